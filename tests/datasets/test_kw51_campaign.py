@@ -59,8 +59,10 @@ def test_records_are_those_of_the_bridge(campaign):
 def test_one_seed_gives_one_campaign(campaign, unchanged):
     again = make_kw51_campaign(n_hours=500, random_state=0)
     changed = make_kw51_campaign(n_hours=500, noise=0.0, damage={"braces": 0.2}, random_state=0)
-    for name in ("temperatures", "frequencies", "damping", "theta", "clean_frequencies"):
+    for name in ("temperatures", "damping", "theta"):
         assert_frame_equal(again[name], campaign[name][:500], check_exact=True)
+    for name in ("frequencies", "clean_frequencies"):  # eigenvalues round by how many are solved for at once
+        assert_frame_equal(again[name], campaign[name][:500], rtol=1e-13, atol=0)
     for other in (changed, unchanged):
         for name in ("temperatures", "damping", "theta"):
             assert_frame_equal(other[name][:500], campaign[name][:500], check_exact=True)
@@ -121,7 +123,7 @@ def test_damage_begins_when_it_is_said_to(unchanged):
     damaged = make_kw51_campaign(damage={"braces": 0.2}, damage_from="2018-11-20", **options)
     onset = unchanged.theta.index.get_loc("2018-11-20 00:00")
     change = damaged.clean_frequencies / unchanged.clean_frequencies[:1500] - 1
-    assert (change[:onset] == 0).all(axis=None)
+    assert change[:onset].abs().max(axis=None) < 1e-13
     assert (change[onset:].drop(columns="f1") < 0).all(axis=None)
     assert change[onset:].mean().idxmin() == "f6"
     expected = damaged.model.damaged({"braces": 0.2}).frequencies(damaged.theta.iloc[-5:])

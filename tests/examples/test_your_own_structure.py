@@ -13,7 +13,7 @@ SAID = {
     "frequencies 1.5 times too high": "mode-offsets",
     "two modes swapped": "mode-order",
     "a thermometer that died": "mostly-filled",
-    "a thermometer that got stuck": "stuck-sensor",
+    "a thermometer that got stuck": "'T1' is 10 °C in 250 of 400 rows",
     "30 records": "few-rows",
     "kelvin in fit": "look like kelvin",
     "kelvin in predict": "outside-training-weather",

@@ -83,7 +83,7 @@ assert_type(inverse.inverse_transform(pd.DataFrame(theta, columns=list(model.par
 assert_type(inverse.inverse_transform(theta), Array)
 posterior = PosteriorInverse(model).fit(F)
 assert_type(posterior.transform(F), Frame)
-assert_type(posterior.transform(f), Array)
+assert_type(PosteriorInverse(model).fit(f).transform(f), Array)
 assert_type(posterior.inverse_transform(theta), Array)
 mapper = TemperatureMapper(LinearRegression()).fit(t, theta)
 assert_type(mapper, TemperatureMapper)
