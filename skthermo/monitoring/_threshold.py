@@ -32,6 +32,7 @@ NEAR = 15  # days of the year, up to which a record stands for the season around
 SEASON = 30  # days of the year, before and after each, whose records give its scale
 LEAST_INDEX = 0.1  # share of the median index above 0, as which smaller ones count for the scale of a season
 FEWEST_PEAKS = 3
+FEW_PEAKS = 6  # excursions below which days count in their place
 USUALLY, NEARLY_ALWAYS = 0.5, 0.98
 """Shares of the days of a baseline that stay within a level: an excursion goes on beyond the first, an event beyond the
 second."""
@@ -355,7 +356,8 @@ def estimate_false_alarms(
     An excursion lasts from the first level above the usual one until all levels of ``hold`` have stayed within it. As
     that does not depend on the threshold, the number of events is the number of excursions whose peak exceeds it, and
     the threshold comes from the `Tail` of the squared peaks, each over the `seasonal_scale`. An excursion may be
-    several events, as these end at a higher level: in the mean, as many as the highest excursions are. ``smallest_at``
+    several events, as these end at a higher level: in the mean, as many as the highest excursions are. Of a baseline
+    with fewer than six excursions, each time of ``hold``, or day if that is longer, counts as one. ``smallest_at``
     gives the smallest changes that a threshold sees, for warnings, ``name`` is what errors call ``per_year``.
     """
     hold, known = pd.Timedelta(hold), index.dropna()
@@ -369,7 +371,7 @@ def estimate_false_alarms(
     n_peaks = len(found.squares)
     seen = (
         f"{name} is {per_year:g}, but the baseline of {found.years} has only {counted_number(n_peaks, 'peak')} of "
-        f"the damage index that {counted_number(hold / DAY, 'day')} of quiet follows"
+        "its damage index"
     )
     if n_peaks < FEWEST_PEAKS:
         raise ValueError(f"{seen}; expected at least {FEWEST_PEAKS}")
@@ -413,6 +415,10 @@ class Excursions:
         standard = known / np.sqrt(scale)
         quiet, _ = quiet_levels(standard, hold, persistence)
         table = find_events(standard.to_numpy(), known.index, EventRule(quiet, quiet, hold, persistence))
+        if len(table) < FEW_PEAKS:
+            level = pd.Series(levels(standard.to_numpy(), persistence)[0], known.index)
+            at = level.groupby(blocks_of(known.index, max(hold, DAY))).idxmax()
+            table = pd.DataFrame({"peak": level[at].to_numpy(), "peak_time": at.to_numpy()}).query("peak > 0")
         table["index"] = table["peak"] * np.sqrt(scale[table["peak_time"]].to_numpy())
         scales = np.quantile(scale, (np.arange(N_SCALES) + 0.5) / N_SCALES) if np.ptp(scale) > 0 else np.ones(1)
         table = table.sort_values("peak", ascending=False)

@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from skthermo.monitoring._events import EventRule, EventState, find_events
-from skthermo.monitoring._threshold import estimate_false_alarms, quiet_levels, seasonal_scale
+from skthermo.monitoring._threshold import FEW_PEAKS, estimate_false_alarms, quiet_levels, seasonal_scale
 
 DAY = pd.Timedelta("1D")
 
@@ -22,6 +23,12 @@ def stamps(n, step="1D", start="2025-01-01"):
 def chi(random, shape, n_modes=6):
     """Damage indices of independent records of normally distributed modes."""
     return np.sqrt(random.chisquare(n_modes, shape))
+
+
+def slow_chi(random, n):
+    """The same of modes that are correlated by 0.9 from one record to the next."""
+    noise = random.normal(0.0, np.sqrt(1 - 0.9**2), (n + 200, 6))
+    return np.linalg.norm(lfilter([1.0], [1.0, -0.9], noise, axis=0)[200:], axis=1)
 
 
 def plain_events(index, times, rule):
@@ -184,6 +191,19 @@ def test_half_a_year_gives_no_estimate_for_the_other_half():
     assert "no estimate for 153 days" in str(estimate)
 
 
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|extrapolated-threshold|baseline-peak)")
+def test_a_month_of_few_excursions_has_the_false_alarms_asked_for_from_its_days():
+    random, n, counts = np.random.default_rng(9), 120, []
+    later = pd.Series(slow_chi(random, 20_000), pd.date_range("2025-01-01", periods=20_000, freq="6h"))
+    for _ in range(20):
+        estimate = estimate_false_alarms(pd.Series(slow_chi(random, n), later.index[:n]), 1.0, persistence=3)
+        assert estimate.tail.k + 1 >= FEW_PEAKS
+        counts.append(len(find_events(later.to_numpy(), later.index, estimate.rule)) / (20_000 / 1461))
+    assert 0.2 < np.mean(counts) < 2
+    with pytest.raises(ValueError, match="2 peaks"):
+        estimate_false_alarms(later[:8], 1.0)
+
+
 @pytest.mark.filterwarnings("ignore:.*missing-seasons")
 def test_a_threshold_far_beyond_the_baseline_is_said_to_be_one():
     index = pd.Series(chi(np.random.default_rng(6), 90), stamps(90))
@@ -200,7 +220,7 @@ def test_of_more_alarms_than_excursions_there_are_as_many_as_these():
     assert many.expected == pytest.approx(n_excursions, rel=0.1)
     assert many.rule.threshold < estimate_false_alarms(index, 0.9 * many.expected).rule.threshold
     with pytest.raises(ValueError, match="expected at least"):
-        estimate_false_alarms(index[:3], 500.0)
+        estimate_false_alarms(index[:2], 500.0)
     with pytest.raises(ValueError, match="0 baseline records have a damage index, 0 of them"):
         estimate_false_alarms(index * np.nan)
 
