@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -109,7 +109,11 @@ class BaselineResiduals:
         shares = np.zeros_like(self.values)
         weather = weather[~np.isnan(weather).any(axis=1)]
         wanted = self.coordinates.transform(weather) if len(weather) else weather
-        for modes, known in self._present(self.values, int(MOST_SIMILAR / SIMILAR)):
+        masks, of_mode = patterns(compared(self.values, int(MOST_SIMILAR / SIMILAR)).T)
+        for pattern, mask in enumerate(masks):
+            modes, known = np.flatnonzero(of_mode == pattern), np.flatnonzero(mask)
+            if not len(known):
+                continue
             counts = np.zeros(len(known))
             for _, _, near in nearest_in_parts(self.places[known], wanted, self._n_compared):
                 counts += np.bincount(near.ravel(), minlength=len(known))
@@ -324,19 +328,9 @@ class BaselineResiduals:
 
     def _local_mean(self, values: Array, weather: Array, number: int, most: int) -> Array:
         """Mean of the values of a number of records in weather most like that of each row, among so many at most."""
-        wanted, used = self.coordinates.transform(weather), np.zeros(values.shape, dtype=bool)
-        for modes, known in self._present(values, most):
-            used[np.ix_(known, modes)] = True
+        wanted, used = self.coordinates.transform(weather), compared(values, most)
         rows = used.any(axis=1)
         return mean_of_nearest(self.places[rows], values[rows], used[rows], wanted, number)
-
-    def _present(self, values: Array, most: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Modes that are there in the same records, and positions of these records, or of so many of them."""
-        masks, of_mode = patterns(~np.isnan(values).T)
-        for pattern, mask in enumerate(masks):
-            known = np.flatnonzero(mask)
-            if known.size:
-                yield np.flatnonzero(of_mode == pattern), known[one_in_each_part(len(known), most)]
 
     def _spread(self, values: Array, weather: Array, beyond: Array) -> Array:
         """The spread of residuals in weather, the wider the farther this is beyond what was learned from."""
@@ -364,6 +358,21 @@ class BaselineResiduals:
             spread = self._spread(np.where(test[:, np.newaxis], np.nan, self._scattered), weather, beyond)
             scores[test] = np.abs(self._scattered[test]) / spread
         return scores
+
+
+def compared(values: Array, most: int) -> NDArray[np.bool_]:
+    """Which values count: all that are there or, of more records, those of the most complete one of equal parts each.
+
+    All modes count in the same records, so that one search for neighbours serves them.
+    """
+    there = ~np.isnan(values)
+    rows = np.flatnonzero(there.any(axis=1))
+    if len(rows) <= most:
+        return there
+    part, n_there = np.arange(len(rows)) * most // len(rows), there[rows].sum(axis=1)
+    order = np.lexsort((np.random.RandomState(0).uniform(size=len(rows)), n_there, part))
+    chosen = rows[order[np.append(np.flatnonzero(np.diff(part)), len(rows) - 1)]]
+    return there & np.isin(np.arange(len(values)), chosen)[:, np.newaxis]
 
 
 def order_statistic(scores: Array, confidence: float) -> float:

@@ -17,7 +17,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo._tables.frames import correlation_time
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
-from skthermo.residuals.baseline import BaselineResiduals, order_statistic
+from skthermo.residuals.baseline import BaselineResiduals, compared, order_statistic
 from skthermo.surrogate import TemperatureMapper
 from tests.surrogate.chains import F, T, as_measured, inverse, trained
 from tests.surrogate.chains import chain as any_chain
@@ -437,6 +437,21 @@ def test_a_day_whose_lags_reach_back_too_far_is_counted():
 
 
 # Many records
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 60))
+def test_of_many_records_the_most_complete_one_of_each_part_counts_for_all_modes(seed, n_records, most):
+    random = np.random.default_rng(seed)
+    values = np.where(random.random((n_records, 3)) < 0.3, np.nan, random.normal(size=(n_records, 3)))
+    there, counts = ~np.isnan(values), compared(values, most)
+    assert not (counts & ~there).any()
+    n_there = there.sum(axis=1)
+    rows, chosen = np.flatnonzero(n_there), np.flatnonzero(counts.any(axis=1))
+    assert np.array_equal(counts[chosen], there[chosen])
+    assert len(chosen) == min(most, len(rows))
+    if len(rows) > most:
+        parts = [rows[np.arange(len(rows)) * most // len(rows) == part] for part in range(most)]
+        assert all(one in part and n_there[one] == n_there[part].max() for one, part in zip(chosen, parts, strict=True))
 
 
 def test_few_of_many_records_tell_as_much(monkeypatch):
