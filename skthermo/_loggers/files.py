@@ -34,6 +34,7 @@ ENDINGS = (".csv", ".txt", ".dat", ".tsv", *BINARY)
 NO_VALUE = re.compile(
     r"|-+|#.*|n/?a|k\.? ?a\.?|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?", re.IGNORECASE
 )
+OTHER_SIGNS = str.maketrans("\u2212\u2013", "--")  # a minus of typesetters, and a dash in its place
 BLANK = r"[ '\u2019\u00a0\u202f]"  # between thousands
 DATE = re.compile(r"\d{4}-\d\d-\d\d")
 OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")
@@ -306,6 +307,8 @@ def number(text: str, decimal: str) -> float:
             return value if isfinite(value) else np.nan
         except ValueError:
             pass
+    if (plain := text.translate(OTHER_SIGNS)) != text:
+        return number(plain, decimal)
     if NO_VALUE.fullmatch(text):
         return np.nan
     point, sign = re.escape(decimal), "," if decimal == "." else r"\."

@@ -229,6 +229,8 @@ UNDERSTOOD = {
     "thousands by points": lambda: log(rows(RECORDS, GERMAN, write=thousands(".", ",")), ";"),
     "thousands by narrow spaces": lambda: log(rows(RECORDS, GERMAN, write=thousands("\u202f", ",")), ";"),
     "thousands by apostrophes": lambda: log(rows(RECORDS, GERMAN, write=thousands("'", ".")), ";"),
+    "a minus of typesetters": lambda: log(rows(write=lambda value: repr(value).replace("-", "\u2212"))),
+    "a dash for a minus": lambda: log(rows(write=lambda value: repr(value).replace("-", "\u2013")), encoding="cp1252"),
     "twelve hours": lambda: log(rows(RECORDS, "%m/%d/%Y %I:%M:%S %p")),
     "twelve hours, the year first": lambda: log(rows(RECORDS, "%Y-%m-%d %I:%M %p")),
     "twelve hours in a column": lambda: log(rows(RECORDS, "%m/%d/%Y", "%I:%M:%S %p")),
