@@ -12,13 +12,13 @@ import scipy  # which loads scipy.signal once it is used
 import scipy.fft
 import scipy.sparse
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import without_warnings
 from skthermo._tables.arrays import Array, patterns
 from skthermo._tables.frames import correlation_times
 from skthermo.preprocessing import HampelFilter
+from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.weather import (
     NearestPlaces,
@@ -483,8 +483,10 @@ def _split(
     expected = _expected(memories, less_similar, n_rows, len(found))
     single = np.diag(found[0])
     of_modes = np.diagonal(found, axis1=1, axis2=2) / single
-    fits = [[nnls(expected[[0, place]].T, column) for column in of_modes.T] for place in range(len(memories))]
-    misfits = [sum(n * rest**2 for n, (_, rest) in zip(n_records, fit, strict=True)) for fit in fits]
+    both = np.stack(np.broadcast_arrays(expected[0], expected), axis=1)
+    along, of_memory = (both @ of_modes).swapaxes(1, 2), np.repeat(np.arange(len(memories)), len(single))
+    shares, lengths = project_on_cones(both @ both.swapaxes(1, 2), along.reshape(-1, 2), of_memory)
+    misfits = ((of_modes**2).sum(axis=0) - lengths.reshape(len(memories), -1) ** 2) @ n_records
     best = int(np.argmin(misfits))
     if misfits[0] - misfits[best] <= 2 * (len(n_records) + 1):  # as the same number of parameters explain of noise
         best = 0
@@ -492,7 +494,7 @@ def _split(
     if best == 0:
         variances = single * (expected[0] @ of_modes) / (expected[0] @ expected[0])
         return memory, _covariance(total, variances), np.zeros_like(total)
-    variances = single * np.array([shares for shares, _ in fits[best]]).T
+    variances = single * shares[of_memory == best].T
     matrices = np.linalg.lstsq(expected[[0, best]].T, found.reshape(len(found), -1), rcond=None)[0]
     parts = []
     for part, faded in enumerate((1.0, (1 - memory) / (1 + memory))):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear
 
 from skthermo._tables.arrays import Array
 
@@ -49,7 +49,7 @@ def _amounts(products: Array, along: Array, which: NDArray[np.intp]) -> Array:
         refused[rows[~entered], best[~entered]] = True
     for row in rows:
         root = np.linalg.cholesky(products[which[row]])
-        amounts[row] = nnls(root.T, np.linalg.solve(root, along[row]))[0]
+        amounts[row] = lsq_linear(root.T, np.linalg.solve(root, along[row]), (0, np.inf), method="bvls").x
     return amounts
 
 

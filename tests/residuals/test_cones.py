@@ -1,10 +1,10 @@
-"""Projections on cones, with SciPy's non-negative least squares as an oracle."""
+"""Projections on cones, with SciPy's bounded least squares as an oracle."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear
 
 from skthermo.residuals.cones import project_on_cones
 
@@ -33,8 +33,8 @@ def test_lengths_are_those_of_non_negative_least_squares(seed, n_dimensions, n_d
     amounts, lengths = project_on_cones(several.swapaxes(1, 2) @ several, along, which)
     assert (amounts >= 0).all()
     for row, cone, amount, length in zip(rows, which, amounts, lengths, strict=True):
-        left = nnls(several[cone], row)[1]
-        assert length**2 == pytest.approx(row @ row - left**2, abs=1e-6)
+        left = 2 * lsq_linear(several[cone], row, (0, np.inf), method="bvls").cost
+        assert length**2 == pytest.approx(row @ row - left, abs=1e-6)
         explained = several[cone] @ amount
         acute = several[cone].T @ (row - explained) > 1e-4 * np.linalg.norm(several[cone])
         assert not acute.any()  # Moreau: what is left makes no acute angle with any direction
@@ -47,3 +47,13 @@ def test_a_row_does_not_depend_on_the_others():
     together = project_on_cones(products, rows @ white, all_alike)[1]
     alone = [project_on_cones(products, row[np.newaxis] @ white, all_alike[:1])[1][0] for row in rows]
     assert together == pytest.approx(alone, abs=1e-12)
+
+
+def test_rows_that_take_too_many_steps_are_solved_alone(monkeypatch):
+    random = np.random.default_rng(1)
+    white, rows = random.standard_normal((6, 4)), random.standard_normal((50, 6))
+    problem = (white.T @ white)[np.newaxis], rows @ white, np.zeros(50, dtype=np.intp)
+    amounts, lengths = project_on_cones(*problem)
+    monkeypatch.setattr("skthermo.residuals.cones.MOST_STEPS", 0)
+    for one, expected in zip(project_on_cones(*problem), (amounts, lengths), strict=True):
+        np.testing.assert_allclose(one, expected, atol=1e-8)
