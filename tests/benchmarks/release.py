@@ -142,9 +142,10 @@ def page(found):
     """The tables of a part, and how they were measured."""
     tables = []
     for title, text in found["tables"].items():
-        rows = io.StringIO()
-        csv.writer(rows, lineterminator="\n").writerows(csv.reader(io.StringIO(text)))
-        body = "".join(f"   {row}\n" for row in rows.getvalue().splitlines())
+        (first, *head), *rows = csv.reader(io.StringIO(text))
+        lines = io.StringIO()
+        csv.writer(lines, lineterminator="\n").writerows([[first or "case", *head], *rows])  # screen readers need one
+        body = "".join(f"   {line}\n" for line in lines.getvalue().splitlines())
         tables.append(f".. csv-table:: {title}\n   :header-rows: 1\n\n{body}\n")
     return "".join(tables) + f"``{found['command']}``, revision {found['revision']}, {found['date']}.\n"
 
