@@ -397,7 +397,8 @@ def estimate_false_alarms(
 
 @dataclass(frozen=True)
 class Excursions:
-    """Excursions of a baseline's indices beyond the level that they stay within, the highest first.
+    """Excursions of a baseline's indices beyond the level that they stay within, or its days if they are few, the
+    highest first.
 
     ``table`` has ``peak``, over the root of the seasonal scale, ``index`` and ``peak_time``; ``scales`` are quantiles
     of that scale. ``n_years`` is the time that the records cover, ``missing_season`` what they do not, in words.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
 from skthermo._estimators.warnings import without_warnings
-from skthermo._tables.arrays import Array, patterns
+from skthermo._tables.arrays import Array, rows_by_pattern
 from skthermo._tables.frames import correlation_times
 from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.cones import project_on_cones
@@ -109,9 +109,8 @@ class BaselineResiduals:
         shares = np.zeros_like(self.values)
         weather = weather[~np.isnan(weather).any(axis=1)]
         wanted = self.coordinates.transform(weather) if len(weather) else weather
-        masks, of_mode = patterns(compared(self.values, int(MOST_SIMILAR / SIMILAR)).T)
-        for pattern, mask in enumerate(masks):
-            modes, known = np.flatnonzero(of_mode == pattern), np.flatnonzero(mask)
+        for mask, modes in rows_by_pattern(compared(self.values, int(MOST_SIMILAR / SIMILAR)).T):
+            known = np.flatnonzero(mask)
             if not len(known):
                 continue
             counts = np.zeros(len(known))

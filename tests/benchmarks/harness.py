@@ -76,13 +76,12 @@ def shown(title, table, digits=2):
     TABLES[title] = table.to_csv()
 
 
-def is_missed(what, found, target, *, known=False, quiet=False):
+def is_missed(what, found, target, *, known=False):
     """Print whether a number is within its target, such as ">= 90"; whether it is missed and not known to be."""
     relation, limit = target.split()
     is_met = found >= float(limit) if relation == ">=" else found <= float(limit)
     verdict = "met" if is_met else "missed as known" if known else "MISSED"
-    if not quiet:
-        print(f"{verdict:15} {what}: {found:.3g}, target {target}", flush=True)
+    print(f"{verdict:15} {what}: {found:.3g}, target {target}", flush=True)
     return not (is_met or known)
 
 

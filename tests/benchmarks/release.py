@@ -112,13 +112,10 @@ PARTS = {
 def run(name, measured, quick, again):
     """The result of a part, from its file if it is there and has tables and is not wanted again."""
     part, file, tables = PARTS[name], measured / "results" / f"{name}.json", measured / f"{name}.tables.json"
-    if (
-        not again
-        and file.exists()
-        and (found := json.loads(file.read_text()))["exit code"] in (0, 1)
-        and found["tables"]
-    ):
-        return found
+    if file.exists() and not again:
+        found = json.loads(file.read_text())
+        if found["exit code"] in (0, 1) and found["tables"]:
+            return found
     words = shlex.split(f"{part.options} {part.quick}" if quick else part.options)
     if quick and "--figure" in words:
         words[words.index("--figure") + 1] = str(measured / "figure.png")

@@ -4,13 +4,12 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/scale.py --rows 5256 52560 525600 --bridges 10 100 1000
 
 Frequencies of the truss follow made-up weather, with noise that is correlated in time, gaps and outliers. Each part and
-size has a process of its own, whose peak memory, without that of its workers, is printed. In the part "chain", the
-inverse is a linear regression, which costs the same for each record; the part "defaults" has the defaults of all.
-"service" is a monitor that is fitted to the first tenth of the records, and then updated by each of the other days;
-"fleet" are bridges with a year of hourly records each, whose files are updated by a day, in "workers" by two processes
-as well and in seconds by the clock. The exit code is 1 if a step takes more than three times as long a record or bridge
-as with the next smaller size, where a quadratic one takes ten times as long, a part more than 4 GB, an update of the
-last days more than twice as long as one of the first.
+size has a process of its own, whose peak memory is printed. In the part "chain", the inverse is a linear regression,
+which costs the same for each record; the part "defaults" has the defaults of all. "service" is a monitor that is fitted
+to the first tenth of the records, and then updated by each of the other days; "fleet" are bridges with a year of hourly
+records each, whose files are updated by a day. The exit code is 1 if a step takes more than three times as long a
+record or bridge as with the next smaller size, where a quadratic one takes ten times as long, a part more than 4 GB, an
+update of the last days more than twice as long as one of the first.
 """
 
 import json
@@ -22,7 +21,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import joblib
 import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, compensated, peak_megabytes, shown
@@ -183,26 +181,8 @@ def fleet(n_bridges):
     shutil.rmtree(folder)
 
 
-def workers(n_bridges):
-    folder, new = made_fleet(n_bridges)
-    yield "one process", lambda: Fleet(folder).update(new(0))
-    yield "two processes", lambda: Fleet(folder).update(new(1), n_jobs=2)
-    yield "two workers of Dask", lambda: by_dask(lambda: Fleet(folder).update(new(2)))
-    shutil.rmtree(folder)
-
-
-def by_dask(way):
-    import dask
-    from dask.distributed import Client
-
-    dask.config.set({"distributed.admin.low-level-log-length": 10})  # messages, in which monitors travel
-    with Client(n_workers=2, threads_per_worker=1, dashboard_address=None), joblib.parallel_config("dask"):
-        return way()
-
-
 OF_RECORDS = (preprocessing, chain, defaults, service)
-OF_BRIDGES = (fleet, workers)
-PARTS = {part.__name__: part for part in (*OF_RECORDS, *OF_BRIDGES)}
+PARTS = {part.__name__: part for part in (*OF_RECORDS, fleet)}
 TEN_MINUTES = "ten-minute records of the truss (3 temperatures, 6 frequencies, 5 % missing); processor seconds"
 TITLES = {
     "preprocessing": f"Preparing {TEN_MINUTES}",
@@ -210,22 +190,20 @@ TITLES = {
     "defaults": f"Chain and study by default, {TEN_MINUTES}",
     "service": f"A monitor in service, {TEN_MINUTES}",
     "fleet": "A fleet with baselines of a year of hourly records; processor seconds",
-    "workers": "The fleet's update by a day of hourly records, seconds by the clock on two cores",
 }
 
 
 def one(part, size, **options):
     """Print seconds of each step of a part, and gigabytes, as lines of JSON."""
-    clock = time.perf_counter if part is workers else time.process_time
-    if part in OF_BRIDGES:
+    if part is fleet:
         steps = part(size)
     else:
         T, F = records(size, 10 if part is service else 1)
         steps = part(T, with_faults(F), **options)
     for step, way in steps:
-        start = clock()
+        start = time.process_time()
         way()
-        print(json.dumps({"name": step, "seconds": clock() - start}), flush=True)
+        print(json.dumps({"name": step, "seconds": time.process_time() - start}), flush=True)
     says("peak memory of the process, GB", peak_megabytes() / 1e3, is_missed=peak_megabytes() > 1e3 * MOST_GIGABYTES)
 
 
@@ -241,12 +219,12 @@ def main():
     if options.one:
         part = PARTS[options.parts[0]]
         more = {"n_replicates": options.replicates} if part is defaults else {}
-        one(part, (options.bridges if part in OF_BRIDGES else options.rows)[0], **more)
+        one(part, (options.bridges if part is fleet else options.rows)[0], **more)
         return 0
     missed = 0
     for part in options.parts:
         option, what, sizes = "rows", "record", options.rows
-        if PARTS[part] in OF_BRIDGES:
+        if PARTS[part] is fleet:
             option, what, sizes = "bridges", "bridge", options.bridges
         seconds, others = {}, {}
         for size in sizes:
