@@ -38,7 +38,7 @@ def pytest_collection_finish(session):
 @pytest.fixture(scope="session")
 def shared_folder(tmp_path_factory):
     """Gives the folder of a name, which the first worker that asks fills for all; none changes what is in it."""
-    from skthermo._io import alone_with
+    from skthermo._core.files import alone_with
 
     root = tmp_path_factory.getbasetemp()
     root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root

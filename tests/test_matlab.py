@@ -13,7 +13,7 @@ import pytest
 import scipy.io
 import scipy.sparse
 
-from skthermo._io import read_matlab
+from skthermo._core.matrix_files import read_matlab
 
 SPARSE = scipy.sparse.csc_array(np.array([[2.0, -1.0, 0], [-1.0, 2.0, 0], [0, 0, 0], [0.5, 0, 0]]))
 CUBE = np.random.default_rng(0).normal(size=(3, 2, 4))
@@ -178,11 +178,11 @@ def test_a_crash_too_much_memory_and_too_much_time_are_errors_that_name_the_file
         read(file, mat_file(packed(zeros)))
     ending = tmp_path / "ending.py"
     ending.write_text("import os\nos.kill(os.getpid(), 11)\n")
-    monkeypatch.setattr("skthermo._io._matrix_files.CHILD", ending)
+    monkeypatch.setattr("skthermo._core.matrix_files.CHILD", ending)
     with pytest.raises(ValueError, match=r"any\.mat: .*reading it ended the process with exit code -?\d+"):
         read(file, mat_file(X))
     ending.write_text("import time\ntime.sleep(60)\n")
-    monkeypatch.setattr("skthermo._io._matrix_files.SECONDS", 0.2)
+    monkeypatch.setattr("skthermo._core.matrix_files.SECONDS", 0.2)
     with pytest.raises(ValueError, match=r"any\.mat: .*reading it took more than 0 s"):
         read(file, mat_file(X))
 
@@ -244,7 +244,8 @@ def test_the_one_matlab_file_in_a_zip_file(tmp_path, in_process):
 def test_a_script_without_a_main_guard_and_another_folder_can_read(tmp_path):
     scipy.io.savemat(tmp_path / "any.mat", {"x": np.eye(2)})
     (tmp_path / "json.py").write_text("raise SystemExit('a module of the user')")
-    script = "from pathlib import Path; from skthermo._io import read_matlab; print(read_matlab(Path('any.mat')))"
+    script = "from pathlib import Path; from skthermo._core.matrix_files import read_matlab; "
+    script += "print(read_matlab(Path('any.mat')))"
     (tmp_path / "script.py").write_text(script)
     for command in (["-c", script.replace("from", "import sys; sys.path.remove(''); from", 1)], ["-P", "script.py"]):
         done = subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, check=False)

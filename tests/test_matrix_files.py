@@ -7,7 +7,7 @@ import pytest
 import scipy.io
 import scipy.sparse
 
-from skthermo._io import read_named_matrices
+from skthermo._core.matrix_files import read_named_matrices
 
 N = 6
 RNG = np.random.default_rng(0)

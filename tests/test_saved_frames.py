@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo._tables.saved_frames import SavedTable, SavedTime, from_saved, to_saved
+from skthermo._core.saved_frames import SavedTable, SavedTime, from_saved, to_saved
 
 VALUES = np.arange(6.0).reshape(3, 2)
 HOURS = pd.date_range("2025-01-01", periods=3, freq="h", name="time")

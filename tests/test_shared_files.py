@@ -6,12 +6,12 @@ import sys
 
 import pytest
 
-from skthermo._io import ReadWhenAsked, alone_with, write_when_complete
+from skthermo._core.files import ReadWhenAsked, alone_with, write_when_complete
 
 HOLDER = """
 import sys
 from pathlib import Path
-from skthermo._io import alone_with
+from skthermo._core.files import alone_with
 with alone_with(Path(sys.argv[1]), 0):
     print("held", flush=True)
     sys.stdin.read()

@@ -10,9 +10,9 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.svm import OneClassSVM
 
-from skthermo._tables.arrays import as_floats, as_random_state, real_array
-from skthermo._tables.frames import as_index, column_names, frame_like, usual_step
-from skthermo._tables.text import plain
+from skthermo._core.arrays import as_floats, as_random_state, real_array
+from skthermo._core.frames import as_index, column_names, frame_like, usual_step
+from skthermo._core.text import plain
 from skthermo.detection import DamageDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.fem import add_noise
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures

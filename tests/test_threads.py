@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg  # brings a BLAS of its own
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from skthermo._estimators.jobs import map_on_blas_threads, single_blas_thread
+from skthermo._core.parallel import map_on_blas_threads, single_blas_thread
 
 def blas_threads():
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}

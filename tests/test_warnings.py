@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sklearn.inspection import partial_dependence, permutation_importance
 
-from skthermo._estimators.warnings import (
+from skthermo._core.warnings import (
     counted_warnings,
     explain_rows,
     explained_rows,

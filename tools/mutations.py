@@ -133,7 +133,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("shape derivative along the mode itself", "-d_masses / 2", "-d_masses"),
         ("shape derivative along other modes", "along / np.where", "-along / np.where"),
     ],
-    ("_tables/arrays.py", "fem/test_linearise.py"): [
+    ("_core/arrays.py", "fem/test_linearise.py"): [
         ("one-sided differences", "known.any(axis=0), known.sum(axis=0)", "known.any(axis=0), 2"),
     ],
     ("fem/_evaluate.py", "fem/test_linearise.py"): [
@@ -177,7 +177,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
         ("parameters distinguished", "values > SMALLEST_SHARE * values[0]", "values >= 0"),
     ],
-    ("_tables/arrays.py", "updating/test_sensitivity.py"): [
+    ("_core/arrays.py", "updating/test_sensitivity.py"): [
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
         ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
     ],
@@ -217,10 +217,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
         ("residuals of records of weight 0", "measured).all(axis=1) & self.counted", "measured).all(axis=1)"),
     ],
-    ("_tables/frames.py", "surrogate/test_sample_weight.py"): [
+    ("_core/frames.py", "surrogate/test_sample_weight.py"): [
         ("weights of a series by index", "sample_weight.reindex(X.index)", "sample_weight"),
     ],
-    ("_validation.py", "surrogate/test_sample_weight.py"): [
+    ("_core/estimators.py", "surrogate/test_sample_weight.py"): [
         ("weights routed as requested", "is None or routes_weights(estimator):", "is None:"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
@@ -264,17 +264,17 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("residuals/weather.py", "surrogate/test_uncertainty.py"): [
         ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
     ],
-    ("_tables/frames.py", "surrogate/test_uncertainty.py"): [
+    ("_core/frames.py", "surrogate/test_uncertainty.py"): [
         ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
     ],
     ("preprocessing/_folds.py", "preprocessing/test_folds.py"): [
         ("blocks dealt in turn", "blocks % self.n_splits", "blocks * self.n_splits // (blocks.max() + 1)"),
     ],
-    ("_io/_child.py", "test_matlab.py"): [
+    ("_core/matrix_child.py", "test_matlab.py"): [
         ("a part too many in a file", "n_parts != expected", "n_parts < expected"),
         ("unsorted rows in a file", "if scipy.sparse.issparse(value) and not", "if False and not"),
     ],
-    ("_io/_child.py", "fem/test_triplets.py"): [
+    ("_core/matrix_child.py", "fem/test_triplets.py"): [
         ("entries on both sides in a file", "(rows < columns).any() and (rows > columns).any()", "False"),
     ],
     ("preprocessing/_poles.py", "preprocessing/test_mode_tracker.py"): [
@@ -361,7 +361,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("windows with too few records", "np.median(windows.n_known) / 2", "np.median(windows.n_known) / 4"),
         ("half the width of a window", "self.width_ / 2)", "self.width_ / 4)"),
     ],
-    ("_estimators/warnings.py", "detection/test_checked_once.py"): [
+    ("_core/warnings.py", "detection/test_checked_once.py"): [
         ("what the calling estimator has reported", "if kind in context.reported:", "if kind in ():"),
         (
             "a check that is shared",
@@ -372,10 +372,10 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_fused.py", "detection/test_checked_once.py"): [
         ("detectors that share a check", ", checked_once():", ":"),
     ],
-    ("_estimators/warnings.py", "surrogate/test_report.py"): [
+    ("_core/warnings.py", "surrogate/test_report.py"): [
         ("a warning for each fold", "if kind in given:", "if kind in given and not in_folds:"),
     ],
-    ("_estimators/jobs.py", "test_threads.py"): [
+    ("_core/parallel.py", "test_threads.py"): [
         ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
     ],
     ("residuals/baseline.py", "surrogate/test_scatter.py"): [
@@ -419,7 +419,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
-    ("_effects.py", "studies/test_identify_causes.py"): [
+    ("_core/effects.py", "studies/test_identify_causes.py"): [
         ("derivatives by relative changes", "self.directions / (1 + self", "self.directions / (1 + 0 * self"),
         ("weather of each mode's own records", "mean, square = places @ shares", "mean, square = 0 * places @ shares"),
     ],
@@ -510,7 +510,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("commands/_bridge.py", "commands/test_monitor_commands.py"): [
         ("an alarm that has ended within a batch", "if has_alarm or state ==", "if state =="),
     ],
-    ("_io/_shared_files.py", "test_shared_files.py"): [
+    ("_core/files.py", "test_shared_files.py"): [
         ("a lock that another process holds", "        return False\n    return True", "        pass\n    return True"),
     ],
 }

@@ -16,10 +16,9 @@ from typing import Any
 import pandas as pd
 
 import skthermo
-from skthermo._estimators.warnings import reported_by_caller, warn_user
-from skthermo._io import alone_with
-from skthermo._loggers.files import CsvFormat, in_zone, read_file
-from skthermo._tables.text import counted, plain
+from skthermo._core.files import alone_with
+from skthermo._core.text import counted, plain
+from skthermo._core.warnings import reported_by_caller, warn_user
 from skthermo.commands._new_records import (
     NewFile,
     Taken,
@@ -32,6 +31,7 @@ from skthermo.commands._new_records import (
 from skthermo.commands._settings import Settings, read_settings
 from skthermo.exceptions import SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
+from skthermo.preprocessing.loggers.files import CsvFormat, in_zone, read_file
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}

@@ -12,13 +12,13 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._io import write_when_complete
-from skthermo._loggers.files import BINARY, ENDINGS, CsvFormat, read_file
-from skthermo._loggers.together import in_celsius, joined, once
-from skthermo._tables.text import counted
+from skthermo._core.files import write_when_complete
+from skthermo._core.text import counted
+from skthermo._core.warnings import warn_user
 from skthermo.commands._settings import Records
 from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing.loggers.files import BINARY, ENDINGS, CsvFormat, read_file
+from skthermo.preprocessing.loggers.together import in_celsius, joined, once
 
 
 @dataclass(frozen=True)

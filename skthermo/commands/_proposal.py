@@ -16,12 +16,10 @@ import numpy as np
 import pandas as pd
 
 import skthermo
-from skthermo._estimators.warnings import without_warnings
-from skthermo._io import write_when_complete
-from skthermo._loggers.files import BINARY, PARQUET, CsvFormat, Look, read_file
-from skthermo._loggers.together import HZ, LoggerRecords
-from skthermo._tables.frames import usual_step
-from skthermo._tables.text import duration_text
+from skthermo._core.files import write_when_complete
+from skthermo._core.frames import usual_step
+from skthermo._core.text import duration_text
+from skthermo._core.warnings import without_warnings
 from skthermo.commands._settings import (
     CLASSES,
     SECTIONS,
@@ -34,6 +32,8 @@ from skthermo.commands._settings import (
 )
 from skthermo.detection import DirectionalDetector
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
+from skthermo.preprocessing.loggers.files import BINARY, PARQUET, CsvFormat, Look, read_file
+from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
 REGRESSION = "sklearn.linear_model.Ridge"

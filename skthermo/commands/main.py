@@ -40,8 +40,8 @@ from typing import Any, NoReturn
 import pandas as pd
 
 import skthermo
-from skthermo._io import ReadWhenAsked, write_when_complete
-from skthermo._tables.text import capital, plain
+from skthermo._core.files import ReadWhenAsked, write_when_complete
+from skthermo._core.text import capital, plain
 from skthermo.commands import _bridge
 from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt, sentence
 from skthermo.commands._settings import HOW_TO_BEGIN

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import Array, as_random_state, check_noise, is_real, positive_integer
+from skthermo._core.arrays import Array, as_random_state, check_noise, is_real, positive_integer
 from skthermo.datasets._fleet_site import (
     ATYPICAL_LAWS,
     Law,

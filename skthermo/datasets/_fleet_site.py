@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import norm
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.datasets._kw51_campaign import memory
 
 COLDEST_DAY = 20.0

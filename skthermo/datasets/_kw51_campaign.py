@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 from scipy.stats import norm
 
-from skthermo._tables.arrays import Array, as_random_state, check_flag, check_noise, positive_integer
+from skthermo._core.arrays import Array, as_random_state, check_flag, check_noise, positive_integer
 from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import N_BAYS, N_PANELS, kw51_sensors, kw51_structure, updated_model
 from skthermo.datasets._results import KW51Campaign

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._io import read_matlab
-from skthermo._tables.arrays import Array, check_path
+from skthermo._core.arrays import Array, check_path
+from skthermo._core.matrix_files import read_matlab
+from skthermo._core.warnings import warn_user
 from skthermo.datasets._results import KW51Monitoring
 from skthermo.exceptions import RecordsWarning
 

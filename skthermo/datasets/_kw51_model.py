@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._tables.arrays import check_flag, positive_integer
+from skthermo._core.arrays import check_flag, positive_integer
 from skthermo.fem import AffineModel, Beam, Membrane, Structure
 
 Section = dict[str, float]

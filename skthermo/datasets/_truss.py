@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import as_random_state, is_real, positive_integer, real_array
+from skthermo._core.arrays import as_random_state, is_real, positive_integer, real_array
 from skthermo.datasets._results import TrussCampaign
 from skthermo.fem import AffineModel, Bar, Structure, add_noise
 

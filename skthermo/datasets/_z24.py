@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._io import read_matlab
-from skthermo._tables.arrays import check_path, positive_integer
+from skthermo._core.arrays import check_path, positive_integer
+from skthermo._core.matrix_files import read_matlab
 from skthermo.datasets._results import Z24Monitoring
 from skthermo.fem import AffineModel, Beam, Spring, Structure
 

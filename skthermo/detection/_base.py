@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
-from skthermo._estimators.warnings import explain_rows, explained_rows, warn_each, warn_user
-from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import Table, frame_like, row_times
-from skthermo._tables.origins import origin_of
-from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
+from skthermo._core.arrays import Array, as_floats
+from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted
+from skthermo._core.frames import Table, frame_like, row_times
+from skthermo._core.origins import origin_of
+from skthermo._core.warnings import explain_rows, explained_rows, warn_each, warn_user
 from skthermo.exceptions import FewRecordsWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing import set_aside
 

@@ -18,27 +18,9 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
-from skthermo._estimators.answers import answer_once
-from skthermo._estimators.warnings import (
-    explain_rows,
-    explained_rows,
-    findings_of,
-    reported_by_caller,
-    warn_each,
-    warn_user,
-    warnings_once,
-    without_warnings,
-)
-from skthermo._tables.arrays import Array, as_columns, as_floats, is_model, means_of_known
-from skthermo._tables.frames import (
-    column_names,
-    frame_like,
-    has_stamps,
-    positions_of,
-    warn_of_markers,
-)
-from skthermo._tables.origins import Changes, Origin, with_origin
-from skthermo._validation import (
+from skthermo._core.answers import answer_once
+from skthermo._core.arrays import Array, as_columns, as_floats, is_model, means_of_known
+from skthermo._core.estimators import (
     BaseSearchCV,
     Estimator,
     HasMethods,
@@ -56,6 +38,24 @@ from skthermo._validation import (
     rows_from_fleet,
     validate_data,
     warn_of_fleet,
+)
+from skthermo._core.frames import (
+    column_names,
+    frame_like,
+    has_stamps,
+    positions_of,
+    warn_of_markers,
+)
+from skthermo._core.origins import Changes, Origin, with_origin
+from skthermo._core.warnings import (
+    explain_rows,
+    explained_rows,
+    findings_of,
+    reported_by_caller,
+    warn_each,
+    warn_user,
+    warnings_once,
+    without_warnings,
 )
 from skthermo.detection._base import mean_log_density
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning

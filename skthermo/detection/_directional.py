@@ -12,10 +12,10 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._effects import damage_directions, usual_frequencies
-from skthermo._tables.arrays import Array, as_floats, check_probability, is_model, means_of_known, patterns, real_array
-from skthermo._tables.origins import Changes, origin_of
-from skthermo._validation import Interval, StrOptions, check_is_fitted
+from skthermo._core.arrays import Array, as_floats, check_probability, is_model, means_of_known, patterns, real_array
+from skthermo._core.effects import damage_directions, usual_frequencies
+from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
+from skthermo._core.origins import Changes, origin_of
 from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector, PatternScale, as_if_complete
 from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.gaussian import precisions, whitenings

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import clone
 
-from skthermo._estimators.warnings import checked_once, explain_rows, explained_rows, warnings_once
-from skthermo._tables.arrays import Array, as_floats
-from skthermo._validation import _BaseComposition, last_step
+from skthermo._core.arrays import Array, as_floats
+from skthermo._core.estimators import _BaseComposition, last_step
+from skthermo._core.warnings import checked_once, explain_rows, explained_rows, warnings_once
 from skthermo.detection._base import DamageDetector, conformal_threshold
 
 

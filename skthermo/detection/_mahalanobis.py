@@ -14,9 +14,9 @@ from scipy.stats import chi2
 from sklearn.base import BaseEstimator, clone
 from sklearn.covariance import EmpiricalCovariance
 
-from skthermo._estimators.warnings import warn_user, without_warnings
-from skthermo._tables.arrays import Array, patterns
-from skthermo._validation import HasMethods, StrOptions
+from skthermo._core.arrays import Array, patterns
+from skthermo._core.estimators import HasMethods, StrOptions
+from skthermo._core.warnings import warn_user, without_warnings
 from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.residuals.folds import Neighbourhoods

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, DensityMixin, clone
 from sklearn.neighbors import KernelDensity
 
-from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import column_names
-from skthermo._tables.text import listed
-from skthermo._validation import HasMethods, Interval, StrOptions
+from skthermo._core.arrays import Array, as_floats
+from skthermo._core.estimators import HasMethods, Interval, StrOptions
+from skthermo._core.frames import column_names
+from skthermo._core.text import listed
 from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.residuals.folds import Neighbourhoods
 

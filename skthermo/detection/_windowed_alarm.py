@@ -17,11 +17,11 @@ from sklearn.base import clone
 from sklearn.model_selection import KFold
 from sklearn.utils.metaestimators import available_if
 
-from skthermo._estimators.warnings import reported_by_caller, without_warnings
-from skthermo._tables.arrays import Array, check_probability, patterns, range_sums
-from skthermo._tables.frames import correlation_time, first_disorder
-from skthermo._tables.origins import Changes, Origin, with_origin
-from skthermo._validation import Interval, StrOptions, check_is_fitted
+from skthermo._core.arrays import Array, check_probability, patterns, range_sums
+from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
+from skthermo._core.frames import correlation_time, first_disorder
+from skthermo._core.origins import Changes, Origin, with_origin
+from skthermo._core.warnings import reported_by_caller, without_warnings
 from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.detection._directional import (
     Detectability,

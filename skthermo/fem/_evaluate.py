@@ -13,8 +13,7 @@ from joblib import delayed, effective_n_jobs
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import qmc
 
-from skthermo._estimators.jobs import as_they_come, map_on_blas_threads, single_blas_thread, with_progress
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     Bounds,
     RandomState,
@@ -31,6 +30,7 @@ from skthermo._tables.arrays import (
     positive_integer,
     real_array,
 )
+from skthermo._core.parallel import as_they_come, map_on_blas_threads, single_blas_thread, with_progress
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._terms import ROWS_PER_CHUNK, warn_of_failures
 from skthermo.fem.modal import linearised_by_row

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 
 VARIABLE = "SKTHERMO_SOLVER"
 SYMMETRIC = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
@@ -134,6 +134,6 @@ SOLVERS: dict[str, Callable[[NDArray[np.int32], NDArray[np.int32]], Elimination]
 
 
 def _rslab() -> ModuleType:
-    from skthermo._validation import import_optional  # imported here because scikit-learn imports pandas
+    from skthermo._core.estimators import import_optional  # imported here because scikit-learn imports pandas
 
     return import_optional("rslab", extra="sparse")

@@ -10,7 +10,7 @@ from operator import add
 import numpy as np
 import scipy.sparse
 
-from skthermo._tables.arrays import Array, Label, Matrix
+from skthermo._core.arrays import Array, Label, Matrix
 from skthermo.fem._structure import (
     MASS,
     SAME,

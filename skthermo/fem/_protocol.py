@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 
 
 @runtime_checkable

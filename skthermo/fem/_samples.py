@@ -2,7 +2,7 @@
 
 from sklearn.utils import Bunch
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 
 
 class Samples(Bunch):

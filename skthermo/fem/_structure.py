@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse
 
-from skthermo._tables.arrays import Array, Label, Matrix, MatrixLike, real_array
+from skthermo._core.arrays import Array, Label, Matrix, MatrixLike, real_array
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, ByProperties, Dof, Element, check_element, check_matrices
 

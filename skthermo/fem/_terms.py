@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
+from skthermo._core.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._factors import Elimination, elimination
 

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import false_discovery_control, genpareto
 
-from skthermo._tables.arrays import Array, check_size
-from skthermo._tables.text import counted_number, listed, percent, significant
+from skthermo._core.arrays import Array, check_size
+from skthermo._core.text import counted_number, listed, percent, significant
 from skthermo.monitoring import Monitor
 
 FEWEST_EXCESSES = 80  # of other bridges, from which the shape of the tail is learned

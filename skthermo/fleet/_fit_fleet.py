@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.jobs import with_progress
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import check_jobs, check_path
+from skthermo._core.arrays import check_jobs, check_path
+from skthermo._core.parallel import with_progress
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._fleet import Fleet, Storage, named, warn_of_bridges
 from skthermo.fleet._workers import BridgeFit, run_tasks, seed_of, standing_of

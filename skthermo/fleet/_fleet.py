@@ -19,11 +19,11 @@ import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.jobs import with_progress
-from skthermo._estimators.warnings import warn_user
-from skthermo._io import ReadWhenAsked, alone_with, write_when_complete
-from skthermo._tables.arrays import check_jobs, check_path
-from skthermo._tables.text import counted
+from skthermo._core.arrays import check_jobs, check_path
+from skthermo._core.files import ReadWhenAsked, alone_with, write_when_complete
+from skthermo._core.parallel import with_progress
+from skthermo._core.text import counted
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import SkthermoWarning
 from skthermo.fleet._discoveries import Discoveries, discover, without_zone
 from skthermo.fleet._workers import (

@@ -23,11 +23,11 @@ from joblib import Parallel, delayed, effective_n_jobs, parallel_config, wrap_no
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._estimators.answers import content_of
-from skthermo._estimators.jobs import single_blas_thread, without_bars
-from skthermo._estimators.memory import identity_of
-from skthermo._estimators.warnings import counted_warnings
-from skthermo._validation import seed_parts
+from skthermo._core.answers import content_of
+from skthermo._core.estimators import seed_parts
+from skthermo._core.memory import identity_of
+from skthermo._core.parallel import single_blas_thread, without_bars
+from skthermo._core.warnings import counted_warnings
 from skthermo.metrics import mape
 from skthermo.monitoring import Monitor, MonitorStatus
 

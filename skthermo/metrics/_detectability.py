@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import is_labelled, real_array
-from skthermo._tables.frames import check_same_rows, row_times, time_of
+from skthermo._core.arrays import is_labelled, real_array
+from skthermo._core.frames import check_same_rows, row_times, time_of
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import UnevaluatedRowsWarning
 
 

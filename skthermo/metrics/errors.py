@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
-from skthermo._tables.arrays import as_columns, real_array
-from skthermo._tables.frames import MARKERS, check_same_rows, column_names, row_weights
+from skthermo._core.arrays import as_columns, real_array
+from skthermo._core.frames import MARKERS, check_same_rows, column_names, row_weights
 
 AVERAGE = "Average"
 

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
-from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import DAY, check_duration, usual_step
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._validation import BaseSearchCV, last_step
+from skthermo._core.answers import answers_kept
+from skthermo._core.arrays import Array, as_floats
+from skthermo._core.estimators import BaseSearchCV, last_step
+from skthermo._core.frames import DAY, check_duration, usual_step
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo.detection import (
     DirectionalDetector,
     FusedDetector,

@@ -12,8 +12,8 @@ import pandas as pd
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import make_pipeline
 
-from skthermo._tables.frames import positions_of
-from skthermo._validation import check_is_fitted
+from skthermo._core.estimators import check_is_fitted
+from skthermo._core.frames import positions_of
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing.checks import SetAside, set_aside
 

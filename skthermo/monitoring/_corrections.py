@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import MARKERS
+from skthermo._core.arrays import Array
+from skthermo._core.frames import MARKERS
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.sensors import Dispute, SensorWatch
 from skthermo.preprocessing.checks import Plausible

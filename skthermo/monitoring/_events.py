@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import as_index
-from skthermo._tables.saved_frames import SavesFrames
+from skthermo._core.arrays import Array
+from skthermo._core.frames import as_index
+from skthermo._core.saved_frames import SavesFrames
 
 DAMAGE, MEASUREMENT, WATCH = "damage", "measurement or structure", "watch"
 """Kinds of events; the second is that of responses set aside as implausible or stuck, the last of a raised index."""

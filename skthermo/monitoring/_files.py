@@ -16,10 +16,10 @@ from sklearn.exceptions import InconsistentVersionWarning
 from sklearn.utils.validation import check_is_fitted
 
 import skthermo
-from skthermo._estimators.warnings import warn_user
-from skthermo._io import write_when_complete
-from skthermo._tables.arrays import check_path
-from skthermo._validation import import_optional
+from skthermo._core.arrays import check_path
+from skthermo._core.estimators import import_optional
+from skthermo._core.files import write_when_complete
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import SkthermoWarning
 
 ENDINGS = (".joblib", ".skops")

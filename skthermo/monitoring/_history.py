@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import midnight, midnights, midnights_between
-from skthermo._tables.saved_frames import SavesFrames
+from skthermo._core.arrays import Array
+from skthermo._core.frames import midnight, midnights, midnights_between
+from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._corrections import Corrected, Corrections, CorrectionState
 from skthermo.monitoring._events import (

@@ -13,11 +13,8 @@ import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import check_flag, is_real
-from skthermo._tables.frames import DAY, YEAR, check_duration, check_stamp, midnight
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._validation import (
+from skthermo._core.arrays import check_flag, is_real
+from skthermo._core.estimators import (
     Estimator,
     HasMethods,
     Interval,
@@ -27,6 +24,9 @@ from skthermo._validation import (
     seed_parts,
     seeded,
 )
+from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, midnight
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._columns import usable_baseline, without_what_cannot_be

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.pipeline import Pipeline
 
-from skthermo._tables.arrays import as_floats, is_model, refuse_no_table
-from skthermo._tables.frames import DAY_NS, YEAR, usual_step
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.text import duration_text
-from skthermo._validation import with_nan
+from skthermo._core.arrays import as_floats, is_model, refuse_no_table
+from skthermo._core.estimators import with_nan
+from skthermo._core.frames import DAY_NS, YEAR, usual_step
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.text import duration_text
 from skthermo.preprocessing import HampelFilter
 
 JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong

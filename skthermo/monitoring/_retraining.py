@@ -11,11 +11,11 @@ import pandas as pd
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 
-from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.warnings import without_warnings
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
-from skthermo._tables.text import capital, counted
+from skthermo._core.answers import answers_kept
+from skthermo._core.arrays import Array
+from skthermo._core.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
+from skthermo._core.text import capital, counted
+from skthermo._core.warnings import without_warnings
 from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._events import WATCH
 from skthermo.monitoring._records import Memory

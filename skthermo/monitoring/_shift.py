@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_law
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._estimators.warnings import without_warnings
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import correlation_time
-from skthermo._tables.text import probability_text
+from skthermo._core.arrays import Array
+from skthermo._core.frames import correlation_time
+from skthermo._core.text import probability_text
+from skthermo._core.warnings import without_warnings
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring._threshold import WEEK, blocks_of
 from skthermo.residuals.gaussian import Gaussian

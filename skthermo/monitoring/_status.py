@@ -9,8 +9,8 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._tables.frames import DAY, as_moment, check_duration, usual_step
-from skthermo._tables.text import counted, counted_number, duration_text, plain, probability_text
+from skthermo._core.frames import DAY, as_moment, check_duration, usual_step
+from skthermo._core.text import counted, counted_number, duration_text, plain, probability_text
 from skthermo.monitoring._events import WATCH
 
 LATE = 2 * DAY  # beyond the usual step, after which a record is missed

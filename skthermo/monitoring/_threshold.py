@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import gamma, nbinom
 
-from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import DAY, YEAR, correlation_time
-from skthermo._tables.text import counted_number, duration_text, percent
+from skthermo._core.answers import answers_kept
+from skthermo._core.arrays import Array
+from skthermo._core.frames import DAY, YEAR, correlation_time
+from skthermo._core.text import counted_number, duration_text, percent
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, WeatherWarning
 from skthermo.monitoring._events import EventRule, find_events, levels
 

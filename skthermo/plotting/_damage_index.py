@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
-from skthermo._tables.arrays import is_real
-from skthermo._validation import last_step
+from skthermo._core.arrays import is_real
+from skthermo._core.estimators import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting._display import (
     BLACK,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import Array, check_names
-from skthermo._tables.text import percent, printable, share_text
+from skthermo._core.arrays import Array, check_names
+from skthermo._core.text import percent, printable, share_text
 from skthermo.plotting._display import (
     BLACK,
     BLUE,

@@ -14,9 +14,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.exceptions import NotFittedError
 
-from skthermo._tables.arrays import Array, as_columns, real_array
-from skthermo._tables.text import printable
-from skthermo._validation import import_optional
+from skthermo._core.arrays import Array, as_columns, real_array
+from skthermo._core.estimators import import_optional
+from skthermo._core.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.text import chance_text
+from skthermo._core.text import chance_text
 from skthermo.plotting._display import BLACK, BLUE, GREY, LIGHT, ORANGE, Display, drawing, label_of, plain, shortened
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.fem import FEModel, Structure
 from skthermo.plotting._display import LIGHT, ORANGE, Display
 from skthermo.plotting._structures import (

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import days_later, midnight, midnights_between
+from skthermo._core.arrays import Array
+from skthermo._core.frames import days_later, midnight, midnights_between
 from skthermo.plotting._display import (
     AMBER,
     BLACK,

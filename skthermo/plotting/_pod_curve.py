@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.plotting._display import (
     COLOURS,
     GREY,

@@ -11,10 +11,10 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
-from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array, as_columns
-from skthermo._tables.frames import check_same_rows
-from skthermo._validation import check_is_fitted
+from skthermo._core.arrays import Array, as_columns
+from skthermo._core.estimators import check_is_fitted
+from skthermo._core.frames import check_same_rows
+from skthermo._core.warnings import warnings_once
 from skthermo.plotting._display import (
     BLACK,
     BLUE,

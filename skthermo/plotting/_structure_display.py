@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import Array, real_array
-from skthermo._validation import last_step
+from skthermo._core.arrays import Array, real_array
+from skthermo._core.estimators import last_step
 from skthermo.fem import Structure
 from skthermo.plotting._display import COLOURS, GREY, LIGHT, Display, legend_columns, plain, pyplot, shortened
 from skthermo.plotting._structures import (

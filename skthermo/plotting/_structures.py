@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from skthermo._tables.arrays import Array, Label
+from skthermo._core.arrays import Array, Label
 from skthermo.fem import Structure
 from skthermo.plotting._display import BLACK, drawing, panels, pyplot
 

@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.model_selection import BaseCrossValidator
 
-from skthermo._tables.arrays import NORMAL, Array, median, piecewise_linear, robust_deviation, spread_evenly
-from skthermo._tables.frames import Table, check_duration, has_stamps, row_times
-from skthermo._validation import _num_samples
+from skthermo._core.arrays import NORMAL, Array, median, piecewise_linear, robust_deviation, spread_evenly
+from skthermo._core.estimators import _num_samples
+from skthermo._core.frames import Table, check_duration, has_stamps, row_times
 
 WEEK = "7D"
 BLOCKS_OF_ROWS = 52  # into which records without stamps are divided: weeks, if they are those of a year

@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import Array, as_floats, median, robust_deviation, spread_evenly
-from skthermo._tables.frames import (
+from skthermo._core.arrays import Array, as_floats, median, robust_deviation, spread_evenly
+from skthermo._core.estimators import Interval
+from skthermo._core.frames import (
     Table,
     check_duration,
     frame_like,
@@ -20,7 +21,6 @@ from skthermo._tables.frames import (
     positions_of,
     row_times,
 )
-from skthermo._validation import Interval
 from skthermo.preprocessing._folds import (
     MOST_LEARNED,
     Grams,

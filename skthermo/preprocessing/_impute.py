@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from sklearn.impute import KNNImputer
 
-from skthermo._tables.arrays import Array, rows_by_pattern
-from skthermo._tables.frames import frame_like, warn_of_markers
-from skthermo._validation import (
+from skthermo._core.arrays import Array, rows_by_pattern
+from skthermo._core.estimators import (
     _check_feature_names_in,
     _get_weights,
     _num_samples,
@@ -23,6 +22,7 @@ from skthermo._validation import (
     validate_data,
     with_nan,
 )
+from skthermo._core.frames import frame_like, warn_of_markers
 
 FLOATS = [np.float64, np.float32]
 Mask = NDArray[np.bool_]

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import TransformerMixin
 from sklearn.utils import Bunch
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import as_stamps, check_duration
-from skthermo._validation import Estimator, Interval, _fit_context, check_is_fitted
+from skthermo._core.arrays import Array
+from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted
+from skthermo._core.frames import as_stamps, check_duration
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing._poles import (
     Pairs,

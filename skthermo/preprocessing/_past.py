@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.warnings import explain_rows, warn_user
-from skthermo._tables.arrays import Array, means_of_known, median, piecewise_linear, robust_deviation, spread_evenly
-from skthermo._tables.frames import (
+from skthermo._core.arrays import Array, means_of_known, median, piecewise_linear, robust_deviation, spread_evenly
+from skthermo._core.estimators import Interval, StrOptions, check_array, check_is_fitted
+from skthermo._core.frames import (
     DAY,
     DAY_NS,
     Table,
@@ -27,9 +27,9 @@ from skthermo._tables.frames import (
     frame_like,
     has_stamps,
 )
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.text import duration_text
-from skthermo._validation import Interval, StrOptions, check_array, check_is_fitted
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.text import duration_text
+from skthermo._core.warnings import explain_rows, warn_user
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing._folds import (
     KNOTS,

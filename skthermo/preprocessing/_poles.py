@@ -10,9 +10,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, real_array, rows_by_pattern, shape_array
-from skthermo._tables.frames import check_same_rows
+from skthermo._core.arrays import Array, as_floats, real_array, rows_by_pattern, shape_array
+from skthermo._core.frames import check_same_rows
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning
 
 FIELDS = ("frequencies", "damping", "shapes")

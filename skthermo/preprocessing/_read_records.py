@@ -9,10 +9,10 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._loggers.together import LoggerRecords
-from skthermo._tables.text import counted
+from skthermo._core.text import counted
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing.loggers.together import LoggerRecords
 
 
 def read_records(

@@ -11,9 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import as_floats, by_mode, is_model, means_of_known, piecewise_linear, real_array
-from skthermo._tables.frames import Table, frame_like, row_weights, warn_of_markers
-from skthermo._validation import (
+from skthermo._core.arrays import as_floats, by_mode, is_model, means_of_known, piecewise_linear, real_array
+from skthermo._core.estimators import (
     Estimator,
     HasMethods,
     Interval,
@@ -24,6 +23,7 @@ from skthermo._validation import (
     check_array,
     check_is_fitted,
 )
+from skthermo._core.frames import Table, frame_like, row_weights, warn_of_markers
 
 EVERYWHERE = "ambient"
 SINGULAR = 1e-9  # eigenvalue beside the largest that counts as zero

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.text import significant
+from skthermo._core.arrays import Array
+from skthermo._core.text import significant
 from skthermo.reporting._html import Html, element, joined
 from skthermo.reporting._readable import Values, readable
 

@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.text import printable
-from skthermo._validation import import_optional
+from skthermo._core.arrays import Array, as_floats
+from skthermo._core.estimators import import_optional
+from skthermo._core.text import printable
 from skthermo.fem import Structure
 from skthermo.plotting import (
     DamageIndexDisplay,

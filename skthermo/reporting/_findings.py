@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies import DetectabilityStudy, PODCurve
 

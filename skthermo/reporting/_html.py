@@ -6,7 +6,7 @@ from base64 import b64encode
 from collections.abc import Iterable
 from html import escape
 
-from skthermo._tables.text import printable
+from skthermo._core.text import printable
 
 
 class Html(str):

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._estimators.warnings import without_warnings
-from skthermo._tables.arrays import as_floats, spread_evenly
-from skthermo._tables.frames import column_names
-from skthermo._tables.text import period_text
+from skthermo._core.arrays import as_floats, spread_evenly
+from skthermo._core.frames import column_names
+from skthermo._core.text import period_text
+from skthermo._core.warnings import without_warnings
 from skthermo.reporting._figures import chosen_sensor
 from skthermo.reporting._templates import Row
 from skthermo.surrogate import DataInformedFEM

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 from sklearn.exceptions import NotFittedError
 
-from skthermo._io import write_when_complete
-from skthermo._tables.arrays import check_path, check_size
+from skthermo._core.arrays import check_path, check_size
+from skthermo._core.files import write_when_complete
 from skthermo.fem import Structure
 from skthermo.reporting._templates import check_templates, rendered
 from skthermo.reporting.service import Standing, monitor_facts

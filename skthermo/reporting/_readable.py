@@ -8,8 +8,8 @@ from urllib.parse import quote
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.text import printable
+from skthermo._core.arrays import Array
+from skthermo._core.text import printable
 from skthermo.reporting._html import Html, element
 
 DIGITS = "%.6g"

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo._validation import last_step
+from skthermo._core.estimators import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import Structure
 from skthermo.reporting._choice import Choice

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo._tables import text
-from skthermo._tables.arrays import check_path
-from skthermo._tables.frames import midnight
-from skthermo._validation import import_optional
+from skthermo._core import text
+from skthermo._core.arrays import check_path
+from skthermo._core.estimators import import_optional
+from skthermo._core.frames import midnight
 from skthermo.reporting._html import Html
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.warnings import without_warnings
-from skthermo._tables.arrays import Array, rows_by_pattern
-from skthermo._tables.frames import correlation_times
+from skthermo._core.arrays import Array, rows_by_pattern
+from skthermo._core.frames import correlation_times
+from skthermo._core.warnings import without_warnings
 from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.gaussian import Gaussian

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 
 RIDGE = 1e-10  # added to the squared length of each direction, so that equal ones share an effect evenly
 SMALLEST = 1e-9  # share of the length of a row below which a direction explains nothing more of it

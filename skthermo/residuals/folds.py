@@ -13,8 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.model_selection import check_cv
 
-from skthermo._tables.arrays import Array, range_sums
-from skthermo._tables.frames import DAY_NS, YEAR, correlation_times, row_times
+from skthermo._core.arrays import Array, range_sums
+from skthermo._core.frames import DAY_NS, YEAR, correlation_times, row_times
 from skthermo.preprocessing import BlockedKFold
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.weather import parts

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, patterns, spread_evenly
+from skthermo._core.arrays import Array, patterns, spread_evenly
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ResultWarning
 
 Mask = NDArray[np.bool_]

@@ -12,9 +12,9 @@ import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.answers import answer_once
-from skthermo._tables.arrays import Array, patterns, spread_evenly
-from skthermo._tables.frames import DAY_NS, has_stamps, row_times
+from skthermo._core.answers import answer_once
+from skthermo._core.arrays import Array, patterns, spread_evenly
+from skthermo._core.frames import DAY_NS, has_stamps, row_times
 from skthermo.residuals.gaussian import (
     Gaussian,
     Mask,

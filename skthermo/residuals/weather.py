@@ -15,9 +15,9 @@ from sklearn.neighbors import NearestNeighbors
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._estimators.warnings import warn_user, without_warnings
-from skthermo._tables.arrays import Array, as_floats, median, range_sums, robust_deviation, spread_evenly
-from skthermo._tables.frames import Table, column_names, frame_like, has_stamps, row_times
+from skthermo._core.arrays import Array, as_floats, median, range_sums, robust_deviation, spread_evenly
+from skthermo._core.frames import Table, column_names, frame_like, has_stamps, row_times
+from skthermo._core.warnings import warn_user, without_warnings
 from skthermo.exceptions import RecordsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.gaussian import Gaussian

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import HUGE, as_mapping, check_names, is_real, real_array
-from skthermo._tables.frames import Table, row_times, time_of
-from skthermo._validation import check_is_fitted
+from skthermo._core.arrays import HUGE, as_mapping, check_names, is_real, real_array
+from skthermo._core.estimators import check_is_fitted
+from skthermo._core.frames import Table, row_times, time_of
 from skthermo.fem import FEModel
 from skthermo.surrogate import FittedChain
 

@@ -18,18 +18,8 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._estimators.jobs import single_blas_thread
-from skthermo._estimators.memory import remembered
-from skthermo._tables.arrays import Array, as_columns, as_floats, by_name, check_flag
-from skthermo._tables.frames import (
-    Table,
-    check_same_rows,
-    column_names,
-    frame_like,
-    like_targets,
-    row_weights,
-)
-from skthermo._validation import (
+from skthermo._core.arrays import Array, as_columns, as_floats, by_name, check_flag
+from skthermo._core.estimators import (
     Estimator,
     HasMethods,
     TransformerMixin,
@@ -43,6 +33,16 @@ from skthermo._validation import (
     seeded,
     validate_data,
 )
+from skthermo._core.frames import (
+    Table,
+    check_same_rows,
+    column_names,
+    frame_like,
+    like_targets,
+    row_weights,
+)
+from skthermo._core.memory import remembered
+from skthermo._core.parallel import single_blas_thread
 from skthermo.fem import evaluate
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import HingeFeatures, set_aside

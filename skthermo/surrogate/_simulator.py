@@ -14,8 +14,8 @@ import joblib
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import DEFAULT_TOLERANCE, Array, Reduce, is_auto, tolerance
+from skthermo._core.arrays import DEFAULT_TOLERANCE, Array, Reduce, is_auto, tolerance
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import AffineModel, FEModel, FrequencySurface, ReducedModel, evaluate, linearise, linearise_modes
 

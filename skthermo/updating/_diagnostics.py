@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, mac
 from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from joblib import delayed
 
-from skthermo._effects import read_groups
-from skthermo._estimators.jobs import run_jobs
-from skthermo._tables.arrays import Array, check_names
+from skthermo._core.arrays import Array, check_names
+from skthermo._core.effects import read_groups
+from skthermo._core.parallel import run_jobs
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel, ReducedModel
 from skthermo.updating._diagnostics import at_bounds, false_matches

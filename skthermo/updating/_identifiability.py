@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from sklearn.utils import Bunch
 
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     HUGE,
     Array,
     check_model,
@@ -22,7 +22,7 @@ from skthermo._tables.arrays import (
     is_real,
     real_array,
 )
-from skthermo._tables.text import SPACE, counted, listed
+from skthermo._core.text import SPACE, counted, listed
 from skthermo.fem import FEModel, linearise, linearise_modes
 from skthermo.updating._residuals import tangent_derivatives
 

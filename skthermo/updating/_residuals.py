@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import Bounds, OptimizeResult, least_squares, linear_sum_assignment, minimize
 
-from skthermo._estimators.jobs import single_blas_thread
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     Label,
     as_floats,
@@ -20,6 +18,8 @@ from skthermo._tables.arrays import (
     real_array,
     shape_array,
 )
+from skthermo._core.parallel import single_blas_thread
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning
 from skthermo.fem import FEModel
 

@@ -12,9 +12,7 @@ from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
-from skthermo._estimators.jobs import run_jobs
-from skthermo._estimators.warnings import warn_each, warn_user
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     Bounds,
     Reduce,
@@ -29,8 +27,7 @@ from skthermo._tables.arrays import (
     real_array,
     tolerance,
 )
-from skthermo._tables.frames import column_names
-from skthermo._validation import (
+from skthermo._core.estimators import (
     Estimator,
     HasMethods,
     Interval,
@@ -39,6 +36,9 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
+from skthermo._core.frames import column_names
+from skthermo._core.parallel import run_jobs
+from skthermo._core.warnings import warn_each, warn_user
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.fem import FEModel
 from skthermo.updating._diagnostics import (

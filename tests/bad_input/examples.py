@@ -14,7 +14,7 @@ from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import LocalOutlierFactor
 
 from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
-from skthermo._tables.arrays import check_bounds, check_prior
+from skthermo._core.arrays import check_bounds, check_prior
 from skthermo.detection import MahalanobisDetector, OutlierDetector, WindowedAlarm
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring, evaluate_modes
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures

@@ -22,7 +22,7 @@ import sklearn.utils._param_validation
 import sklearn.utils.validation
 
 import skthermo
-from skthermo._tables.arrays import check_noise
+from skthermo._core.arrays import check_noise
 from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing import RecordFindings
 from tests.bad_input import registry

@@ -18,8 +18,8 @@ import scipy.io
 import scipy.sparse
 from harness import arguments, peak_megabytes, shown, timed
 
-from skthermo._io._child import read
-from skthermo._io._matrix_files import form_of
+from skthermo._core.matrix_child import read
+from skthermo._core.matrix_files import form_of
 
 DIRECTIONS = 6
 

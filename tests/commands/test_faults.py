@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import skthermo.reporting
-from skthermo._io import alone_with
+from skthermo._core.files import alone_with
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
 from tests.commands.folders import edit, run, write_day

@@ -11,7 +11,7 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
-from skthermo._estimators.warnings import checked_once, findings_of, reported_by_caller
+from skthermo._core.warnings import checked_once, findings_of, reported_by_caller
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import FusedDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures, check_records

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 from sklearn.linear_model import LinearRegression
 
-from skthermo._estimators import answers
-from skthermo._estimators.answers import answer_once, answers_kept, content_of
-from skthermo._estimators.warnings import without_warnings
+from skthermo._core import answers
+from skthermo._core.answers import answer_once, answers_kept, content_of
+from skthermo._core.warnings import without_warnings
 from skthermo.detection import TemperatureCompensator
 from tests.detection.compensated import MODES, X
 

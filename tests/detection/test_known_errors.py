@@ -6,7 +6,7 @@ import pytest
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.pipeline import make_pipeline
 
-from skthermo._tables.origins import origin_of
+from skthermo._core.origins import origin_of
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures
 from skthermo.residuals.gaussian import Gaussian

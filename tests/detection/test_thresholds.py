@@ -12,7 +12,7 @@ from scipy.stats import beta, chi
 from scipy.stats import f as f_law
 from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 
-from skthermo._tables.frames import correlation_time
+from skthermo._core.frames import correlation_time
 from skthermo.detection import MahalanobisDetector
 from skthermo.detection._base import conformal_threshold
 from skthermo.detection._mahalanobis import factor_of_few

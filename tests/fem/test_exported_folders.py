@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from skthermo._io import read_named_matrices
+from skthermo._core.matrix_files import read_named_matrices
 from skthermo.fem import AffineModel, load_affine
 from tests.fem.exported_files import (
     DOFS,

@@ -9,7 +9,7 @@ import scipy.sparse
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from skthermo._io import read_named_matrices
+from skthermo._core.matrix_files import read_named_matrices
 from skthermo.fem import AffineModel, evaluate_modes, load_affine
 from tests.fem.exported_files import (
     DOFS,

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from skthermo._io import read_named_matrices
+from skthermo._core.matrix_files import read_named_matrices
 from tests.fem.exported_files import TEXTS, TOTAL
 from tests.fem.slow_readers import agrees
 

@@ -14,7 +14,7 @@ import joblib
 import numpy as np
 import pytest
 
-from skthermo._estimators.jobs import bars_of, run_jobs
+from skthermo._core.parallel import bars_of, run_jobs
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, evaluate, sample
 
@@ -44,7 +44,7 @@ def test_only_a_terminal_sees_a_bar_unasked_and_only_after_a_while(monkeypatch, 
         (Terminal(), 0.0, False, False),
         (Terminal(), 3600.0, None, False),
     ):
-        monkeypatch.setattr("skthermo._estimators.jobs.SILENT_SECONDS", silence)
+        monkeypatch.setattr("skthermo._core.parallel.SILENT_SECONDS", silence)
         monkeypatch.setattr(sys, "stderr", stderr)
         sample(TRUSS, 0.2, 300, n_jobs=n_jobs, progress=progress, random_state=0)
         assert bool(stderr.getvalue()) == seen
@@ -57,7 +57,7 @@ def test_a_notebook_sees_a_bar_that_names_the_stage_and_the_work_around_it_alone
     def repeat(number):
         return number, sample(TRUSS, 0.2, 300, random_state=0)
 
-    monkeypatch.setattr("skthermo._estimators.jobs.SILENT_SECONDS", 0.0)
+    monkeypatch.setattr("skthermo._core.parallel.SILENT_SECONDS", 0.0)
     for output in (Output(), Terminal(), io.StringIO()):
         monkeypatch.setattr(sys, "stderr", output)
         with bars_of("other repeats"):

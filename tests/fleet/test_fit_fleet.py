@@ -20,7 +20,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 
-from skthermo._estimators.warnings import warn_user
+from skthermo._core.warnings import warn_user
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.fleet import Fleet, fit_fleet

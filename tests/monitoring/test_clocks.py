@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skthermo._tables.frames import days_later, midnight, midnights, midnights_between
+from skthermo._core.frames import days_later, midnight, midnights, midnights_between
 from skthermo.datasets import make_truss_campaign
 from skthermo.monitoring import Monitor
 

@@ -143,7 +143,7 @@ def test_skops_itself_reads_such_files(monitor, tmp_path):
     [
         ("os", "system"),
         ("numpy", "memmap"),  # a class that can write a file
-        ("skthermo._io._shared_files", "write_when_complete"),  # a function
+        ("skthermo._core.files", "write_when_complete"),  # a function
         ("skthermo.monitoring._files", "Path"),  # another package's class by a name of this one
         ("skthermo.monitoring", "NoSuchClass"),
     ],

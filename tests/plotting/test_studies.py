@@ -11,7 +11,7 @@ from sklearn.ensemble import IsolationForest
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._validation import last_step
+from skthermo._core.estimators import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting import DamageIndexDisplay, IdentifiedDamageDisplay, PODCurveDisplay
 from skthermo.studies import pod_curve

@@ -3,7 +3,7 @@
 import pytest
 from sklearn.mixture import GaussianMixture
 
-from skthermo._tables.text import share_text
+from skthermo._core.text import share_text
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.reporting import owner_report
 from skthermo.reporting._choice import Choice

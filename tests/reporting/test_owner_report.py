@@ -10,7 +10,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._tables.text import bounds_text, chance_text, share_text
+from skthermo._core.text import bounds_text, chance_text, share_text
 from skthermo.datasets import kw51_structure
 from skthermo.preprocessing import LagFeatures
 from skthermo.reporting import owner_report

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo._tables.text import duration_text, percent, probability_text, share_text
+from skthermo._core.text import duration_text, percent, probability_text, share_text
 from skthermo.reporting._findings import SIMULATED, findings_of
 from skthermo.reporting._html import Html, element
 from skthermo.reporting._templates import environment_of

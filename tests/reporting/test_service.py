@@ -11,7 +11,7 @@ from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
-from skthermo._tables.text import share_text
+from skthermo._core.text import share_text
 from skthermo.datasets import make_truss_campaign, truss_structure
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor

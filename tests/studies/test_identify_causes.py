@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skthermo._effects import FrequencyEffects, StructuralChanges, typical_rows
+from skthermo._core.effects import FrequencyEffects, StructuralChanges, typical_rows
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._causes import read_causes
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skthermo._effects import read_groups
+from skthermo._core.effects import read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.residuals.weather import WeatherFunctions
 from skthermo.studies.identification._causes import Cause

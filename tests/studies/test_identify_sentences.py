@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from skthermo._tables.text import SPACE, chance_text
+from skthermo._core.text import SPACE, chance_text
 from skthermo.plotting import IdentifiedDamageDisplay
 from skthermo.reporting._figures import identified_facts
 from skthermo.reporting._templates import environment_of

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from skthermo._effects import ChangedStructure
+from skthermo._core.effects import ChangedStructure
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import mac
 from skthermo.studies import identify_damage

@@ -14,7 +14,7 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
-from skthermo._tables.frames import correlation_time
+from skthermo._core.frames import correlation_time
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
 from skthermo.residuals.baseline import BaselineResiduals, compared, order_statistic

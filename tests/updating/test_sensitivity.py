@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo._tables.arrays import cramer_rao
+from skthermo._core.arrays import cramer_rao
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.updating import identifiability, select_parameters, sensitivity

@@ -11,9 +11,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.jobs import map_on_blas_threads
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     Bounds,
     Label,
@@ -30,6 +28,8 @@ from skthermo._tables.arrays import (
     real_array,
     shape_array,
 )
+from skthermo._core.parallel import map_on_blas_threads
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import (
     AffineTerms,

@@ -10,8 +10,8 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array
 
-from skthermo._estimators.jobs import map_on_blas_threads
-from skthermo._tables.arrays import Array, RandomState, as_random_state
+from skthermo._core.arrays import Array, RandomState, as_random_state
+from skthermo._core.parallel import map_on_blas_threads
 from skthermo.fem._factors import Solve, factorise
 from skthermo.fem._terms import SparseTerms
 from skthermo.fem.modal import AffineCore, ShiftInvertSolver, may_be_missed, pair_modes

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._estimators.jobs import single_blas_thread
-from skthermo._tables.arrays import Array, Bounds, check_theta, spread_evenly
+from skthermo._core.arrays import Array, Bounds, check_theta, spread_evenly
+from skthermo._core.parallel import single_blas_thread
 
 FIRST_DEGREE = 3
 MOST_TERMS = 500

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, is_real, real_array
+from skthermo._core.arrays import Array, is_real, real_array
 from skthermo.fem.elements._element import ROTATIONS, TRANSLATIONS, ByProperties, Dof, PhysicalElement
 
 DIRECTIONS = (*TRANSLATIONS, *ROTATIONS)

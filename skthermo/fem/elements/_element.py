@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from skthermo._tables.arrays import Array, is_real
+from skthermo._core.arrays import Array, is_real
 
 Dof = tuple[Hashable, str]
 ByProperties = dict[tuple[str, ...], Array]

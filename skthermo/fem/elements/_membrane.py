@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skthermo._tables.arrays import Array, is_real
+from skthermo._core.arrays import Array, is_real
 from skthermo.fem.elements._element import ByProperties, PhysicalElement
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

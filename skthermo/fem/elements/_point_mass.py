@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.fem.elements._element import ByProperties, PhysicalElement
 
 

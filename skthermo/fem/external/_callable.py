@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, check_flag, check_path, check_theta, positive_integer, real_array
+from skthermo._core.arrays import Array, check_flag, check_path, check_theta, positive_integer, real_array
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._terms import (
     ROWS_PER_CHUNK,

@@ -10,8 +10,8 @@ from operator import add
 import numpy as np
 import scipy.sparse
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, MatrixLike, RandomState, as_random_state, is_real
+from skthermo._core.arrays import Array, MatrixLike, RandomState, as_random_state, is_real
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ModelWarning
 from skthermo.fem._factors import factorise
 from skthermo.fem._terms import by_name, check_different, failures_named, read_matrix, read_terms

@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 import scipy.sparse
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._io import MASS, read_half, read_named_matrices
-from skthermo._tables.arrays import Matrix, check_names, check_path
+from skthermo._core.arrays import Matrix, check_names, check_path
+from skthermo._core.matrix_files import MASS, read_half, read_named_matrices
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ModelWarning
 from skthermo.fem.affine import AffineModel
 from skthermo.fem.external._differences import SAME, difference_terms, relative

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.fem._terms import DenseTerms
 
 

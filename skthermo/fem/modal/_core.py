@@ -10,7 +10,7 @@ import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._tables.arrays import Array, Matrix
+from skthermo._core.arrays import Array, Matrix
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
 from skthermo.fem.modal._condensation import CondensationSolver, EigenSolver, batch_solver
 from skthermo.fem.modal._modes import REPEATED, LocalModes, linearised_by_row

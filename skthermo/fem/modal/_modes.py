@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     Matrix,
     check_dofs,

@@ -7,7 +7,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, Label, Matrix, as_dense
+from skthermo._core.arrays import Array, Label, Matrix, as_dense
 from skthermo.fem._factors import Solve, factorise
 from skthermo.fem._terms import SparseTerms
 

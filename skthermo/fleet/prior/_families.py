@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import block_diag
 
-from skthermo._tables.arrays import Array, is_real
+from skthermo._core.arrays import Array, is_real
 from skthermo.fleet.prior._information import Information
 from skthermo.fleet.prior._posterior import CoefficientPosterior, CoefficientPrior
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
-from skthermo._tables.arrays import Array, piecewise_linear, rows_by_pattern
-from skthermo._tables.frames import correlation_times
+from skthermo._core.arrays import Array, piecewise_linear, rows_by_pattern
+from skthermo._core.frames import correlation_times
 from skthermo.fleet.prior._posterior import CoefficientPosterior, OwnPrior
 from skthermo.fleet.prior._records import BridgeRecords
 from skthermo.preprocessing import HampelFilter

@@ -11,15 +11,15 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import RegressorMixin
 
-from skthermo._tables.arrays import Array, as_columns, check_flag, spread_evenly
-from skthermo._tables.frames import (
+from skthermo._core.arrays import Array, as_columns, check_flag, spread_evenly
+from skthermo._core.estimators import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
+from skthermo._core.frames import (
     check_same_rows,
     column_names,
     frame_like,
     like_targets,
     row_weights,
 )
-from skthermo._validation import Estimator, HasMethods, _fit_context, check_array, check_is_fitted, validate_data
 from skthermo.fleet.prior._families import CoefficientFamily, Covariates, Member
 from skthermo.fleet.prior._information import FleetBasis, FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import logsumexp
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 
 STEPS = 25  # to the deviation of a bridge on its own
 SHAPE_STEPS = 4

@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
-from skthermo._tables.arrays import Array, real_array
-from skthermo._tables.text import counted
-from skthermo._validation import Estimator, Interval, check_is_fitted
+from skthermo._core.arrays import Array, real_array
+from skthermo._core.estimators import Estimator, Interval, check_is_fitted
+from skthermo._core.text import counted
 from skthermo.fleet.prior._families import CoefficientFamily, Covariates, Member, expect, learn_families
 from skthermo.fleet.prior._information import FleetBasis, FleetNoise, Information
 from skthermo.fleet.prior._mapper import FleetKnowledge, FleetMapper, pooled_weather

@@ -11,15 +11,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._tables.arrays import Array, as_columns, spread_evenly
-from skthermo._tables.frames import (
+from skthermo._core.arrays import Array, as_columns, spread_evenly
+from skthermo._core.estimators import check_array, check_is_fitted
+from skthermo._core.frames import (
     check_same_rows,
     column_names,
     frame_like,
     has_stamps,
     row_times,
 )
-from skthermo._validation import check_array, check_is_fitted
 from skthermo.preprocessing import set_aside
 
 MOST_ROWS = 20_000

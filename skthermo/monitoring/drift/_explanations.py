@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 
 N_SHAPES = 5  # a line, and the leading components of a random walk beside it
 WALKS = np.array([0.0, 0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032])

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from skthermo._effects import ALL_GROUPS
-from skthermo._estimators.warnings import warn_each
-from skthermo._tables.arrays import Array, as_floats, is_real
-from skthermo._tables.frames import YEAR, frame_like, has_stamps
-from skthermo._tables.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
+from skthermo._core.arrays import Array, as_floats, is_real
+from skthermo._core.effects import ALL_GROUPS
+from skthermo._core.frames import YEAR, frame_like, has_stamps
+from skthermo._core.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
+from skthermo._core.warnings import warn_each
 from skthermo.monitoring._records import OF_TRAINING
 from skthermo.monitoring.drift._explanations import SIGNIFICANT
 from skthermo.preprocessing import set_aside

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.residuals.baseline import Scatter
 
 SMALLEST = 1e-8  # standard deviation of a daily mean of the logarithm of a frequency

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo._effects import ALL_GROUPS, FrequencyEffects, StructuralChanges, healthy_frequencies, read_groups
-from skthermo._estimators.warnings import warn_each, warnings_once, without_warnings
-from skthermo._tables.arrays import Array, as_floats, refuse_no_table, spread_evenly
-from skthermo._tables.frames import DAY, YEAR, frame_like, has_stamps, midnight, midnights_between
-from skthermo._validation import check_is_fitted
+from skthermo._core.arrays import Array, as_floats, refuse_no_table, spread_evenly
+from skthermo._core.effects import ALL_GROUPS, FrequencyEffects, StructuralChanges, healthy_frequencies, read_groups
+from skthermo._core.estimators import check_is_fitted
+from skthermo._core.frames import DAY, YEAR, frame_like, has_stamps, midnight, midnights_between
+from skthermo._core.warnings import warn_each, warnings_once, without_warnings
 from skthermo.monitoring.drift._kalman import DailyNoise, DayShown
 from skthermo.preprocessing import ExponentialMeans, set_aside
 from skthermo.residuals.weather import WeatherFunctions

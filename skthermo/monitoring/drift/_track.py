@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array, as_random_state, check_probability
+from skthermo._core.arrays import Array, as_random_state, check_probability
+from skthermo._core.warnings import warnings_once
 from skthermo.monitoring.drift._explanations import N_SHAPES, SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._history import DriftResolution, GroupTrajectory, ModeShifts, ParameterHistory
 from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, State

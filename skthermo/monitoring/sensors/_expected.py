@@ -13,8 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from skthermo._tables.arrays import Array, median, robust_deviation
-from skthermo._tables.frames import DAY, DAY_NS, YEAR
+from skthermo._core.arrays import Array, median, robust_deviation
+from skthermo._core.frames import DAY, DAY_NS, YEAR
 from skthermo.residuals.gaussian import Gaussian
 
 Days = NDArray[np.int64]

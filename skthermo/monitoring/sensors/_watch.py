@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, as_floats
-from skthermo._tables.frames import DAY_NS, as_index, columns_by_sensor, frame_like
+from skthermo._core.arrays import Array, as_floats
+from skthermo._core.frames import DAY_NS, as_index, columns_by_sensor, frame_like
 from skthermo.monitoring._events import Transition
 from skthermo.monitoring.sensors._expected import (
     CERTAIN,

@@ -12,7 +12,7 @@ import pandas as pd
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     as_columns,
     means_of_known,
@@ -21,8 +21,8 @@ from skthermo._tables.arrays import (
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import YEAR, column_names, columns_by_sensor, correlation_time, has_stamps, row_times
-from skthermo._validation import check_array
+from skthermo._core.estimators import check_array
+from skthermo._core.frames import YEAR, column_names, columns_by_sensor, correlation_time, has_stamps, row_times
 from skthermo.preprocessing._folds import BlockedKFold, WeatherBasis, distances_from_neighbours, out_of_fold
 from skthermo.preprocessing._past import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
 from skthermo.preprocessing.checks._columns import stuck_columns

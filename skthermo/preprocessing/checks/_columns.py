@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.ndimage import binary_closing, maximum_filter1d, minimum_filter1d
 
-from skthermo._tables.arrays import HUGE, NORMAL, Array, as_floats, median, spread_evenly
-from skthermo._tables.frames import IMPLAUSIBLE, MARKERS, columns_by_sensor
+from skthermo._core.arrays import HUGE, NORMAL, Array, as_floats, median, spread_evenly
+from skthermo._core.frames import IMPLAUSIBLE, MARKERS, columns_by_sensor
 from skthermo.preprocessing.checks._findings import Finding
 
 LOGGED = (*MARKERS, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)

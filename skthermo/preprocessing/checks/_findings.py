@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.frames import midnight
-from skthermo._tables.saved_frames import SavesFrames
+from skthermo._core.frames import midnight
+from skthermo._core.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing._past import MemoryFindings
 

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._estimators.warnings import warn_each
-from skthermo._tables.arrays import Array, check_model, spread_evenly
-from skthermo._tables.frames import MARKERS, Table, as_stamps, frame_like
-from skthermo._tables.saved_frames import SavesFrames
+from skthermo._core.arrays import Array, check_model, spread_evenly
+from skthermo._core.frames import MARKERS, Table, as_stamps, frame_like
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._columns import (
     MOST_COMPARED,

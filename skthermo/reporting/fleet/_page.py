@@ -16,8 +16,8 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from skthermo._io import write_when_complete
-from skthermo._tables.frames import as_moment
+from skthermo._core.files import write_when_complete
+from skthermo._core.frames import as_moment
 from skthermo.fleet import Fleet
 from skthermo.reporting._settings import settings_of, versions
 from skthermo.reporting._templates import Row, rendered, rows_of

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.frames import midnight, midnights_between
+from skthermo._core.frames import midnight, midnights_between
 from skthermo.fem import Structure
 from skthermo.plotting import MonitorDisplay, StructureDisplay
 from skthermo.reporting._chart import chart

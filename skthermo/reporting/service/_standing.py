@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.frames import as_moment
+from skthermo._core.frames import as_moment
 from skthermo.monitoring import Monitor, MonitorStatus
 from skthermo.reporting._templates import Row, rows_of
 

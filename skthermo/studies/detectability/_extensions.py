@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as student
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._estimators.jobs import run_jobs, single_blas_thread
-from skthermo._estimators.warnings import reported_by_caller, warn_user, warnings_once, without_warnings
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     as_floats,
     as_random_state,
@@ -23,7 +21,9 @@ from skthermo._tables.arrays import (
     integer_row,
     real_array,
 )
-from skthermo._tables.frames import Table, check_same_rows, column_names
+from skthermo._core.frames import Table, check_same_rows, column_names
+from skthermo._core.parallel import run_jobs, single_blas_thread
+from skthermo._core.warnings import reported_by_caller, warn_user, warnings_once, without_warnings
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
 from skthermo.studies._scenarios import Scenario

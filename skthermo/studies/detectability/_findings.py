@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._estimators.warnings import warnings_once
-from skthermo._tables.arrays import Array, check_flag, check_probability
+from skthermo._core.arrays import Array, check_flag, check_probability
+from skthermo._core.warnings import warnings_once
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._ranking import in_words, rank

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, check_flag, check_probability, real_array
+from skthermo._core.arrays import Array, check_flag, check_probability, real_array
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._rates import clopper_pearson

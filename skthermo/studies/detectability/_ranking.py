@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.studies.detectability._pod_curve import families_of
 from skthermo.studies.detectability._rates import EvaluatedRecords
 

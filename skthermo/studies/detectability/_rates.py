@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import beta, t
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import Table, correlation_times, row_times, time_of
+from skthermo._core.arrays import Array
+from skthermo._core.frames import Table, correlation_times, row_times, time_of
 from skthermo.studies._scenarios import BaseScenario
 
 BLOCK = 10  # length of a block, in correlation times

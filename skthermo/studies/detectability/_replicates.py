@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 from scipy.stats import t
 
-from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.jobs import run_jobs, single_blas_thread
-from skthermo._estimators.warnings import checked_once, warn_user, without_warnings
-from skthermo._tables.arrays import Array, as_floats, positive_integer
-from skthermo._tables.frames import Table, column_names, frame_like, has_stamps, row_times
+from skthermo._core.answers import answers_kept
+from skthermo._core.arrays import Array, as_floats, positive_integer
+from skthermo._core.frames import Table, column_names, frame_like, has_stamps, row_times
+from skthermo._core.parallel import run_jobs, single_blas_thread
+from skthermo._core.warnings import checked_once, warn_user, without_warnings
 from skthermo.exceptions import ModelWarning, ResultWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import minimum_detectable_damage

@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.answers import answer_once, answers_kept
-from skthermo._estimators.jobs import run_jobs, single_blas_thread
-from skthermo._estimators.memory import remembered
-from skthermo._estimators.warnings import warnings_of_detector, without_warnings
-from skthermo._tables.arrays import Array, as_columns, as_floats, is_real
-from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
-from skthermo._tables.origins import Origin, of_origin, origin_of
-from skthermo._validation import _num_samples, last_step, seed_parts
+from skthermo._core.answers import answer_once, answers_kept
+from skthermo._core.arrays import Array, as_columns, as_floats, is_real
+from skthermo._core.estimators import _num_samples, last_step, seed_parts
+from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
+from skthermo._core.memory import remembered
+from skthermo._core.origins import Origin, of_origin, origin_of
+from skthermo._core.parallel import run_jobs, single_blas_thread
+from skthermo._core.warnings import warnings_of_detector, without_warnings
 from skthermo.detection import DamageDetector
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._rates import EvaluatedRecords, rate_of

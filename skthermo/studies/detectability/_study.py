@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._estimators.answers import answers_kept
-from skthermo._estimators.jobs import single_blas_thread
-from skthermo._estimators.warnings import checked_once, warn_each, warnings_once
-from skthermo._tables.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
-from skthermo._validation import Stages, held, last_step, seeded
+from skthermo._core.answers import answers_kept
+from skthermo._core.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
+from skthermo._core.estimators import Stages, held, last_step, seeded
+from skthermo._core.parallel import single_blas_thread
+from skthermo._core.warnings import checked_once, warn_each, warnings_once
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios

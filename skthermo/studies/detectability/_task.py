@@ -13,9 +13,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
-from skthermo._estimators.jobs import single_blas_thread
-from skthermo._estimators.warnings import reported_by_caller, warn_each, warn_user, warnings_once
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     as_columns,
     as_floats,
@@ -25,8 +23,10 @@ from skthermo._tables.arrays import (
     check_size,
     positive_integer,
 )
-from skthermo._tables.frames import Table, has_stamps, row_times, time_of
-from skthermo._validation import BaseSearchCV, _num_samples, last_step
+from skthermo._core.estimators import BaseSearchCV, _num_samples, last_step
+from skthermo._core.frames import Table, has_stamps, row_times, time_of
+from skthermo._core.parallel import single_blas_thread
+from skthermo._core.warnings import reported_by_caller, warn_each, warn_user, warnings_once
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.preprocessing import set_aside
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, is_real
-from skthermo._tables.frames import Table, has_stamps, row_times, time_of
-from skthermo._tables.text import counted, duration_text
+from skthermo._core.arrays import Array, is_real
+from skthermo._core.frames import Table, has_stamps, row_times, time_of
+from skthermo._core.text import counted, duration_text
 from skthermo.studies.detectability._rates import EvaluatedRecords, clopper_pearson, rate_of
 from skthermo.studies.detectability._simulation import onsets_of
 

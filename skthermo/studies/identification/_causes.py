@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse
 
-from skthermo._effects import ALL_GROUPS, HIGHEST_SEVERITY, StructuralChanges, read_groups
-from skthermo._tables.arrays import MatrixLike, check_names, is_real, real_array
+from skthermo._core.arrays import MatrixLike, check_names, is_real, real_array
+from skthermo._core.effects import ALL_GROUPS, HIGHEST_SEVERITY, StructuralChanges, read_groups
 
 MOST_CAUSES = 3  # largest number of causes in one explanation
 

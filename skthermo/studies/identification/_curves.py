@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
-from skthermo._tables.arrays import Array
+from skthermo._core.arrays import Array
 from skthermo.studies.identification._causes import Cause
 
 Effects = Callable[[Array], tuple[Array, Array]]

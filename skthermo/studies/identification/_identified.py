@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._effects import HIGHEST_SEVERITY
-from skthermo._tables.arrays import Array
-from skthermo._tables.text import SPACE, Sentences, chance_text, listed, percent, probability_text
+from skthermo._core.arrays import Array
+from skthermo._core.effects import HIGHEST_SEVERITY
+from skthermo._core.text import SPACE, Sentences, chance_text, listed, percent, probability_text
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies._scenarios import UncertainDamage
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior

@@ -12,10 +12,10 @@ from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from skthermo._effects import FrequencyEffects, StructuralChanges
-from skthermo._estimators.jobs import run_jobs
-from skthermo._estimators.warnings import warn_each, without_warnings
-from skthermo._tables.arrays import Array, MatrixLike, as_floats, as_random_state, check_jobs
+from skthermo._core.arrays import Array, MatrixLike, as_floats, as_random_state, check_jobs
+from skthermo._core.effects import FrequencyEffects, StructuralChanges
+from skthermo._core.parallel import run_jobs
+from skthermo._core.warnings import warn_each, without_warnings
 from skthermo.studies._scenarios import check_chain, checked_models
 from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior, read_causes
 from skthermo.studies.identification._curves import Observed, Part, ShiftComparison

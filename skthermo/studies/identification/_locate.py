@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._effects import FrequencyEffects, StructuralChanges, read_groups
-from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
-from skthermo._tables.arrays import Array, as_random_state
+from skthermo._core.arrays import Array, as_random_state
+from skthermo._core.effects import FrequencyEffects, StructuralChanges, read_groups
+from skthermo._core.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import Structure
 from skthermo.studies._scenarios import check_chain

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from skthermo._tables.arrays import check_probability
-from skthermo._tables.text import Sentences, counted, listed, percent, share_text
+from skthermo._core.arrays import check_probability
+from skthermo._core.text import Sentences, counted, listed, percent, share_text
 from skthermo.fem import Structure
 from skthermo.studies.identification._identified import IdentifiedDamage
 

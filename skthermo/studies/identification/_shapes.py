@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._effects import ChangedStructure, central_differences
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, check_dofs
+from skthermo._core.arrays import Array, as_floats, check_dofs
+from skthermo._core.effects import ChangedStructure, central_differences
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning
 from skthermo.studies.identification._curves import Part
 from skthermo.studies.identification._shift import stated_deviations

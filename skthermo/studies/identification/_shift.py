@@ -11,12 +11,12 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from skthermo._effects import healthy_frequencies
-from skthermo._estimators.warnings import warn_user, warnings_once
-from skthermo._tables.arrays import Array, as_floats, check_noise, means_of_known, median, robust_deviation
-from skthermo._tables.frames import has_stamps, row_times
-from skthermo._tables.text import capital, counted, listed, significant
-from skthermo._validation import check_array
+from skthermo._core.arrays import Array, as_floats, check_noise, means_of_known, median, robust_deviation
+from skthermo._core.effects import healthy_frequencies
+from skthermo._core.estimators import check_array
+from skthermo._core.frames import has_stamps, row_times
+from skthermo._core.text import capital, counted, listed, significant
+from skthermo._core.warnings import warn_user, warnings_once
 from skthermo.exceptions import (
     FewRecordsWarning,
     RecordsWarning,

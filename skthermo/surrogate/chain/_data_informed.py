@@ -18,9 +18,7 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
-from skthermo._estimators.memory import remembered
-from skthermo._estimators.warnings import findings_of, warn_each, warn_user
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     MatrixLike,
     as_columns,
@@ -31,16 +29,7 @@ from skthermo._tables.arrays import (
     is_auto,
     is_real,
 )
-from skthermo._tables.frames import (
-    Table,
-    check_same_rows,
-    column_names,
-    frame_like,
-    like_targets,
-    row_weights,
-)
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._validation import (
+from skthermo._core.estimators import (
     CallbackSupport,
     Estimator,
     HasMethods,
@@ -60,6 +49,17 @@ from skthermo._validation import (
     seeded,
     validate_data,
 )
+from skthermo._core.frames import (
+    Table,
+    check_same_rows,
+    column_names,
+    frame_like,
+    like_targets,
+    row_weights,
+)
+from skthermo._core.memory import remembered
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import findings_of, warn_each, warn_user
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2

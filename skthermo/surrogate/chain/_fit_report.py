@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch
 
-from skthermo._tables.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
-from skthermo._tables.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._tables.text import capital
-from skthermo._validation import last_step, offers, reach_of
+from skthermo._core.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
+from skthermo._core.estimators import last_step, offers, reach_of
+from skthermo._core.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.text import capital
 from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel, linearise, match_modes
 from skthermo.metrics import mape

@@ -15,8 +15,7 @@ from scipy.spatial import cKDTree
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._estimators.warnings import without_warnings
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     as_columns,
     as_floats,
@@ -29,9 +28,10 @@ from skthermo._tables.arrays import (
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like, row_times
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._validation import fit_weighted, last_step, offers, predicted_covariance, reach_of
+from skthermo._core.estimators import fit_weighted, last_step, offers, predicted_covariance, reach_of
+from skthermo._core.frames import Table, check_same_rows, column_names, frame_like, row_times
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import without_warnings
 from skthermo.preprocessing import BlockedKFold, RecordFindings
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.folds import CORRELATION_TIMES, N_FOLDS

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch
 
-from skthermo._estimators.warnings import reported_by_caller, warn_user, without_warnings
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     HUGE,
     Array,
     MatrixLike,
@@ -31,9 +30,7 @@ from skthermo._tables.arrays import (
     robust_deviation,
     spread_evenly,
 )
-from skthermo._tables.frames import Table, check_same_rows, column_names, frame_like
-from skthermo._tables.saved_frames import SavesFrames
-from skthermo._validation import (
+from skthermo._core.estimators import (
     fit_outputs,
     inputs_of_last_step,
     last_step,
@@ -43,6 +40,9 @@ from skthermo._validation import (
     rows_from_fleet,
     warn_of_fleet,
 )
+from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo.exceptions import (
     FewRecordsWarning,
     ModelWarning,

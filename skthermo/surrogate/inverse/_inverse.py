@@ -14,11 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch, check_random_state
 
-from skthermo._estimators.memory import remembered
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, Bounds, check_bounds, check_model, check_noise, check_theta
-from skthermo._tables.frames import frame_like
-from skthermo._validation import (
+from skthermo._core.arrays import Array, Bounds, check_bounds, check_model, check_noise, check_theta
+from skthermo._core.estimators import (
     HasMethods,
     Interval,
     StrOptions,
@@ -26,6 +23,9 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
+from skthermo._core.frames import frame_like
+from skthermo._core.memory import remembered
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample
 from skthermo.metrics.errors import complete_r2

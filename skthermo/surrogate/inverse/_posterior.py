@@ -15,10 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 from sklearn.utils import Bunch
 
-from skthermo._estimators.jobs import with_progress
-from skthermo._estimators.memory import remembered
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     check_flag,
     check_model,
@@ -28,9 +25,7 @@ from skthermo._tables.arrays import (
     spread_evenly,
     tolerance,
 )
-from skthermo._tables.frames import column_names, frame_like, row_times
-from skthermo._tables.text import listed, percent
-from skthermo._validation import (
+from skthermo._core.estimators import (
     Estimator,
     HasMethods,
     Interval,
@@ -39,6 +34,11 @@ from skthermo._validation import (
     check_is_fitted,
     validate_data,
 )
+from skthermo._core.frames import column_names, frame_like, row_times
+from skthermo._core.memory import remembered
+from skthermo._core.parallel import with_progress
+from skthermo._core.text import listed, percent
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, evaluate
 from skthermo.fem.affine import ResponseSurface, n_terms

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._tables.arrays import Array, by_mode, check_dofs, real_array
+from skthermo._core.arrays import Array, by_mode, check_dofs, real_array
 from skthermo.fem import FEModel, evaluate_modes, shape_components
 
 NODE = 1e-6

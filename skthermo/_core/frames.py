@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import Array, as_floats, is_real, real_array, refuse_no_array
-from skthermo._validation import _num_samples
+from skthermo._core.arrays import Array, as_floats, is_real, real_array, refuse_no_array
+from skthermo._core.estimators import _num_samples
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning
 
 Table: TypeAlias = Array | pd.DataFrame

@@ -33,9 +33,7 @@ from sklearn.utils.metadata_routing import get_routing_for_object
 from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, has_fit_parameter
 
-from skthermo._estimators.jobs import bars_of, without_bars
-from skthermo._estimators.warnings import warn_user
-from skthermo._tables.arrays import (
+from skthermo._core.arrays import (
     Array,
     as_columns,
     is_frame_of_floats,
@@ -46,6 +44,8 @@ from skthermo._tables.arrays import (
     refuse_no_table,
     without_mask,
 )
+from skthermo._core.parallel import bars_of, without_bars
+from skthermo._core.warnings import warn_user
 from skthermo.exceptions import WeatherWarning
 
 if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any

@@ -11,9 +11,9 @@ from joblib import Memory
 from sklearn.utils.validation import check_memory
 
 import skthermo
-from skthermo._estimators.answers import content_of
-from skthermo._estimators.warnings import give_again, recorded
-from skthermo._io import lock
+from skthermo._core.answers import content_of
+from skthermo._core.files import lock
+from skthermo._core.warnings import give_again, recorded
 
 Result = TypeVar("Result")
 

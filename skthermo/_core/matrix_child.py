@@ -21,7 +21,7 @@ import numpy as np
 import scipy.io
 import scipy.sparse
 
-from skthermo._io._text_matrices import (
+from skthermo._core.text_matrices import (
     BYTES_FOR_EACH_ROW,
     numbers_of,
     read_dmig,

@@ -17,7 +17,7 @@ import numpy as np
 from joblib import Parallel
 from numpy.typing import NDArray
 
-from skthermo._estimators.answers import content_of
+from skthermo._core.answers import content_of
 from skthermo.exceptions import SkthermoWarning
 
 Records = TypeVar("Records")

@@ -15,10 +15,10 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from skthermo._estimators.warnings import warn_user, without_warnings
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import MARKERS
-from skthermo._validation import import_optional
+from skthermo._core.arrays import Array
+from skthermo._core.estimators import import_optional
+from skthermo._core.frames import MARKERS
+from skthermo._core.warnings import warn_user, without_warnings
 from skthermo.exceptions import RecordsWarning
 
 ISO, UNIX, UNIX_MS, EXCEL = "ISO8601", "unix", "unix_ms", "excel"

@@ -17,10 +17,10 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 import scipy.sparse
 
-from skthermo._io._text_matrices import OP4_HEADING, Labelled
-from skthermo._tables.arrays import Label, Matrix
+from skthermo._core.arrays import Label, Matrix
+from skthermo._core.text_matrices import OP4_HEADING, Labelled
 
-CHILD = Path(__file__).with_name("_child.py")
+CHILD = Path(__file__).with_name("matrix_child.py")
 LEAST_MEMORY = 256_000_000
 TIMES_THE_FILE = 10
 EXPECTED = "ten times the size of the file or 256 MB (a sound file can be saved without compression)"
@@ -71,7 +71,7 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
     """Run the child; how it ended."""
     name = Path(sys.executable or "").name.lower()
     if getattr(sys, "frozen", False) or not name.startswith(("python", "pypy")):  # a program that embeds Python
-        from skthermo._io._child import read  # with SciPy's readers, which only the child needs otherwise
+        from skthermo._core.matrix_child import read  # with SciPy's readers, which only the child needs otherwise
 
         for file, form in json.loads(job)["files"]:
             pickle.dump(read(file, form), output)

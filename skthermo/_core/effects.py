@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array, Matrix, as_floats, check_names, is_model
-from skthermo._validation import check_is_fitted
+from skthermo._core.arrays import Array, Matrix, as_floats, check_names, is_model
+from skthermo._core.estimators import check_is_fitted
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 NEAR = 1 / 3  # share of the bounds up to which amounts have a reduced model; one for all of them would be large

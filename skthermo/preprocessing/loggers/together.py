@@ -11,8 +11,8 @@ from zoneinfo import ZoneInfo
 
 import pandas as pd
 
-from skthermo._loggers.files import MOSTLY, Look, look_at
-from skthermo._tables.text import counted
+from skthermo._core.text import counted
+from skthermo.preprocessing.loggers.files import MOSTLY, Look, look_at
 
 ABSOLUTE_ZERO, FREEZING, FAHRENHEIT = 273.15, 32.0, 5 / 9
 TEMPERATURES, HZ = {"°C", "K", "°F"}, "Hz"

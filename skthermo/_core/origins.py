@@ -10,8 +10,8 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._tables.arrays import Array
-from skthermo._tables.frames import Table, frame_like
+from skthermo._core.arrays import Array
+from skthermo._core.frames import Table, frame_like
 
 
 @dataclass(frozen=True)
