@@ -165,6 +165,26 @@ def explained_rows(table: Any) -> NDArray[np.bool_] | np.bool_:
 
 
 @contextmanager
+def collected() -> Iterator[list[SkthermoWarning]]:
+    """Warnings of the parts within become findings of the estimator that calls them; other warnings pass.
+
+    Outside the main thread they pass as they are, because filters belong to the whole process.
+    """
+    findings: list[SkthermoWarning] = []
+    if not _may_filter():
+        yield findings
+        return
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", SkthermoWarning)
+        yield findings
+    for one in caught:
+        if isinstance(one.message, SkthermoWarning):
+            findings.append(one.message)
+        else:
+            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+
+
+@contextmanager
 def recorded() -> Iterator[list[warnings.WarningMessage]]:
     """Keep the warnings of what runs inside in a list, for `give_again`; outside the main thread they pass as they are,
     because filters belong to the whole process."""

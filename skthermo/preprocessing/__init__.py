@@ -3,7 +3,6 @@
 It uses ``_tables``. Start with ``checks/_set_aside.py``, through which all fits go.
 """
 
-from skthermo.preprocessing._folds import BlockedKFold
 from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._mode_tracker import ModeTracker
@@ -17,6 +16,7 @@ from skthermo.preprocessing.checks import (
     residual_trend,
     set_aside,
 )
+from skthermo.preprocessing.folds import BlockedKFold
 
 __all__ = [
     "BiasAligner",

@@ -21,14 +21,14 @@ from skthermo._core.frames import (
     positions_of,
     row_times,
 )
-from skthermo.preprocessing._folds import (
+from skthermo.preprocessing._records import RecordTransformer
+from skthermo.preprocessing.folds import (
     MOST_LEARNED,
     Grams,
     WeatherBasis,
     distances_from_neighbours,
     without_far,
 )
-from skthermo.preprocessing._records import RecordTransformer
 
 LEAST_WINDOW = 3  # rows
 

@@ -31,14 +31,14 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import explain_rows, warn_user
 from skthermo.exceptions import FewRecordsWarning
-from skthermo.preprocessing._folds import (
+from skthermo.preprocessing._records import RecordTransformer
+from skthermo.preprocessing.folds import (
     KNOTS,
     Grams,
     WeatherBasis,
-    out_of_fold,
+    predicted_by_weather,
     without_far,
 )
-from skthermo.preprocessing._records import RecordTransformer
 
 EARLIEST = np.iinfo(np.int64).min  # stamp that there may be, in nanoseconds
 DEFAULT_TOLERANCE = 6  # times freq
@@ -729,7 +729,7 @@ class _Candidates:
         self.has_all_seasons = pd.Timedelta(np.ptp(times), "ns") >= ALL_SEASONS
         basis = WeatherBasis.of(T)
         lines = basis.lines(basis.coordinates(T[rows]))
-        left = F[rows] - out_of_fold(lines, F[rows], self.folds)
+        left = F[rows] - predicted_by_weather(lines, F[rows], self.folds)
         self.scale = robust_deviation(left)
         self.values = without_far(F[rows] - median(F[rows]), left) / np.where(self.scale > 0, self.scale, np.inf)
         blocks: dict[Any, Array] = {"weather": lines, "time": _time_shapes(without_far(left, left))}

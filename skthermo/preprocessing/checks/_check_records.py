@@ -23,11 +23,11 @@ from skthermo._core.arrays import (
 )
 from skthermo._core.estimators import check_array
 from skthermo._core.frames import YEAR, column_names, columns_by_sensor, correlation_time, has_stamps, row_times
-from skthermo.preprocessing._folds import BlockedKFold, WeatherBasis, distances_from_neighbours, out_of_fold
 from skthermo.preprocessing._past import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
 from skthermo.preprocessing.checks._columns import stuck_columns
 from skthermo.preprocessing.checks._findings import Finding, RecordFindings, findings_table, period_of
 from skthermo.preprocessing.checks._set_aside import FEW_WRONG, CleanedRecords
+from skthermo.preprocessing.folds import BlockedKFold, WeatherBasis, distances_from_neighbours, predicted_by_weather
 
 Rows = NDArray[np.intp]
 LEAST_ROWS = 50  # with temperatures and frequencies, below which only runs of equal values are looked for
@@ -224,7 +224,7 @@ class _Records:
                 continue
             ordered = np.where(turned[:, np.newaxis], pair[:, ::-1], pair)
             ordered[~known], given = np.nan, np.where(known[:, np.newaxis], pair, np.nan)
-            predicted = out_of_fold(lines, ordered, folds)
+            predicted = predicted_by_weather(lines, ordered, folds)
             rest = ordered - predicted
             deviation = robust_deviation(rest)
             with np.errstate(invalid="ignore"):
@@ -235,7 +235,7 @@ class _Records:
             if len(rows) < least:
                 continue
             kept = np.flatnonzero(is_near)
-            before = given[kept] - out_of_fold(lines[kept], given[kept], folds[kept], trim=False)
+            before = given[kept] - predicted_by_weather(lines[kept], given[kept], folds[kept], trim=False)
             ratio = np.nanmean(rest[kept] ** 2, axis=0) / np.nanmean(before**2, axis=0)
             if np.sqrt(ratio.prod()) < IN_ORDER:
                 alone = (is_far & is_near_to_other).any(axis=1) & (np.isnan(pair).sum(axis=1) == 1)
@@ -249,7 +249,7 @@ class _Records:
     def _far_from_neighbours(self, lines: Array, folds: Rows) -> NDArray[np.bool_]:
         """Values far from their neighbours and from what the weather explains or, without weather, implausible ones."""
         F, has_weather = self.F, ~np.isnan(lines).any(axis=1)[:, np.newaxis]
-        rest = F - np.where(has_weather, out_of_fold(lines, F, folds), median(F))
+        rest = F - np.where(has_weather, predicted_by_weather(lines, F, folds), median(F))
         distances, local = distances_from_neighbours(rest, np.arange(len(F)), WINDOW)
         floor = PREDICTABLE * robust_deviation(F)
         deviation = np.fmax(robust_deviation(rest), floor)
@@ -387,7 +387,7 @@ def unexplained(inputs: Array, frequencies: Array, folds: Rows) -> Array:
     means = np.broadcast_to(median(values), sums.shape).copy()  # medians where the other folds have no value
     others = counts.sum(axis=0) - counts
     np.divide(sums.sum(axis=0) - sums, others, out=means, where=others > 0)
-    left = np.nansum((values - out_of_fold(inputs, values, folds, trim=False)) ** 2, axis=0)
+    left = np.nansum((values - predicted_by_weather(inputs, values, folds, trim=False)) ** 2, axis=0)
     whole = np.nansum((values - means[folds]) ** 2, axis=0)
     return np.divide(left, whole, out=np.full(len(whole), np.nan), where=whole > 0)
 

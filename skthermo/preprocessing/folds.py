@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from sklearn.model_selection import BaseCrossValidator
 
 from skthermo._core.arrays import NORMAL, Array, median, piecewise_linear, robust_deviation, spread_evenly
@@ -176,6 +176,41 @@ class BlockedKFold(BaseCrossValidator):
             yield folds == fold
 
 
+def out_of_fold(
+    learn: Callable[[NDArray[np.intp]], Callable[[NDArray[np.intp]], ArrayLike]], fold_of: NDArray[np.intp]
+) -> Array:
+    """Value of each row, by what was learned from the rows of the other folds.
+
+    Parameters
+    ----------
+    learn : callable
+        Takes the positions of training rows; gives a function that takes the positions of test rows and gives their
+        values, (n_test_rows, ...).
+    fold_of : ndarray of int of shape (n_rows,)
+        The fold of each row. Rows of a negative fold are in no test fold: they train, and their value is NaN.
+
+    Returns
+    -------
+    ndarray of shape (n_rows, ...)
+        Values of all rows, in their order.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> y = np.array([1.0, 2.0, 3.0, 4.0])
+    >>> out_of_fold(lambda train: lambda test: np.full(len(test), y[train].mean()), np.array([0, 0, 1, 1]))
+    array([3.5, 3.5, 1.5, 1.5])
+    """
+    values: Array | None = None
+    for fold in np.unique(fold_of[fold_of >= 0]):
+        test = np.flatnonzero(fold_of == fold)
+        found = np.asarray(learn(np.flatnonzero(fold_of != fold))(test), dtype=float)
+        if values is None:
+            values = np.full((len(fold_of), *found.shape[1:]), np.nan)
+        values[test] = found
+    return np.full(len(fold_of), np.nan) if values is None else values
+
+
 @dataclass(frozen=True)
 class WeatherBasis:
     """Principal components of the temperatures, gaps filled by them, and lines that break at quantiles of each."""
@@ -262,7 +297,7 @@ class Grams(NamedTuple):
         return np.linalg.solve(gram + penalty[..., np.newaxis] * identity, target[..., np.newaxis])[..., 0]
 
 
-def out_of_fold(inputs: Array, values: Array, folds: NDArray[np.intp], *, trim: bool = True) -> Array:
+def predicted_by_weather(inputs: Array, values: Array, folds: NDArray[np.intp], *, trim: bool = True) -> Array:
     """Predictions of each fold's rows from the others, far values left out of the second of two fits by ``trim``."""
     centre = median(values)
     centred = trained = values - centre
