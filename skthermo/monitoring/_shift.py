@@ -150,7 +150,7 @@ class LevelShift:
         rest = np.where(known, y - x * change, np.nan)
         blocks = blocks_of(free.residuals.index, free.block)
         covariance, n_independent = _of_means(rest, x / weight, blocks)
-        scatter = Gaussian.of(rest).covariance
+        scatter = Gaussian.fitted(rest).covariance
         size = float(Gaussian(np.zeros(len(change)), scatter).distances(change[np.newaxis])[0])
         of_mode = (
             pd.Series(one, free.residuals.columns)
@@ -247,7 +247,7 @@ def _of_means(rest: Array, weights: Array, blocks: NDArray[np.intp]) -> tuple[Ar
     if n_blocks < n_modes + 3 or np.isnan(means).all(axis=0).any():
         return np.full((n_modes, n_modes), np.nan), 0.0
     lasting = max(float(np.mean([correlation_time(column) for column in means.T])), 1.0)
-    together = Gaussian.of(means).covariance * n_blocks / (n_blocks - 1)
+    together = Gaussian.fitted(means).covariance * n_blocks / (n_blocks - 1)
     return together * np.sqrt(np.outer(*2 * [(weight**2).sum(axis=0)])) * lasting, n_blocks / lasting
 
 

@@ -187,7 +187,7 @@ class Spread:
 
 def without_errors(residuals: Array, errors: PredictionError) -> Gaussian:
     """Distribution of what residuals are without the errors of predictions that are known of each row."""
-    return Gaussian.of(residuals, errors.of_all(*residuals.shape) if len(errors.rows) else None)
+    return Gaussian.fitted(residuals, errors.of_all(*residuals.shape) if len(errors.rows) else None)
 
 
 @dataclass(frozen=True)
@@ -320,7 +320,7 @@ class LocalCovariance:
     def _standard(self) -> tuple[Array, Gaussian]:
         """Records over the standard deviations in their own weather, and their distribution."""
         rows = (self.history.residuals - self.history.overall.mean) / np.sqrt(self._variances(self._own))
-        return rows, Gaussian.of(rows)
+        return rows, Gaussian.fitted(rows)
 
     def _variances(self, neighbours: Neighbours) -> Array:
         overall = self.history.overall

@@ -75,16 +75,16 @@ def test_a_distribution_is_learned_from_rows_that_hold_known_errors(n_rows):
     sizes = rng.uniform(0, 3, n_rows)
     rows = 5 + rng.standard_normal((n_rows, 3)) @ ROOT.T + sizes[:, None] * rng.standard_normal((n_rows, 3))
     rows[rng.uniform(size=rows.shape) < 0.1] = np.nan
-    learned = Gaussian.of(rows, sizes[:, None, None] ** 2 * np.eye(3))
+    learned = Gaussian.fitted(rows, sizes[:, None, None] ** 2 * np.eye(3))
     assert np.abs(learned.mean - 5).max() < 4 / np.sqrt(n_rows / 2)
     assert np.abs(learned.covariance - ROOT @ ROOT.T).max() < 12 / np.sqrt(n_rows)
-    without = Gaussian.of(rows).covariance
+    without = Gaussian.fitted(rows).covariance
     assert np.trace(without) > 2 * np.trace(learned.covariance)
 
 
 def test_without_errors_the_distribution_is_that_of_the_rows():
     rows = np.random.default_rng(0).standard_normal((200, 3)) @ ROOT.T
-    plain, learned = Gaussian.of(rows), Gaussian.of(rows, np.zeros((200, 3, 3)))
+    plain, learned = Gaussian.fitted(rows), Gaussian.fitted(rows, np.zeros((200, 3, 3)))
     np.testing.assert_allclose(learned.covariance, plain.covariance, atol=1e-6)
     np.testing.assert_allclose(learned.mean, plain.mean, atol=1e-6)
 

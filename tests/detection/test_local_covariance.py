@@ -16,7 +16,7 @@ from tests.detection.test_whitening import FROZEN, THAWED, X, compensator
 @pytest.fixture(scope="module")
 def history():
     residuals, places = compensator(None).fit_transform(X).to_numpy(), X[["T1"]].to_numpy()
-    return History(np.arange(len(X)), places, residuals, Gaussian.of(residuals))
+    return History(np.arange(len(X)), places, residuals, Gaussian.fitted(residuals))
 
 
 def test_neighbours_are_the_nearest_in_weather_that_are_not_near_in_time(history):
