@@ -50,8 +50,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         Residuals are trailing means over that many records or that time, such as "1D". A single record cannot dominate
         a mean: residuals count as no farther from the median than four robust standard deviations.
     regimes : "auto", None or tuple, default="auto"
-        Whether records are divided in two where, at one value of one input, the scatter of residuals changes, as it does
-        when bearings freeze. Each regime has a detector of its own, and means are taken within a regime.
+        Whether records are divided in two where, at one value of one input, the scatter of residuals changes, as when
+        bearings freeze. Each regime has a detector of its own, and means are taken within a regime.
 
         - ``"auto"``: at the value by which held-out weeks are clearly likelier, if there is one; never with a window.
         - ``None``: no division.
@@ -71,6 +71,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         The fitted detector of each regime, on residuals or their means.
     shares_ : ndarray of shape (n_regimes,)
         Share of the baseline in each regime.
+    scale_ : ndarray of shape (n_targets,)
+        Robust standard deviations of the residuals of the baseline, or of their means.
     means_ : object or None
         Trailing means of the residuals; None without a window.
     baseline_index_ : ndarray of shape (n_samples,)
@@ -190,7 +192,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
                 self.detectors_.append(self._part().fit(Z[own]))
             findings += found
             self.baseline_index_[own] = self._ratio(number) * self.detectors_[number].baseline_index_
-        self.shares_ = np.bincount(regime) / len(regime)
+        self.shares_, self.scale_ = np.bincount(regime) / len(regime), robust_deviation(Z.to_numpy())
         self.threshold_, self.report_ = self.detectors_[0].threshold_, self.detectors_[0].report_
         self.offset_ = -self.threshold_
         self.n_independent_ = independent_records(self.baseline_index_[np.argsort(row_times(X), kind="stable")])

@@ -396,8 +396,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
 
     def _difference(self, Y: Array, predicted: Array) -> Array:
         """Measured beside predicted: relative, or in the unit of a response that may be zero."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            relative = np.log(np.where(Y > 0, Y, np.nan) / np.where(predicted > 0, predicted, np.nan))
+        ratio = Y / np.where(predicted > 0, predicted, np.nan)
+        relative = np.log(np.maximum(ratio, 1e-6))  # a frequency below zero is no less a fall
         return np.where(self.relative_, relative, Y - predicted)
 
     def _filled(self, T: Any) -> tuple[Any, list[SkthermoWarning]]:

@@ -19,16 +19,23 @@ Regimes = NDArray[np.intp]
 class WindowMeans:
     """Trailing means of residuals, and what they need of the baseline.
 
-    ``limits``, (n_regimes, 2, n_targets), are the lowest and the highest residual that counts in a mean; ``usual``,
-    (n_regimes, n_targets), the numbers of values that a window usually holds; ``history`` the residuals of the last
-    window of the baseline, with their regimes, where records have stamps.
+    ``width`` is the number of records in the longest window; ``limits``, (n_regimes, 2, n_targets), are the lowest and
+    the highest residual that counts in a mean; ``usual``, (n_regimes, n_targets), the numbers of values that a window
+    usually holds; ``history`` the residuals of the last window of the baseline, with their regimes, where records have
+    stamps.
     """
 
     window: Any
+    width: int
     share: float
     limits: Array
     usual: Array
     history: tuple[pd.DataFrame, Regimes] | None
+
+    @property
+    def lookback_(self) -> int | np.timedelta64:
+        """How long before a record its window begins: a number of rows, or a time."""
+        return self.window - 1 if isinstance(self.window, int) else pd.Timedelta(self.window).to_timedelta64()
 
     @classmethod
     def fitted(
@@ -52,7 +59,8 @@ class WindowMeans:
             if not isinstance(window, int):
                 recent = residuals.index > residuals.index[-1] - pd.Timedelta(window)
             history = residuals[recent], regime[recent]
-        return cls(window, share, limits, usual, history)
+        ones = pd.Series(1, None if isinstance(window, int) else residuals.index)
+        return cls(window, int(ones.rolling(window).count().max()), share, limits, usual, history)
 
     def __call__(self, residuals: pd.DataFrame, regime: Regimes, *, is_baseline: bool = False) -> Array:
         """Means of records in order of time; NaN where a window holds too few values.

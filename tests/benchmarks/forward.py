@@ -5,11 +5,11 @@
 - truss, fleet, footbridge, soil: a year is learned, another one evaluated, healthy and damaged. Fleet: six-hourly
   records of three bridges with models that are a little wrong. Footbridge: one with frost, gaps and outliers. Soil: a
   girder whose soil follows the air with 40 days.
-- z24: what comes after 50, 65 and 80 % of the first 2800 records is evaluated; damage is a fall of each mode by 1 %. Its
-  data are in the folder that SKTHERMO_DATA names.
+- z24: the records after the first 50, 65 and 80 % of its healthy ones are evaluated; damage is a fall of one mode by
+  1 %. Its data are in the folder that SKTHERMO_DATA names.
 
-Columns: `CompensatedDetector` with the directions of a model, with "softening", with the Mahalanobis distance (an earlier
-version has pipelines behind `TemperatureCompensator` in their place), and 20 neighbours of raw frequencies.
+Detectors: `CompensatedDetector` with the directions of a model, with "softening", with the Mahalanobis distance (an
+earlier version has pipelines behind `TemperatureCompensator` in their place), and 20 neighbours of raw frequencies.
 """
 
 import numpy as np
