@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 
 from skthermo._core.arrays import Array, as_floats, check_probability, is_model, means_of_known, patterns, real_array
-from skthermo._core.effects import damage_directions, usual_frequencies
 from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
 from skthermo._core.origins import Changes, origin_of
 from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector, PatternScale, as_if_complete
@@ -375,7 +374,8 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
             )
         return pd.DataFrame(-np.eye(n_modes), modes, modes)
     if _is_fem(directions):
-        directions = damage_directions(directions)
+        has_own = hasattr(directions, "damage_directions")
+        directions = directions.damage_directions() if has_own else differences(directions)
     is_frame = isinstance(directions, pd.DataFrame)
     if is_frame and names is not None and all(isinstance(one, str) for one in [*directions.columns, *modes]):
         if set(directions.columns) != set(modes):
@@ -402,6 +402,26 @@ def _alike(white: Array, names: pd.Index) -> list[tuple[str, str]]:
     first, second = np.triu_indices(unit.shape[1], 1)
     alike = (unit.T @ unit)[first, second] > ALIKE
     return [(names[i], names[k]) for i, k in zip(first[alike], second[alike], strict=True)]
+
+
+def differences(model: Any, step: float = 1e-3) -> pd.DataFrame:
+    """Central differences of the ln frequencies of a model that has no directions of its own, by group."""
+    nominal = np.ones((1, len(model.parameter_names)))
+
+    def logarithms(group: str, severity: float) -> Array:
+        return np.log(as_floats(model.damaged({group: severity}).frequencies(nominal)))[0]
+
+    rows = [(logarithms(group, step) - logarithms(group, -step)) / (2 * step) for group in model.groups]
+    return pd.DataFrame(rows, list(model.groups), range(model.n_modes))
+
+
+def usual_frequencies(fem: Any) -> Array:
+    """Frequencies in Hz of a model at its nominal state, or of a fitted chain at the mean of its parameters."""
+    if is_model(fem):
+        return as_floats(fem.frequencies(np.ones((1, len(fem.parameter_names)))))[0]
+    check_is_fitted(fem)
+    theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
+    return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs, warn=False)))[0]
 
 
 def largest_amount(directions: Any) -> float:

@@ -8,10 +8,10 @@ import numpy as np
 from joblib import delayed
 
 from skthermo._core.arrays import Array, check_names
-from skthermo._core.effects import read_groups
 from skthermo._core.parallel import run_jobs
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel, ReducedModel
+from skthermo.fem.damage import read_groups
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from copy import copy
 from functools import partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import scipy.sparse
@@ -43,7 +43,11 @@ from skthermo.fem._terms import (
     warn_of_failures,
 )
 from skthermo.fem.affine._basis import Basis, grow_basis
+from skthermo.fem.damage import damage_directions
 from skthermo.fem.modal import AffineCore, LocalModes, check_supported, count_modes
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Terms = Mapping[tuple[str, ...], MatrixLike] | Sequence[tuple[tuple[str, ...], MatrixLike]]
 Content = tuple[Hashable, tuple[str, ...]]
@@ -415,6 +419,35 @@ class AffineModel:
         for group, severity in check_severities(damage, self._groups).items():
             factors[list(self._groups[group])] *= 1 - severity
         return self._with_core(self._whole.with_scaled_stiffness(factors))
+
+    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+
+        Returns
+        -------
+        DataFrame of shape (n_groups, n_modes)
+            Derivatives of ln f by the severity, at the model's nominal state. Groups that move no frequency are left
+            out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or none moves a frequency.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> make_truss().damage_directions(["bottom", "top"]).round(3)
+                    0      1      2      3      4      5
+        bottom -0.233 -0.225 -0.159 -0.070 -0.022 -0.031
+        top    -0.212 -0.127 -0.098 -0.053 -0.140 -0.029
+        """
+        return damage_directions(self, groups)
 
     def with_modes(self, modes: Sequence[int]) -> Self:
         """A new model with other modes as its columns.

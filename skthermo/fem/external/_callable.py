@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +26,10 @@ from skthermo.fem._terms import (
     failures_named,
     warn_of_failures,
 )
+from skthermo.fem.damage import damage_directions
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SECONDS = 600  # a process waits so long while others write
 
@@ -312,6 +317,27 @@ class CallableModel:
         for group, severity in check_severities(damage, self.groups).items():
             twin._factors[[self.parameter_names.index(name) for name in self.groups[group]]] *= 1 - severity
         return twin
+
+    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+
+        Returns
+        -------
+        DataFrame of shape (n_groups, n_modes)
+            Central differences of ln f by the severity, at the model's nominal state. Groups that move no frequency
+            are left out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or none moves a frequency.
+        """
+        return damage_directions(self, groups)
 
     def quiet(self) -> CallableModel:
         """The same model, but without warnings and errors: it gives NaN where the function fails.
