@@ -45,8 +45,8 @@ class FEModel(Protocol):
     - ``reduction_pays(n_solves)``, whether ``reduced`` is expected to save time for so many rows of theta;
     - ``rows_per_chunk``, how many rows are best solved together; ``thread_safe``, whether several threads may ask it at
       the same time; ``prefer``, a hint to joblib, "threads" or "processes";
-    - ``quiet()``, the same model without warnings, for searches that may pass through theta of which it would warn, and
-      ``warn_of(theta, frequencies)``, which gives the warnings about a whole table and its solution.
+    - ``quiet()``, the same model without warnings, for searches that may pass through theta without a solution, and
+      ``findings(theta, frequencies)``, the list of its warnings about a whole table and its solution.
 
     scikit-learn's ``clone`` never copies a model in skthermo's estimators.
     """
