@@ -419,7 +419,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
-    ("_core/effects.py", "studies/test_identify_causes.py"): [
+    ("surrogate/effects.py", "studies/test_identify_causes.py"): [
         ("derivatives by relative changes", "self.directions / (1 + self", "self.directions / (1 + 0 * self"),
         ("weather of each mode's own records", "mean, square = places @ shares", "mean, square = 0 * places @ shares"),
     ],

@@ -44,7 +44,6 @@ from skthermo._core.arrays import (
     refuse_no_table,
     without_mask,
 )
-from skthermo._core.parallel import bars_of, without_bars
 from skthermo._core.warnings import warn_user
 from skthermo.exceptions import WeatherWarning
 
@@ -279,9 +278,6 @@ class Stages:
         line = f"({self._begun} of {self._number}) {name}" if self._estimator.verbose else None
         with ExitStack() as within:
             within.enter_context(_print_elapsed_time(type(self._estimator).__name__, line))
-            within.enter_context(bars_of(name))
-            if getattr(self._estimator, "_skl_callbacks", ()):  # such as a progress bar
-                within.enter_context(without_bars())
             if self._task is None:
                 yield
                 return

@@ -85,6 +85,7 @@ from skthermo.surrogate.chain._stages import (
     possible,
     ratio_regressor,
 )
+from skthermo.surrogate.effects import damage_directions
 from skthermo.surrogate.inverse import PosteriorInverse
 
 
@@ -585,6 +586,27 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         values = validate_data(self, X, dtype=np.float64, reset=False)
         filled, deviations = self.sensors_.fill(values)
         return Weather(X, frame_like(X, filled), deviations, self.mapper_)
+
+    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+
+        Returns
+        -------
+        DataFrame of shape (n_groups, n_modes)
+            Derivatives of ln f by the severity at the mean of the learned parameters, in the measured domain, with the
+            names of the modes. Groups that move no frequency are left out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or none moves a frequency.
+        """
+        return damage_directions(self, groups)
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far the inputs of M2 are outside the training range, row by row.
