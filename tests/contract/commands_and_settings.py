@@ -57,10 +57,11 @@ def subcommands(parser):
 
 
 def run(*arguments):
-    arguments = ["skthermo", *map(str, arguments)]
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        with patch.object(sys, "argv", arguments):
-            return main()
+    with contextlib.ExitStack() as inside:
+        inside.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        inside.enter_context(contextlib.redirect_stderr(io.StringIO()))
+        inside.enter_context(patch.object(sys, "argv", ["skthermo", *map(str, arguments)]))
+        return main()
 
 
 def written_settings(folder):

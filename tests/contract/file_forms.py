@@ -14,8 +14,8 @@ from skthermo.datasets import load_kw51, load_z24, make_truss_campaign
 from skthermo.fem import load_affine, read_triplets
 from skthermo.monitoring import Monitor, load_monitor
 from skthermo.preprocessing import read_records
-
-sys.path += [str(Path(__file__).parents[1] / room) for room in ("fem", "datasets")]  # which have writers of files
+from tests.datasets.kw51_file import write_kw51
+from tests.fem.exported_files import DOFS, MATRICES, TEXTS, WRITERS, write_texts
 
 
 def file_forms():
@@ -40,7 +40,6 @@ def is_read(work):
 
 def exports():
     """Matrices of FE programs."""
-    from exported_files import DOFS, MATRICES, TEXTS, WRITERS, write_texts
 
     def loads(write):
         def work(folder):
@@ -89,8 +88,6 @@ def records():
 
 def campaigns():
     """Published records, and a saved monitor."""
-    from kw51_file import write_kw51
-
     sensors, modes = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"], ["f1", "f2", "f3", "f4"]
     table = pd.DataFrame([[0, *[4.0, 5.0, 10.0, 11.0], *[10.0] * 7]] * 2, columns=["record", *modes, *sensors])
     table["record"], table["state"] = [0, 1], ["undamaged", "damaged"]

@@ -2,7 +2,8 @@
 
 ``PYTHONPATH=FOLDER python tests/contract/inventory.py`` prints the inventory of the skthermo in a folder. Items are
 
-- ``room.Name``, ``room.Name(parameter)``, ``room.Name.method``, ``room.Name.method(parameter)``, ``room.Name.attribute``
+- ``room.Name``, ``room.Name(parameter)``
+- ``room.Name.method``, ``room.Name.method(parameter)``, ``room.Name.attribute``
 - ``room.Name.table[column]``: columns and index of a table, keys of a Bunch
 - ``command update --json``, ``monitor.toml [monitor] persistence``, ``--json status.state``, ``metric skthermo_up``
 - ``load_affine CalculiX``: a form of file that is read
@@ -19,21 +20,21 @@ from pathlib import Path
 from sklearn.base import BaseEstimator
 from sklearn.utils import Bunch
 
-sys.path.append(str(Path(__file__).parent))  # after PYTHONPATH
+sys.path.append(str(Path(__file__).parents[2]))  # after PYTHONPATH
 
 import skthermo
 
 COMMON = {name for base in (BaseEstimator, Bunch, tuple, Exception) for name in dir(base)}
-OF_SCIKIT_LEARN = re.compile("set_.*_request|get_metadata_routing")
+OF_SCIKIT_LEARN = re.compile("set_.*_request|set_callbacks|get_metadata_routing")
 ATTRIBUTES = re.compile(r"^Attributes\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", re.MULTILINE | re.DOTALL)
 VARIABLE = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
 
 
 def inventory():
     """All items, sorted."""
-    from commands_and_settings import commands_and_settings
-    from file_forms import file_forms
-    from tables import tables
+    from tests.contract.commands_and_settings import commands_and_settings
+    from tests.contract.file_forms import file_forms
+    from tests.contract.tables import tables
 
     named = set(surface())
     return sorted(named | set(tables(named)) | set(commands_and_settings()) | set(file_forms()))
@@ -61,7 +62,8 @@ def names():
         if "._" in module.name or module.name.endswith("__main__"):
             continue
         room = importlib.import_module(module.name)
-        for name in getattr(room, "__all__", ()):
+        protocols = {name for name, thing in vars(room).items() if getattr(thing, "_is_protocol", False)}
+        for name in {*getattr(room, "__all__", ())} | protocols:
             yield f"{module.name.removeprefix('skthermo.')}.{name}", getattr(room, name)
 
 

@@ -1,6 +1,7 @@
 """Columns of public tables and keys of results, of a small study, monitor, updating and fleet."""
 
 import contextlib
+import importlib.util
 import re
 import tempfile
 import warnings
@@ -15,7 +16,6 @@ from sklearn.utils import Bunch
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign, truss_structure
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import match_modes
-from skthermo.fleet import fit_fleet
 from skthermo.metrics import error_table
 from skthermo.monitoring import Monitor, track_parameters
 from skthermo.preprocessing import check_records, residual_trend, set_aside
@@ -131,8 +131,8 @@ def results_of_studies(fem, later):
 
 def results_of_monitoring(fem, year, later):
     records, new = (one.temperatures.join(one.frequencies * factor) for one, factor in ((year, 1), (later, 0.95)))
-    new = new[:60].set_index(new.index[:60] + pd.Timedelta("365D"))
-    new.iloc[30:, 0] = 25.0  # a sensor that is stuck
+    new = new[:40].set_index(new.index[:40] + pd.Timedelta("365D"))
+    new.iloc[20:, 0] = 25.0  # a sensor that is stuck
     monitor = Monitor(fem=fem, watch_per_year=12, random_state=0).fit(records)
     yield "monitoring.Monitor.update", monitor.update(new)
     yield "monitoring.Monitor", monitor
@@ -150,9 +150,11 @@ def monitor_of(_):
 
 
 def results_of_a_fleet():
+    room = "fleet" if importlib.util.find_spec("skthermo.fleet") else "monitoring"
+    fit_fleet = importlib.import_module(f"skthermo.{room}").fit_fleet
     years = {name: make_truss_campaign(samples_per_year=120, random_state=n) for n, name in enumerate(["a", "b"])}
     records = {name: (year.temperatures, year.frequencies) for name, year in years.items()}
     with tempfile.TemporaryDirectory() as folder:
         fleet = fit_fleet(dict.fromkeys(records, Ridge()), records, monitor=monitor_of, folder=Path(folder))
-        yield "fleet.Fleet", fleet
-        yield "fleet.Fleet.discoveries", fleet.discoveries()
+        yield f"{room}.Fleet", fleet
+        yield f"{room}.Fleet.discoveries", fleet.discoveries()
