@@ -204,7 +204,7 @@ ARRAYS = {  # equal to an array in C order
     "backwards in memory": lambda table: table.to_numpy()[::-1].copy()[::-1],
     "Fortran order": lambda table: np.asfortranarray(table.to_numpy()),
     "lists": lambda table: table.to_numpy().tolist(),
-    "pickled": lambda table: pickle.loads(pickle.dumps(table.to_numpy())),
+    "pickled": lambda table: pickle.loads(pickle.dumps(table.to_numpy().copy(order="C"))),
     "frame": lambda table: framed(table.to_numpy().copy(order="C"), table),
 }
 FRAMES = {  # equal to a frame in C order
@@ -212,7 +212,7 @@ FRAMES = {  # equal to a frame in C order
     "part of a larger array": lambda table: framed(within(table), table),
     "Fortran": lambda table: framed(np.asfortranarray(table.to_numpy()), table),
     "columns of their own": lambda table: pd.DataFrame({name: table[name].copy() for name in table}),
-    "pickled": lambda table: pickle.loads(pickle.dumps(table)),
+    "pickled": lambda table: pickle.loads(pickle.dumps(framed(table.to_numpy().copy(order="C"), table))),
     "CSV": from_csv,
     "Parquet": from_parquet,
 }
