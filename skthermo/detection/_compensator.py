@@ -43,8 +43,8 @@ from skthermo._core.frames import (
     column_names,
     frame_like,
     has_stamps,
+    marker_findings,
     positions_of,
-    warn_of_markers,
 )
 from skthermo._core.origins import Changes, Origin, with_origin
 from skthermo._core.warnings import (
@@ -412,7 +412,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         values = validate_data(self, X, **AS_FLOATS, reset=False)
         temperatures, frequencies = split_columns(X, values, self.targets_)
         is_named = isinstance(X, pd.DataFrame)
-        warn_of_markers(frequencies if is_named else pd.DataFrame(frequencies, columns=self.get_feature_names_out()))
+        named = frequencies if is_named else pd.DataFrame(frequencies, columns=self.get_feature_names_out())
+        warn_each(marker_findings(named))
         warn_of_implausible(self.training_range_, temperatures)
         return temperatures, frequencies
 
