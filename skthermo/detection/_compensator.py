@@ -22,7 +22,7 @@ from skthermo._core.estimators import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._core.frames import column_names, frame_like, positions_of
+from skthermo._core.frames import column_names, frame_like, marker_findings, positions_of
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
@@ -384,6 +384,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """
         T, F = self._split(X)
         inputs, findings = self._filled(T)
+        findings += marker_findings(F if isinstance(F, pd.DataFrame) else pd.DataFrame(F, columns=self.get_feature_names_out()))
         with collected():
             predicted = self.regression_.predict(inputs)
         unknown = np.isnan(predicted).all(axis=1)
