@@ -58,7 +58,7 @@ from skthermo._core.warnings import (
     without_warnings,
 )
 from skthermo.detection._base import mean_log_density
-from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning, WeatherWarning
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing import RecordFindings, check_records, set_aside
 from skthermo.residuals.folds import Folds
 from skthermo.residuals.spread import FEWEST, Extrapolation, Spread, rows_near_in_time
@@ -69,10 +69,10 @@ from skthermo.residuals.weather import (
     SensorRegression,
     TrainingRange,
     filled_text,
+    implausible,
     misplaced_columns,
     unpredicted_text,
-    warn_of_implausible,
-    warn_of_unseen_weather,
+    unseen_weather,
 )
 
 AS_FLOATS = {"order": "C", "dtype": np.float64}
@@ -398,9 +398,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         weather = as_floats(filled)
         known, from_fleet, errors = self.regression_.stated(filled)
         reach, inputs = known or (self.training_range_, weather)  # with that of a fleet
-        warn_user(reach.warning(inputs), WeatherWarning, "outside-training-weather")
+        warn_each(reach.doubts(inputs))
         warn_of_fleet(from_fleet, "Their residuals count less, by that uncertainty")
-        warn_user(self.sensors_.warning(temperatures), RecordsWarning, "sensor-disagrees")
+        warn_each(self.sensors_.doubts(temperatures))
         predicted = self.regression_.predict(filled)
         predicted[np.isnan(weather).all(axis=1)] = np.nan
         unknown = warn_of_unpredicted(predicted, weather)
@@ -413,7 +413,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         temperatures, frequencies = split_columns(X, values, self.targets_)
         is_named = isinstance(X, pd.DataFrame)
         warn_of_markers(frequencies if is_named else pd.DataFrame(frequencies, columns=self.get_feature_names_out()))
-        warn_of_implausible(self.training_range_, temperatures)
+        warn_each(implausible(self.training_range_, temperatures))
         return temperatures, frequencies
 
     def _with_spread(self, residuals: Array) -> Array:
@@ -465,7 +465,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.estimator_ = self.regression_.estimator
         self.folds_ = folds.of_row(len(measured))
         if not self.regression_.states_errors:
-            warn_of_unseen_weather(filled, self.folds_, "Their residuals are too large, and may hide damage")
+            warn_each(unseen_weather(filled, self.folds_, "Their residuals are too large, and may hide damage"))
         length = None if folds.blocks is None else folds.blocks.length(filled)
         self.block_ = length.to_numpy() if isinstance(length, pd.Timedelta) else length  # which skops can load
         predicted[np.isnan(as_floats(temperatures)).all(axis=1)] = np.nan
