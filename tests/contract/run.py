@@ -28,6 +28,8 @@ def run(name):
         warnings.simplefilter("ignore")
         left = runpy.run_path(str(SCRIPTS / f"{name}.py"), run_name="__main__")
     tolerances = left.get("TOLERANCES", {})
+    if unknown := set(tolerances) - {*left["RESULTS"], "*"}:
+        raise ValueError(f"{name}: there are tolerances of {unknown}, which are no results")
     return {
         result: {"value": simple(value), **TOLERANCE, **tolerances.get("*", {}), **tolerances.get(result, {})}
         for result, value in left["RESULTS"].items()
