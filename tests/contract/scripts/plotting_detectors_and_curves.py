@@ -10,7 +10,7 @@ from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM
 
 mpl.use("Agg")
-year = make_truss_campaign(samples_per_year=180, random_state=0)
+year = make_truss_campaign(random_state=0)
 fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
 scenarios = sweep(fem, (0.1, 0.2, 0.3), ["bottom"])
 detectors = {name: MahalanobisDetector(threshold=name) for name in ("conformal", "quantile")}

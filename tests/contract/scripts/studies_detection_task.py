@@ -7,10 +7,10 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.studies import detection_task
 from skthermo.surrogate import DataInformedFEM
 
-year, weather, later = (make_truss_campaign(samples_per_year=180, random_state=seed) for seed in range(3))
+year, weather, later = (make_truss_campaign(random_state=seed) for seed in range(3))
 fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
 options = {"columns": fem.mode_names_, "n_repeats": 2, "random_state": 0}
-task = detection_task(fem, weather.temperatures, [{}, {"bottom": 0.3}], **options)
+task = detection_task(fem, weather.temperatures, [{}, {"bottom": 0.2}], **options)
 grid = {"threshold": ["conformal", "quantile"]}
 search = GridSearchCV(MahalanobisDetector(), grid, cv=task.cv, scoring=task.scoring, refit=False).fit(task.X, task.y)
 detector = task.refit(search)
