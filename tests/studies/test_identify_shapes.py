@@ -25,7 +25,7 @@ random = np.random.RandomState(0)
 
 @pytest.fixture(scope="module")
 def effects(fem):
-    return ShapeEffects.of(ChangedStructure(fem, CHANGES), THETA, DOFS)
+    return ShapeEffects.of(ChangedStructure(fem, CHANGES, THETA), THETA, DOFS)
 
 
 def shapes_at(amounts=None):
@@ -75,7 +75,7 @@ def test_models_without_exact_derivatives(fem, effects):
         model, n_jobs = Model(), None
         simulator_ = type(fem.simulator_)(Model())
 
-    other = ShapeEffects.of(ChangedStructure(Chain, CHANGES), THETA, DOFS)
+    other = ShapeEffects.of(ChangedStructure(Chain, CHANGES, THETA), THETA, DOFS)
     exact = effects(AT)
     turned = [np.sign((a * b).sum(axis=0)) for a, b in zip(other.across, effects.across, strict=True)]
     signs = np.concatenate(turned)

@@ -329,7 +329,7 @@ class Posterior:
         if now.is_program:
             return now
         solved = now.simulator.approximate.linearise(np.exp(x), now.n_jobs, relative=True)
-        return replace(now, surface=ResponseSurface.of(x, *solved))
+        return replace(now, surface=ResponseSurface.fitted(x, *solved))
 
     def _with_runs(self, x: Array, runs: list[tuple[Array, Array]]) -> Posterior:
         """The same with a surface through further runs of a program near some ln theta."""
@@ -338,7 +338,7 @@ class Posterior:
         points = x[random.randint(len(x), size=number)]
         points = points + self.prior.deviations * random.standard_normal(points.shape)
         runs.append((points, evaluate(self.simulator.model, np.exp(points), n_jobs=self.n_jobs)))
-        surface = ResponseSurface.of(*(np.concatenate(part) for part in zip(*runs, strict=True)))
+        surface = ResponseSurface.fitted(*(np.concatenate(part) for part in zip(*runs, strict=True)))
         return replace(self, surface=surface, n_runs=self.n_runs + number + (2 * n_parameters + 1) * (len(runs) == 1))
 
 
