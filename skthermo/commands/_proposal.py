@@ -30,7 +30,6 @@ from skthermo.commands._settings import (
     read_settings,
     settings_of,
 )
-from skthermo.detection import DirectionalDetector
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
 from skthermo.preprocessing.loggers.files import BINARY, PARQUET, CsvFormat, Look, read_file
 from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
@@ -42,15 +41,8 @@ FEATURES = {
     "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
 }
 DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day can be evaluated together
-SINGLE = ("MahalanobisDetector", {}, "each record for itself")
-DAY = ("WindowedAlarm", {"window": "1D"}, "the records of a day together")
-FALLS = {"class": "DirectionalDetector"}  # of natural frequencies, as damage has it
-SINGLE_FALLS = ("DirectionalDetector", {}, "each record for itself, falls of frequencies with more weight than rises")
-DAY_FALLS = (
-    "WindowedAlarm",
-    {"window": "1D", "detector": FALLS},
-    "the records of a day together, falls of frequencies with more weight than rises",
-)
+DAY = {"window": "1D"}
+ANY_CHANGE, FALLS = "MahalanobisDetector", "DirectionalDetector"  # of other responses, and of natural frequencies
 WIDTH = 110  # of comments
 OTHERS = """
 # An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
@@ -76,7 +68,7 @@ class Candidate:
     """
 
     kind: str
-    chosen: Mapping[str, Any]
+    compensator: Mapping[str, Any]
     text: str
     finds: str
     size: float
@@ -153,16 +145,14 @@ class Proposal:
         """
         parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen in self.features]}
         parts["regression"] = class_named(REGRESSION, CLASSES["regression"])()
-        options = {"compensator": {}, "monitor": self.monitor_options}
-
-        are_frequencies = set(self.units.values()) == {HZ}
-        single, day = (SINGLE_FALLS, DAY_FALLS) if are_frequencies else (SINGLE, DAY)
-        tried = []
-        for kind, chosen, text in [single, day] if self.step <= DENSE else [single]:
-            inner = {key: DirectionalDetector() for key, one in chosen.items() if one is FALLS}
+        kind = FALLS if set(self.units.values()) == {HZ} else ANY_CHANGE
+        falls = ", falls of frequencies with more weight than rises" if kind == FALLS else ""
+        ways = [({}, f"each record for itself{falls}"), (DAY, f"the records of a day together{falls}")]
+        parts["detector"], tried = class_named(kind, CLASSES["detector"])(), []
+        for chosen, text in ways if self.step <= DENSE else ways[:1]:
+            options = {"compensator": chosen, "monitor": self.monitor_options}
             try:
-                detector = class_named(kind, CLASSES["detector"])(**{**chosen, **inner})
-                made = Settings(Path(), {}, Files(), self.records, self.form, parts | {"detector": detector}, options)
+                made = Settings(Path(), {}, Files(), self.records, self.form, parts, options)
                 with without_warnings():  # the fit that follows gives them
                     smallest = made.monitor().fit(self.baseline).smallest_changes_
                 size = float(np.exp(np.log(list(smallest.single.values())).mean()))
@@ -215,8 +205,8 @@ class Proposal:
             ("csv", None, asdict(self.form), "How CSV files are written."),
             *(("features", kind, chosen, FEATURES[kind]) for kind, chosen in self.features),
             ("regression", REGRESSION, {}, "Predicts the responses from the inputs: any of scikit-learn's regressors."),
-            ("compensator", None, {}, "Takes out what the weather explains."),
-            ("detector", best.kind, best.chosen, f"Evaluates {best.text}."),
+            ("compensator", None, best.compensator, f"Takes out what the weather explains, of {best.text}."),
+            ("detector", best.kind, {}, "Gives the damage index of what is left."),
             ("monitor", None, self.monitor_options, "The detector in service."),
         ]
         parts = [

@@ -19,6 +19,7 @@ from skthermo._core.estimators import with_nan
 from skthermo._core.frames import DAY_NS, YEAR, usual_step
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import duration_text
+from skthermo.detection import CompensatedDetector
 from skthermo.preprocessing import HampelFilter
 
 JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong
@@ -231,6 +232,9 @@ def _paths(part: Any, seen: set[int]) -> set[Path]:
     """Ways through a fitted part, each with the reaches on it."""
     if id(part) in seen:
         return {()}
+    if isinstance(part, CompensatedDetector):
+        before = _paths(part.compensator_, seen)
+        return {way + more for way in _paths(part.means_, seen) for more in before}
     if isinstance(part, Pipeline):
         ways: set[Path] = {()}
         for _, step in reversed(part.steps):

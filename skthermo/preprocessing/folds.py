@@ -176,18 +176,20 @@ class BlockedKFold(BaseCrossValidator):
             yield folds == fold
 
 
-def out_of_fold(
-    learn: Callable[[NDArray[np.intp]], Callable[[NDArray[np.intp]], ArrayLike]], fold_of: NDArray[np.intp]
-) -> Array:
-    """Value of each row, by what was learned from the rows of the other folds.
+Rows = NDArray[np.intp]
+
+
+def out_of_fold(learn: Callable[[Rows], Callable[[Rows], ArrayLike]], folds: Rows | list[tuple[Rows, Rows]]) -> Array:
+    """Value of each row, by what was learned from other rows.
 
     Parameters
     ----------
     learn : callable
         Takes the positions of training rows; gives a function that takes the positions of test rows and gives their
         values, (n_test_rows, ...).
-    fold_of : ndarray of int of shape (n_rows,)
-        The fold of each row. Rows of a negative fold are in no test fold: they train, and their value is NaN.
+    folds : ndarray of int of shape (n_rows,), or list of pairs of rows
+        The fold of each row, or training and test rows of each fold. A row that no fold tests, with a negative number
+        or in no test rows, has the value NaN.
 
     Returns
     -------
@@ -201,14 +203,17 @@ def out_of_fold(
     >>> out_of_fold(lambda train: lambda test: np.full(len(test), y[train].mean()), np.array([0, 0, 1, 1]))
     array([3.5, 3.5, 1.5, 1.5])
     """
-    values: Array | None = None
-    for fold in np.unique(fold_of[fold_of >= 0]):
-        test = np.flatnonzero(fold_of == fold)
-        found = np.asarray(learn(np.flatnonzero(fold_of != fold))(test), dtype=float)
-        if values is None:
-            values = np.full((len(fold_of), *found.shape[1:]), np.nan)
-        values[test] = found
-    return np.full(len(fold_of), np.nan) if values is None else values
+    if isinstance(folds, np.ndarray):
+        n_rows = len(folds)
+        tests = [folds == fold for fold in np.unique(folds[folds >= 0])]
+        folds = [(np.flatnonzero(~test), np.flatnonzero(test)) for test in tests]
+    else:
+        n_rows = 1 + max(rows.max(initial=-1) for pair in folds for rows in pair)
+    found = [(test, np.asarray(learn(train)(test), dtype=float)) for train, test in folds]
+    values = np.full((n_rows, *(found[0][1].shape[1:] if found else ())), np.nan)
+    for test, value in found:
+        values[test] = value
+    return values
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from skthermo._core.arrays import Array, as_columns, as_floats, is_real
 from skthermo._core.estimators import _num_samples, last_step, seed_parts
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.memory import remembered
-from skthermo._core.origins import Origin, of_origin, origin_of
 from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.warnings import warnings_of_detector, without_warnings
 from skthermo.detection import DamageDetector
@@ -165,13 +164,11 @@ class Candidate:
             before = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
             begins = before.steps[:-1], healthy
 
-            def transformed() -> tuple[Pipeline, Table, Origin | None]:
-                rows = before.fit_transform(healthy)
-                return before, rows, origin_of(rows)
+            def transformed() -> tuple[Pipeline, Table]:
+                return before, before.fit_transform(healthy)
 
             def learn() -> tuple[Pipeline, Table]:
-                known, rows, origin = remembered(memory, "steps", transformed, begins)
-                return known, of_origin(rows, origin)
+                return remembered(memory, "steps", transformed, begins)
 
             before, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
             head = tuple(step for _, step in before.steps[:-1])
@@ -224,8 +221,8 @@ def _longest_window(detector: BaseEstimator) -> int:
     parts, longest = [detector], 1
     while parts:
         part = parts.pop()
-        longest = max(longest, getattr(part, "width_", 1))
-        parts += [*dict(getattr(part, "steps", ())).values(), *getattr(part, "detectors_", ())]
+        longest = max(longest, getattr(part, "width", 1))
+        parts += [*dict(getattr(part, "steps", ())).values(), *filter(None, [getattr(part, "means_", None)])]
     return longest
 
 
