@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import Matrix, check_names, check_path
-from skthermo._core.matrix_files import MASS, read_half, read_named_matrices
+from skthermo._core.matrix_files import MASS_OF, read_half, read_named_matrices
 from skthermo._core.warnings import warn_each
 from skthermo.fem.affine import AffineModel
 from skthermo.fem.external._differences import SAME_ENTRIES, doubtful_matrices, read_differences, relative
@@ -198,7 +198,7 @@ def load_affine(
 
     def is_used(name: str) -> bool:
         is_named = keys is None or name in (*keys, mass, total)
-        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS))
+        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS_OF))
 
     matrices, dofs = read_named_matrices(file, is_used)
     exports = Exports(file, matrices)
@@ -291,17 +291,17 @@ class Exports:
     def mass(self) -> str:
         """The mass matrix: the one with a usual name, or that of all exports."""
         found = self.usual(self.square, MASS_NAMES, "mass")
-        masses = [name for name in self.square if name.endswith(MASS)]
+        masses = [name for name in self.square if name.endswith(MASS_OF)]
         if found is None and not masses:
             raise ValueError(f"{self.file}: {self._no_mass()}; say mass=..., one of {self.square or [*self.matrices]}")
         if found is not None:
             return found
-        nominal = [name for name in masses if name.removesuffix(MASS).lower() in TOTAL_NAMES]
+        nominal = [name for name in masses if name.removesuffix(MASS_OF).lower() in TOTAL_NAMES]
         chosen = (nominal or masses)[0]
         reference = self.matrix(chosen)
         for name in masses:
             if not _same(self.matrix(name, reference.shape), reference, SAME_ENTRIES):
-                both = f"{name.removesuffix(MASS)!r} differs from that of {chosen.removesuffix(MASS)!r}"
+                both = f"{name.removesuffix(MASS_OF)!r} differs from that of {chosen.removesuffix(MASS_OF)!r}"
                 raise ValueError(
                     f"{self.file}: the mass of {both}; expected exports of the same mass, or mass=..., one of them"
                 )
@@ -322,7 +322,7 @@ class Exports:
             name: self.matrix(name, shape)
             for name, one in self.matrices.items()
             if name != mass
-            and not (name in self.square and name.endswith(MASS))
+            and not (name in self.square and name.endswith(MASS_OF))
             and (name in self.square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
         }
 
