@@ -19,7 +19,7 @@ import skthermo
 from skthermo._core.files import write_when_complete
 from skthermo._core.frames import usual_step
 from skthermo._core.text import duration_text
-from skthermo._core.warnings import without_warnings
+from skthermo._core.warnings import warn_each, without_warnings
 from skthermo.commands._settings import (
     CLASSES,
     SECTIONS,
@@ -31,7 +31,7 @@ from skthermo.commands._settings import (
     settings_of,
 )
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
-from skthermo.preprocessing.loggers.files import BINARY, PARQUET, CsvFormat, Look, read_file
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, PARQUET, CsvFormat, FileLook, read_file
 from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
@@ -81,7 +81,7 @@ class Candidate:
 class Proposal:
     """What was found in files of records, and the settings that are proposed for them."""
 
-    looks: Sequence[Look]
+    looks: Sequence[FileLook]
     form: CsvFormat
     records: Records
     baseline: pd.DataFrame
@@ -93,9 +93,10 @@ class Proposal:
     @classmethod
     def of(cls, options: argparse.Namespace) -> Proposal:
         """Look at files, and at their records up to the end of the baseline."""
-        read = LoggerRecords.of(
+        read = LoggerRecords.read(
             options.files, options.temperatures, options.responses, options.reference, options.zone, options.stamps
         )
+        warn_each(finding for look in read.looks for finding in look.findings)
         looks, roles, table = read.looks, read.roles, read.table
         form = _form_of_all(looks)
         until = options.until
@@ -121,7 +122,7 @@ class Proposal:
     def account(self) -> Iterator[str]:
         for look in self.looks:
             form, index = look.form, look.records.index
-            is_csv = look.file.suffix.lower() not in BINARY
+            is_csv = look.file.suffix.lower() not in NO_TEXT_FILES
             shape = f"values with {form.separator!r} between and the decimal sign {form.decimal!r}, " if is_csv else ""
             zone = f" in {index.tz}" if index.tz else ", without a time zone"
             yield f"{look.file}: {len(index)} records, {shape}{index.min()} to {index.max()}{zone}"
@@ -221,10 +222,10 @@ class Proposal:
         return "\n".join(parts) + "\n"
 
 
-def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
+def _form_of_all(looks: Sequence[FileLook]) -> CsvFormat:
     """The form by which all files are read as they were: that of the first text, as workbooks need less of it."""
     looks = [look for look in looks if look.file.suffix.lower() not in PARQUET] or looks[:1]
-    looks.sort(key=lambda look: look.file.suffix.lower() in BINARY)
+    looks.sort(key=lambda look: look.file.suffix.lower() in NO_TEXT_FILES)
     missing = sorted({marker for look in looks for marker in look.form.missing})
     forms = [replace(look.form, missing=missing) for look in looks]
     other = next((n for n, form in enumerate(forms) if form != forms[0] and not _fits(forms[0], looks[n])), None)
@@ -235,7 +236,7 @@ def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
     return forms[0]
 
 
-def _fits(form: CsvFormat, look: Look) -> bool:
+def _fits(form: CsvFormat, look: FileLook) -> bool:
     """Whether a file has the same records by another form."""
     try:
         return read_file(look.file, form, ignore=look.ignored).equals(look.records)

@@ -26,7 +26,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import CompensatedDetector, DirectionalDetector
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing.loggers.files import CsvFormat
+from skthermo.preprocessing.loggers.logger_files import CsvFormat
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
 NONE = "none"  # in a file, where a parameter may be None and is not by default

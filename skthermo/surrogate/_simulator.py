@@ -14,7 +14,7 @@ import joblib
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import DEFAULT_TOLERANCE, Array, Reduce, is_auto, tolerance
+from skthermo._core.arrays import Array, Reduce, is_auto, tolerance
 from skthermo._core.warnings import warn_user
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import AffineModel, FEModel, FrequencySurface, ReducedModel, evaluate, linearise, linearise_modes
@@ -84,7 +84,7 @@ class Simulator:
     model: FEModel
     reduced: Any = None
     box: Array | None = None
-    tol: float = DEFAULT_TOLERANCE
+    tol: float = 1e-5
     reason: str = ""
     usual: Array | None = None
     _known: KnownChanges = field(default_factory=KnownChanges, init=False, repr=False, compare=False)
@@ -106,7 +106,7 @@ class Simulator:
         """
         auto, box = is_auto(reduce), box_around(theta)
         tol = tolerance(model, reduce, SOLVES_PER_ROW * (len(theta) if n_rows is None else n_rows))
-        allowed = DEFAULT_TOLERANCE if auto else tol
+        allowed = 1e-5 if auto else tol
         usual = theta if reduce and isinstance(model, AffineModel | ReducedModel) else None
         if known is not None and known.model is model and known.box is not None and allowed is not None:
             covers = (known.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= known.box[:, 1]).all()
