@@ -61,7 +61,8 @@ def check_records(
     Returns
     -------
     RecordFindings
-        Its ``table`` has a row for each finding, ``summary()`` a line; ``refuse_meaningless`` raises an error.
+        Its ``table`` has a row for each finding, ``summary()`` a line; ``temperatures`` and ``frequencies`` are the
+        cleaned tables; ``refuse_meaningless`` raises an error.
 
     Raises
     ------
@@ -102,7 +103,9 @@ def check_records(
         findings = [*findings, *records.findings()]
         far.iloc[records.order] |= records.are_outliers
         memory = records.memory
-    return RecordFindings(findings_table(findings), cleaned.n_rows, far, memory)
+    table = findings_table(findings)
+    cleaned.set_stuck_aside()
+    return RecordFindings(table, cleaned.n_rows, far, memory, **cleaned.tables(), left_out=cleaned.left_out())
 
 
 class RecordsInOrder:

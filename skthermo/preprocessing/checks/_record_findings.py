@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.frames import midnight
+from skthermo._core.frames import Table, midnight
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing._find_memory import MemoryFindings
@@ -176,6 +176,10 @@ class RecordFindings(SavesFrames):
         Which frequencies are outliers, on the records' index.
     memory : MemoryFindings, optional
         What `find_memory` has found; None where nothing was looked for.
+    temperatures, frequencies : array-like or DataFrame, optional
+        The tables as they were given, NaN in place of values that cannot be measurements, as `set_aside` gives them.
+    left_out : dict, optional
+        Columns that cannot be used, each with the reason.
 
     Examples
     --------
@@ -193,6 +197,9 @@ class RecordFindings(SavesFrames):
     n_rows: int
     outliers: pd.DataFrame | None = None
     memory: MemoryFindings | None = None
+    temperatures: Table | None = None
+    frequencies: Table | None = None
+    left_out: dict[Hashable, str] = field(default_factory=dict)
 
     def summary(self) -> str:
         """A line for each finding, and for each kind a line with its consequence and what to do.
