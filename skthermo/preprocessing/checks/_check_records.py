@@ -19,6 +19,7 @@ from skthermo._core.arrays import (
     median,
     range_sums,
     robust_deviation,
+    rows_by_pattern,
     spread_evenly,
 )
 from skthermo._core.estimators import check_array
@@ -313,21 +314,22 @@ class RecordsInOrder:
         if self.has_faulty_sensors or self.has_wrong_times or is_short:
             return found, level
         times = row_times(pd.DataFrame(index=self.index))
-        span = np.ptp(times[rows])
-        beside, deviations = Inputs(inputs[rows]), robust_deviation(F)
-        for mode, name in enumerate(self.modes):
-            known = np.flatnonzero(~np.isnan(self.F[:, mode]))
+        span, deviations = np.ptp(times[rows]), robust_deviation(F)
+        for known, basis, mode in bases_of(inputs[rows], F):
+            name, n_inputs = self.modes[mode], inputs.shape[1]
+            all_known = np.flatnonzero(~np.isnan(self.F[:, mode]))
             of_frequency = 0.1 * deviations[mode]
-            row, change, error = largest_step(beside, F[:, mode])
+            row, change, error = largest_step(basis, known, F[:, mode], n_inputs)
             if abs(change) > max(5 * error, of_frequency):
                 level[rows[row] :, mode] = change
                 detail = (
                     f"{name!r} changes by {change:+.2g}{self.unit} about {period_of(self.index, rows[[row]])}, "
                     f"standard error {error:.1g}"
                 )
-                found.append(RecordFinding.in_rows(self.index, "sudden-change", name, known, detail))
+                found.append(RecordFinding.in_rows(self.index, "sudden-change", name, all_known, detail))
                 continue
-            change, error, first, last, number = trend_of(beside, (times[rows] - times[rows[0]]) / span, F[:, mode])
+            places = (times[rows] - times[rows[0]]) / span
+            change, error, first, last, number = trend_of(basis, known, places, F[:, mode], n_inputs)
             least = max(5 * error, 0.5 * error * np.sqrt(number / 12), of_frequency)  # half of the residuals' deviation
             if abs(change) > least:
                 level[:, mode] = change * (times - times[0]) / np.ptp(times)
@@ -336,8 +338,8 @@ class RecordsInOrder:
                     f"{name!r} changes by {change:+.2g}{self.unit}, standard error {error:.1g}{a_year}; first fifth "
                     f"{first:+.2g}{self.unit}, last fifth {last:+.2g}{self.unit}"
                 )
-                found.append(RecordFinding.in_rows(self.index, "trend", name, known, detail))
-        return found, level
+                found.append(RecordFinding.in_rows(self.index, "trend", name, all_known, detail))
+        return sorted(found, key=lambda one: self.modes.index(one.column)), level
 
 
 def _are_implausible(F: Array) -> NDArray[np.bool_]:
@@ -451,52 +453,42 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
     order = np.argsort(times, kind="stable")
     span = np.ptp(times) if len(times) else 0.0
     places = (times[order] - times[order][:1]) / span if span > 0 else np.zeros(len(times))
-    beside = Inputs(np.ones((len(values), 1)))
-    rows = [trend_of(beside, places, column) for column in values[order].T]
+    rows = np.full((values.shape[1], 5), np.nan)
+    for known, basis, mode in bases_of(np.ones((len(values), 1)), values[order]):
+        rows[mode] = trend_of(basis, known, places, values[order, mode], 1)
     estimates = ["change", "standard_error", "first", "last", "n_independent"]
     table = pd.DataFrame(rows, index=list(names), columns=estimates)
     table.insert(2, "per_year", table["change"] * (YEAR.value / span if has_stamps(residuals) and span > 0 else np.nan))
     return table
 
 
-class Inputs:
-    """Inputs beside which trends and steps of columns are sought, (n_samples, n_inputs), in order of time.
-
-    Their orthonormal basis is found once for columns one after the other that have values in the same rows.
-    """
-
-    def __init__(self, values: Array):
-        self.values = values
-        self.are_known = ~np.isnan(values).any(axis=1)
-        self.least_known = 10 + 2 * values.shape[1]
-        self._last: tuple[Rows, Array] | None = None
-
-    def known(self, column: Array) -> Rows:
-        """Rows in which the inputs and a column are known."""
-        return np.flatnonzero(self.are_known & ~np.isnan(column))
-
-    def basis(self, rows: Rows) -> Array:
-        """Orthonormal columns that span what the inputs do in some rows."""
-        if self._last is None or not np.array_equal(self._last[0], rows):
-            basis, triangle = np.linalg.qr(self.values[rows])
+def bases_of(inputs: Array, values: Array) -> Iterator[tuple[Rows, Array, int]]:
+    """For each mode that has enough values: the rows in which it and the inputs are known, orthonormal columns that
+    span what the inputs do there, and its position."""
+    usable = ~np.isnan(inputs).any(axis=1)
+    for is_known, modes in rows_by_pattern(~np.isnan(values.T) & usable):
+        known = np.flatnonzero(is_known)
+        if len(known) >= 10 + 2 * inputs.shape[1]:
+            basis, triangle = np.linalg.qr(inputs[known])
             directions, sizes, _ = np.linalg.svd(triangle)
-            self._last = rows, basis @ directions[:, sizes > 1e-8 * sizes.max()]
-        return self._last[1]
+            basis = basis @ directions[:, sizes > 1e-8 * sizes.max()]
+            yield from ((known, basis, int(mode)) for mode in modes)
 
 
-def trend_of(inputs: Inputs, places: Array, column: Array) -> tuple[float, float, float, float, float]:
-    """Change from place 0 to 1, its standard error, means of the first and last part, and the effective number."""
-    known = inputs.known(column)
+def trend_of(
+    basis: Array, known: Rows, places: Array, column: Array, n_inputs: int
+) -> tuple[float, float, float, float, float]:
+    """Change from place 0 to 1 beside inputs, its standard error, means of the first and last fifth, and the effective
+    number."""
     x, y = places[known], column[known]
-    if len(y) < inputs.least_known or np.ptp(x) == 0:
+    if np.ptp(x) == 0:
         return (np.nan,) * 5
-    basis = inputs.basis(known)
     # Frisch-Waugh: the trend of what the inputs leave of values, over what they leave of time
     both = np.column_stack([x, y])
     alone, rest = (both - basis @ (basis.T @ both)).T
     change = alone @ rest / (alone @ alone)
     scatter = rest - change * alone
-    error, time = _standard_error(scatter, known, len(column), alone @ alone, inputs.values.shape[1])
+    error, time = _standard_error(scatter, known, len(column), alone @ alone, n_inputs)
     at = scatter + change * (x - x.mean())
     is_first, is_last = x <= 1 / 5, x >= 1 - 1 / 5
     first = at[is_first].mean() if is_first.any() else np.nan
@@ -513,17 +505,15 @@ def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_i
     return float(np.sqrt(variance * time / square)), time
 
 
-def largest_step(inputs: Inputs, column: Array) -> tuple[int, float, float]:
+def largest_step(basis: Array, known: Rows, column: Array, n_inputs: int) -> tuple[int, float, float]:
     """The step that explains most of a column beside inputs: its row, the change and its standard error.
 
     The change is 0 where a straight line does nearly as well. Rows are in order of time. As for a trend, the standard
     error holds if what remains depends on what was before.
     """
-    known = inputs.known(column)
     n_places = min(100, len(known) // 10)
-    if len(known) < inputs.least_known or n_places < 2:
+    if n_places < 2:
         return 0, 0.0, np.inf
-    basis = inputs.basis(known)
     at = np.arange(1, n_places) * len(known) // n_places
     line, y = np.arange(len(known)) / len(known), column[known]
     line, rest = line - basis @ (basis.T @ line), y - basis @ (basis.T @ y)
@@ -536,5 +526,5 @@ def largest_step(inputs: Inputs, column: Array) -> tuple[int, float, float]:
     if rest @ rest - change * products[best] > 0.9 * (rest @ rest - explained_by_line):
         return 0, 0.0, np.inf
     scatter = rest - change * ((np.arange(len(known)) >= at[best]) - basis @ within[best])
-    error, _ = _standard_error(scatter, known, len(column), squares[best], inputs.values.shape[1])
+    error, _ = _standard_error(scatter, known, len(column), squares[best], n_inputs)
     return int(known[at[best]]), float(change), error
