@@ -1,4 +1,4 @@
-"""What the weather shows: modes exchanged, outliers, temperatures of another time, steps and trends of frequencies."""
+"""Checks of frequencies beside the weather: exchanged modes, outliers, temperatures of another time, steps, trends."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def check_records(
 ) -> RecordFindings:
     """Look at temperatures and frequencies for faults that would otherwise be learned.
 
-    It looks for gross errors first: what is no table of numbers, wrong times, numbers that stand for missing values,
-    other units, empty, constant or equal columns, tables that are exchanged or have different rows. Whatever it is
-    given as a table, it does not fail. Such values are then left out, and it looks for sensors and modes that are
-    stuck, weather that explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory,
-    steps and trends. Of one table alone, it tells the gross errors, within milliseconds for a year of hourly records. A
-    finding is a reason to look at the records, no proof of a fault.
+    It looks for gross errors first: arguments that are no tables of numbers, wrong times, numbers that stand for
+    missing values, other units, empty, constant or equal columns, tables that are exchanged or have different rows. No
+    argument makes it fail. Such values are then left out, and it looks for stuck sensors and modes, weather that
+    explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory, steps and trends.
+    One table alone is checked for gross errors only, which takes milliseconds for a year of hourly records. A finding
+    is a reason to look at the records, no proof of a fault.
 
     Parameters
     ----------
@@ -73,13 +73,13 @@ def check_records(
     See Also
     --------
     HampelFilter : Puts NaN in place of outliers.
-    find_memory : Means of earlier temperatures that explain the frequencies, also those of hours.
+    find_memory : Means of earlier temperatures, also over hours, that explain the frequencies.
     residual_trend : The trend of residuals of any regression.
 
     Notes
     -----
-    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` what its findings mean. The ``severity`` of a
-    gross error is "meaningless" if results of a fit would be.
+    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` explains its findings. The ``severity`` of a
+    gross error is "meaningless" if results of a fit would be meaningless.
 
     Examples
     --------
@@ -110,9 +110,9 @@ def check_records(
 
 
 class RecordsInOrder:
-    """Records in order of time; what is found to be wrong becomes NaN.
+    """Records in order of time, in which values with a finding become NaN.
 
-    Of every sensor they are what it shows at that time, and of rows with one time the first.
+    Each sensor has its present value, without lags; of several rows with one time, the first counts.
     """
 
     def __init__(self, cleaned: CleanedRecords, unit: str):
@@ -142,7 +142,7 @@ class RecordsInOrder:
             self.inertia = max(int(24 / self.hours), 1)
 
     def findings(self) -> Iterator[RecordFinding]:
-        """What is found, one after the other; each search passes over what was found before."""
+        """Findings one after the other; each search passes over the values of earlier findings."""
         yield from self._stuck("stuck-sensor", self.T, self.sensors, " °C")
         yield from self._stuck("stuck-mode", self.F, self.modes, self.unit)
         if np.count_nonzero(~np.isnan(self.T).all(axis=1) & ~np.isnan(self.F).all(axis=1)) < 50:
@@ -186,7 +186,7 @@ class RecordsInOrder:
     def _exchanged_modes(self, lines: Array, folds: Rows) -> Iterator[RecordFinding]:
         """Pairs of modes that the weather explains much better with their values exchanged in some rows.
 
-        Rows with one value of two count if it is far from what its own column should be and near to the other's.
+        A row with one value of two counts if the value is far from its own column's prediction and near to the other's.
         """
         found = []
         for first, second in combinations(range(len(self.modes)), 2):
@@ -224,7 +224,8 @@ class RecordsInOrder:
             self.F[np.ix_(rows, both)] = self.F[np.ix_(rows, both[::-1])]
 
     def _far_from_neighbours(self, lines: Array, folds: Rows) -> NDArray[np.bool_]:
-        """Values far from their neighbours and from what the weather explains or, without weather, implausible ones."""
+        """Values far from their neighbours and from a regression on the weather or, without weather, implausible
+        ones."""
         F, has_weather = self.F, ~np.isnan(lines).any(axis=1)[:, np.newaxis]
         rest = F - np.where(has_weather, predicted_by_weather(lines, F, folds), median(F))
         distances, local = distances_from_neighbours(rest, np.arange(len(F)), 25)
@@ -273,7 +274,7 @@ class RecordsInOrder:
                 yield RecordFinding.in_rows(self.index, "slow-temperatures", sensor, usable, detail), inputs
 
     def _shift(self, lines: Array, past: Array, places: Array, F: Array, folds: Rows) -> RecordFinding | None:
-        """Temperatures of other rows, if they explain clearly more than those of the row and its past."""
+        """A finding where temperatures of other rows explain clearly more than the row's own and its past."""
         n_rows, inputs, found = len(F), np.hstack([lines, past]), []
         for shift in proposed_shifts(places, F, self.inertia):
             rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
@@ -304,7 +305,7 @@ class RecordsInOrder:
         return RecordFinding.in_rows(self.index, "time-shift", "", rows, detail)
 
     def _changes(self, inputs: Array) -> tuple[list[RecordFinding], Array]:
-        """Steps and trends that are found beside the weather, and what they add to each frequency."""
+        """Steps and trends beside the weather, and their share in each frequency."""
         level = np.zeros(self.F.shape)
         found: list[RecordFinding] = []
         rows = spread_evenly(np.arange(len(inputs)), 20_000)
@@ -358,7 +359,7 @@ def explained(inputs: Array, frequencies: Array, folds: Rows) -> Array:
 
 
 def unexplained(inputs: Array, frequencies: Array, folds: Rows) -> Array:
-    """Mean square that inputs leave of each mode out of fold, over that which the mean of the other folds leaves."""
+    """Mean square of each mode's residuals out of fold by the inputs, over that by the mean of the other folds."""
     values = np.where(np.isnan(inputs).any(axis=1)[:, np.newaxis], np.nan, frequencies)
     means = out_of_fold(lambda train: lambda test: np.tile(means_of_known(values[train]), (len(test), 1)), folds)
     means = np.where(np.isnan(means), median(values), means)  # where the other folds have no value
@@ -435,8 +436,8 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
 
     Notes
     -----
-    The line is that of least squares. Its variance is that of independent records times the correlation time, 1 + 2 *
-    the sum of the autocorrelations, of what remains beside the line.
+    The line is fitted by least squares. Its variance is the variance for independent records times the correlation time
+    of the rest beside the line, 1 + 2 * the sum of its autocorrelations.
 
     Examples
     --------
@@ -483,7 +484,7 @@ def trend_of(
     x, y = places[known], column[known]
     if np.ptp(x) == 0:
         return (np.nan,) * 5
-    # Frisch-Waugh: the trend of what the inputs leave of values, over what they leave of time
+    # Frisch-Waugh: both the values and the times without their parts that the inputs explain
     both = np.column_stack([x, y])
     alone, rest = (both - basis @ (basis.T @ both)).T
     change = alone @ rest / (alone @ alone)
@@ -497,7 +498,7 @@ def trend_of(
 
 
 def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_inputs: int) -> tuple[float, float]:
-    """Of the coefficient of a regressor with this sum of squares, and the correlation time of what it leaves."""
+    """Standard error of the coefficient of a regressor with this sum of squares, and the scatter's correlation time."""
     in_time = np.full(n_rows, np.nan)
     in_time[known] = scatter
     time = min(correlation_time(in_time), len(known) / 2)
@@ -509,7 +510,7 @@ def largest_step(basis: Array, known: Rows, column: Array, n_inputs: int) -> tup
     """The step that explains most of a column beside inputs: its row, the change and its standard error.
 
     The change is 0 where a straight line does nearly as well. Rows are in order of time. As for a trend, the standard
-    error holds if what remains depends on what was before.
+    error allows for correlation of the rest.
     """
     n_places = min(100, len(known) // 10)
     if n_places < 2:

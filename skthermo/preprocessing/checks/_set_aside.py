@@ -1,4 +1,5 @@
-"""What is set aside before anything is learned: values that cannot be, columns of which most are such, wrong rows."""
+"""The gate of records: values that cannot be measurements become NaN, columns without use are left out, wrong rows and
+tables are errors."""
 
 from __future__ import annotations
 
@@ -108,8 +109,8 @@ def set_aside(
 ) -> SetAside:
     """Put NaN in place of values that cannot be measurements.
 
-    Infinite values, numbers that loggers write for a missing one, frequencies that are not positive, values at another
-    level far from all others, and those of a sensor that is stuck become NaN. A column is left out if it has no value,
+    These are infinite values, numbers that loggers write for a missing value, frequencies that are not positive, values
+    at another level far from all others, and values of a stuck sensor. A column is left out if it has no value,
     a single one, if more than half of its values are set aside, or more than a fifth as another level.
 
     Parameters
