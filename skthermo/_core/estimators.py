@@ -363,19 +363,16 @@ def inside(estimator: Any) -> BaseEstimator | None:
     return estimator.estimator if isinstance(estimator, MultiOutputRegressor | BaseSearchCV) else None
 
 
-def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:
-    """Means and standard deviations of all outputs."""
+def predict_with_std(regressor: Any, X: Any) -> tuple[Array, Array | None]:
+    """Means of all outputs and, where ``predict`` takes ``return_std``, their standard deviations; else None."""
     if isinstance(regressor, MultiOutputRegressor):
         parts = [predict_with_std(part, X) for part in regressor.estimators_]
-        means, deviations = (np.hstack(columns) for columns in zip(*parts, strict=True))
-        return means, deviations
+        means, deviations = zip(*parts, strict=True)
+        return np.hstack(means), None if any(one is None for one in deviations) else np.hstack(deviations)
     try:
         means, deviations = regressor.predict(X, return_std=True)
-    except TypeError as error:
-        raise ValueError(
-            f"{regressor!r} gives no standard deviations; expected a regressor whose predict takes return_std, such as "
-            "GaussianProcessRegressor or BayesianRidge"
-        ) from error
+    except (TypeError, ValueError):  # of a regressor that knows none, or of a router that hands none on
+        return as_columns(regressor.predict(X)), None
     return as_columns(means), as_columns(deviations)
 
 

@@ -22,11 +22,11 @@ from skthermo._core.estimators import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._core.frames import column_names, frame_like, positions_of
+from skthermo._core.frames import column_names, frame_like, marker_findings, positions_of
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
-from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing import set_aside
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.gaussian import Gaussian
@@ -37,6 +37,7 @@ from skthermo.residuals.weather import (
     filled_text,
     misplaced_columns,
     unpredicted_text,
+    unseen_weather,
 )
 
 
@@ -70,6 +71,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Which targets are positive, with a standard deviation below a third of their mean: their residuals are relative.
     scale_ : ndarray of shape (n_targets,)
         Robust standard deviations of the residuals of the baseline.
+    usual_deviation_ : ndarray of shape (n_targets,)
+        Median standard deviation of the predictions of the baseline, as a ``predict`` that takes ``return_std`` states
+        it; else 0.
     sensors_ : object
         Regression of each of the other columns on the others: ``sensors_.fill(T)`` and ``sensors_.departures(T)``.
     training_range_ : object
@@ -89,6 +93,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     -----
     The residual of a frequency is relative, ln f - ln f predicted. Another response, which may be zero or negative, has
     the residual measured minus predicted, in its own unit.
+
+    Where the estimator's ``predict`` takes ``return_std``, the residuals of records whose prediction is less certain
+    than usual in the baseline are divided by sqrt(1 + e / s), with the excess e of its variance and the variance s of
+    the baseline's residuals.
 
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design: it predicts each row of the baseline by a clone
     fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than those of new
@@ -328,25 +336,30 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.folds_ = np.full(len(Y), -1)
         for number, (_, test) in enumerate(folds):
             self.folds_[test] = number
-        residuals, told = self._regress(inputs, F, folds, Y)
+        predicted, told = self._regress(inputs, F, folds)
+        residuals = self._difference(Y, predicted)
         far = np.abs(residuals - median(residuals)) > 8 * robust_deviation(residuals)
         if far.any():
-            residuals, told = self._regress(inputs, frame_like(F, np.where(far, np.nan, Y)), folds, Y)
+            predicted, told = self._regress(inputs, frame_like(F, np.where(far, np.nan, Y)), folds)
+            residuals = self._difference(Y, predicted)
         self.estimator_, self.scale_ = self.regression_.estimator, robust_deviation(residuals)
+        self.usual_deviation_ = median(self._deviations(predicted))
+        residuals = self._shrunk(residuals, predicted)
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(residuals).all(axis=1) & ~np.isnan(Y).all(axis=1) & (self.folds_ >= 0)
+        told += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
         text = unpredicted_text(unknown, as_floats(inputs))
         return [*findings, *filled, *told, *as_findings(UnevaluatedRowsWarning, text, "not-predicted")], frame_like(
             F, residuals
         )
 
-    def _regress(self, T: Any, F: Any, folds: list[tuple[Rows, Rows]], Y: Array) -> tuple[Array, list[SkthermoWarning]]:
-        """Fit the regression to targets F; residuals of the measured Y out of fold, and findings of the estimator."""
+    def _regress(self, T: Any, F: Any, folds: list[tuple[Rows, Rows]]) -> tuple[Array, list[SkthermoWarning]]:
+        """Fit the regression; predictions out of fold with standard deviations, and findings of the estimator."""
         estimator = self._default_part("estimator") if self.estimator is None else self.estimator
         with collected() as found:
             self.regression_ = RowsRegression.fitted(estimator, T, F)
             predicted = self.regression_.out_of_fold(estimator, T, F, folds)
-        return self._difference(Y, predicted), found
+        return predicted, found
 
     def inputs(self, X: ArrayLike) -> tuple[Any, list[SkthermoWarning]]:
         """The columns beside the targets, gaps filled from the other sensors.
@@ -384,21 +397,34 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """
         T, F = self._split(X)
         inputs, findings = self._filled(T)
+        findings += marker_findings(pd.DataFrame(as_floats(F), columns=self.get_feature_names_out()))
         with collected():
             predicted = self.regression_.predict(inputs)
-        unknown = np.isnan(predicted).all(axis=1)
+        unknown = np.isnan(predicted[0]).all(axis=1)
         findings += [
-            *as_findings(WeatherWarning, self.training_range_.warning(inputs), "outside-training-weather"),
-            *as_findings(RecordsWarning, self.sensors_.warning(T), "sensor-disagrees"),
+            *self.training_range_.doubts(inputs),
+            *self.sensors_.doubts(T),
             *as_findings(UnevaluatedRowsWarning, unpredicted_text(unknown, as_floats(inputs)), "not-predicted"),
         ]
-        return frame_like(F, self._difference(as_floats(F), predicted)), inputs, findings
+        residuals = self._shrunk(self._difference(as_floats(F), predicted), predicted)
+        return frame_like(F, residuals), inputs, findings
 
     def _difference(self, Y: Array, predicted: Array) -> Array:
         """Measured beside predicted: relative, or in the unit of a response that may be zero."""
+        predicted = predicted[0]
         ratio = Y / np.where(predicted > 0, predicted, np.nan)
         relative = np.log(np.maximum(ratio, 1e-6))  # a frequency below zero is no less a fall
         return np.where(self.relative_, relative, Y - predicted)
+
+    def _deviations(self, predicted: Array) -> Array:
+        """Standard deviations of predictions, relative for relative residuals."""
+        return np.where(self.relative_, predicted[1] / np.abs(predicted[0]), predicted[1])
+
+    def _shrunk(self, residuals: Array, predicted: Array) -> Array:
+        """Residuals that count less where the regression is less certain than it usually was in the baseline."""
+        excess = np.maximum(self._deviations(predicted) ** 2 - self.usual_deviation_**2, 0.0)
+        variance = np.where(self.scale_ > 0, self.scale_, 1.0) ** 2
+        return residuals / np.sqrt(1 + np.nan_to_num(excess) / variance)
 
     def _filled(self, T: Any) -> tuple[Any, list[SkthermoWarning]]:
         """Inputs whose gaps the other sensors fill, and a finding that names these."""

@@ -17,8 +17,8 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
-from skthermo._core.arrays import Array, as_columns, as_floats, is_model
-from skthermo._core.estimators import BaseSearchCV, _BaseImputer, fit_outputs, last_step
+from skthermo._core.arrays import Array, as_floats, is_model
+from skthermo._core.estimators import BaseSearchCV, _BaseImputer, fit_outputs, last_step, predict_with_std
 from skthermo._core.frames import column_names
 from skthermo.preprocessing import BlockedKFold
 from skthermo.preprocessing.folds import Rows, out_of_fold
@@ -51,25 +51,28 @@ class RowsRegression:
         return Pipeline([*self.head.steps, *tail])
 
     def predict(self, T: Any) -> Array:
-        """Predictions of the targets, (n_rows, n_targets)."""
-        return self.predict_behind(T if self.head is None else self.head.transform(T))
+        """Predictions of the targets, and their standard deviations, (2, n_rows, n_targets).
+
+        The latter are zero where the regressor's ``predict`` takes no ``return_std``.
+        """
+        return self.predict_behind(T if self.head is None else self.head.transform(T)).swapaxes(0, 1)
 
     def predict_behind(self, inputs: Any) -> Array:
-        """Predictions from inputs behind the first transformers."""
+        """The same from inputs behind the first transformers, (n_rows, 2, n_targets)."""
         usable = np.ones(inputs.shape[0], dtype=bool) if self.takes_gaps else are_complete(inputs)
-        predicted = np.full((inputs.shape[0], self.n_targets), np.nan)
+        predicted = np.full((inputs.shape[0], 2, self.n_targets), np.nan)
         if usable.any():
-            values = as_columns(self.regressor.predict(rows_of(inputs, usable)))
+            values, deviations = predict_with_std(self.regressor, rows_of(inputs, usable))
             if values.shape != (usable.sum(), self.n_targets):
                 raise ValueError(
                     f"{type(self.regressor).__name__} predicted the shape {values.shape}; expected "
                     f"{(int(usable.sum()), self.n_targets)}, a column for each target"
                 )
-            predicted[usable] = values
+            predicted[usable, 0], predicted[usable, 1] = values, 0.0 if deviations is None else deviations
         return predicted
 
     def out_of_fold(self, estimator: BaseEstimator, T: Any, F: Any, folds: list[tuple[Rows, Rows]]) -> Array:
-        """Predictions of each row by a clone of the estimator's rest that was fitted to other folds."""
+        """The same of each row by a clone of the estimator's rest that was fitted to other folds."""
         rest, inputs = split_pipeline(estimator)[1], T if self.head is None else self.head.transform(T)
 
         def learn(train: Rows) -> Callable[[Rows], Array]:
@@ -77,7 +80,7 @@ class RowsRegression:
             part = RowsRegression(None, fitted, self.takes_gaps, self.n_targets)
             return lambda test: part.predict_behind(rows_of(inputs, test))
 
-        return out_of_fold(learn, folds)
+        return out_of_fold(learn, folds).swapaxes(0, 1)
 
 
 def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:

@@ -59,8 +59,9 @@ class WindowMeans:
             if not isinstance(window, int):
                 recent = residuals.index > residuals.index[-1] - pd.Timedelta(window)
             history = residuals[recent], regime[recent]
-        ones = pd.Series(1, None if isinstance(window, int) else residuals.index)
-        return cls(window, int(ones.rolling(window).count().max()), share, limits, usual, history)
+        ones = pd.Series(1.0, residuals.index)
+        width = window if isinstance(window, int) else int(ones.rolling(window).count().max())
+        return cls(window, width, share, limits, usual, history)
 
     def __call__(self, residuals: pd.DataFrame, regime: Regimes, *, is_baseline: bool = False) -> Array:
         """Means of records in order of time; NaN where a window holds too few values.

@@ -206,7 +206,7 @@ class FrequencyEffects:
     def _differenced(self, theta: Array, sets: Array) -> list[Array]:
         def at(amounts: Array) -> Array:
             simulator, rows = self.structure.with_amounts(theta, amounts)
-            return simulator.frequencies(rows, self.structure.fem.n_jobs, warn=False)
+            return simulator.frequencies(rows, self.structure.fem.n_jobs)
 
         frequencies = np.stack([at(amounts) for amounts in sets])
         slopes = np.stack([central_differences(at, amounts) for amounts in sets])
@@ -249,7 +249,7 @@ def typical_rows(theta: Array, present: NDArray[np.bool_]) -> tuple[Array, Array
 
 def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
     """Frequencies of the undamaged model in the measured domain, without discrepancy, in Hz, (n_rows, n_modes)."""
-    return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs, warn=warn)))
+    return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs)))
 
 
 def central_differences(function: Callable[[Array], Array], amounts: Array) -> Array:

@@ -34,7 +34,7 @@ from skthermo.studies.detectability._simulation import (
     ask_each,
     clean_frequencies,
 )
-from skthermo.surrogate import FittedChain
+from skthermo.surrogate import DataInformedFEM
 
 LEAST_REPEATS, MOST_REPEATS = 3, 20
 
@@ -200,7 +200,7 @@ class DetectabilityStudy(BaseEstimator):
 
     def __init__(
         self,
-        fem: FittedChain,
+        fem: DataInformedFEM,
         detectors: Any,
         scenarios: Sequence[BaseScenario | Mapping[str, float]],
         *,

@@ -40,7 +40,7 @@ from skthermo.studies.detectability._simulation import (
     has_targets,
 )
 from skthermo.studies.detectability._study import check_detector
-from skthermo.surrogate import FittedChain
+from skthermo.surrogate import DataInformedFEM
 
 FIRST_ROWS = "not-predicted", "no-earlier-records"  # kinds of warnings that the first rows of each state would give
 
@@ -357,7 +357,7 @@ class DetectionTask(Bunch):
 
 
 def detection_task(
-    fem: FittedChain,
+    fem: DataInformedFEM,
     T: ArrayLike,
     scenarios: Sequence[BaseScenario | Mapping[str, float]],
     *,
@@ -469,7 +469,7 @@ def detection_task(
 
 
 def _task(
-    fem: FittedChain,
+    fem: DataInformedFEM,
     T: Table,
     scenarios: Any,
     baseline: pd.DataFrame,
@@ -515,7 +515,7 @@ def _task(
     )
 
 
-def _baseline(fem: FittedChain, baseline: Table | None) -> pd.DataFrame:
+def _baseline(fem: DataInformedFEM, baseline: Table | None) -> pd.DataFrame:
     """Measured records as a frame, by default those of the chain; rows without stamps are numbered."""
     T, F = fem.records_.temperatures, fem.records_.frequencies
     every = SeenColumns.all_of(fem)
