@@ -94,9 +94,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     The residual of a frequency is relative, ln f - ln f predicted. Another response, which may be zero or negative, has
     the residual measured minus predicted, in its own unit.
 
-    Where the estimator's ``predict`` takes ``return_std``, the residuals of records whose prediction is less certain
-    than usual in the baseline are divided by sqrt(1 + e / s), with the excess e of its variance and the variance s of
-    the baseline's residuals.
+    Residuals of records whose prediction is less certain than usual in the baseline are divided by sqrt(1 + e / s),
+    with the excess e of its variance and the variance s of the baseline's residuals. A prediction is uncertain where
+    temperatures were filled, and where the estimator's ``predict`` takes ``return_std`` and says so.
 
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design: it predicts each row of the baseline by a clone
     fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than those of new
@@ -344,7 +344,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             residuals = self._difference(Y, predicted)
         self.estimator_, self.scale_ = self.regression_.estimator, robust_deviation(residuals)
         self.usual_deviation_ = median(self._deviations(predicted))
-        residuals = self._shrunk(residuals, predicted)
+        residuals = self._shrunk(residuals, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(residuals).all(axis=1) & ~np.isnan(Y).all(axis=1) & (self.folds_ >= 0)
         told += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
@@ -399,7 +399,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         inputs, findings = self._filled(T)
         findings += marker_findings(pd.DataFrame(as_floats(F), columns=self.get_feature_names_out()))
         with collected():
-            predicted = self.regression_.predict(inputs)
+            predicted = self._with_fills(T, inputs, self.regression_.predict(inputs))
         unknown = np.isnan(predicted[0]).all(axis=1)
         findings += [
             *self.training_range_.doubts(inputs),
@@ -415,6 +415,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         ratio = Y / np.where(predicted > 0, predicted, np.nan)
         relative = np.log(np.maximum(ratio, 1e-6))  # a frequency below zero is no less a fall
         return np.where(self.relative_, relative, Y - predicted)
+
+    def _with_fills(self, T: Any, filled: Any, predicted: Array) -> Array:
+        """Predictions whose standard deviations include the errors of filled inputs, sensor by sensor."""
+        variances = predicted[1] ** 2
+        for error in self.sensors_.errors(T):
+            up, down = (
+                self.regression_.predict(frame_like(filled, as_floats(filled) + side))[0] for side in (error, -error)
+            )
+            variances = variances + np.nan_to_num((up - down) / 2) ** 2
+        return np.stack([predicted[0], np.sqrt(variances)])
 
     def _deviations(self, predicted: Array) -> Array:
         """Standard deviations of predictions, relative for relative residuals."""
@@ -445,7 +455,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"constant"})
         responses = set_aside(frequencies=named_F, unit="", needs_all=True)
         findings = [*inputs.others.warnings(), *responses.others.warnings(), *misplaced_columns(named_T, named_F)]
-        return frame_like(T, as_floats(inputs.frequencies)), frame_like(F, as_floats(responses.frequencies)), findings
+        cleaned = (np.ascontiguousarray(as_floats(found.frequencies)) for found in (inputs, responses))
+        T, F = (frame_like(table, values) for table, values in zip((T, F), cleaned, strict=True))
+        return T, F, findings
 
     def _split(self, X: Any) -> tuple[Any, Any]:
         """Inputs and targets of new records."""
@@ -463,7 +475,8 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     """The other columns and the targets, as frames if X is one."""
     columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
     others = np.delete(np.arange(len(columns)), targets)
-    return frame_like(X, values[:, others], columns[others]), frame_like(X, values[:, targets], columns[targets])
+    T, F = (frame_like(X, np.ascontiguousarray(values[:, some]), columns[some]) for some in (others, targets))
+    return T, F
 
 
 def as_findings(category: type[SkthermoWarning], text: str, kind: str) -> list[SkthermoWarning]:
