@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, shown, tower_records, z24_records
+from inside import SET_ASIDE
 from structures import slow_soil
 
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss_campaign
 from skthermo.preprocessing import HampelFilter, check_records, set_aside
-from skthermo.preprocessing.checks._findings import SET_ASIDE
 
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
