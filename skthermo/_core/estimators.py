@@ -411,7 +411,9 @@ def offers(estimator: Any, name: str) -> bool:
     last = last_step(estimator)
     if isinstance(last, MultiOutputRegressor):
         return all(offers(part, name) for part in last.estimators_)
-    return offers(last.mapper_, name) if hasattr(last, "mapper_") else hasattr(last, name)
+    if hasattr(last, "mapper_") and name != "predict_covariance":
+        return offers(last.mapper_, name)
+    return hasattr(last, name)
 
 
 def inputs_of_last_step(estimator: Any, X: Any) -> Any:

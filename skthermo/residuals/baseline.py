@@ -58,9 +58,9 @@ class BaselineResiduals:
     mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
     of the training records they are. ``ratios``, (n_records, n_parameters), are the parameters of the records over
     out-of-fold predictions. ``errors``, (n_records, n_modes), are the relative standard deviations of out-of-fold
-    predictions as a mapper states them, None if it does not; ``reach`` is the weather within which they hold, all by
-    default, and ``beyond``, (n_records,), how far each record was outside that of the mapper that predicted it.
-    ``findings`` say in which weather residuals are not to be trusted.
+    predictions as a mapper states them that knows the weather within which they hold, ``reach``, else None. ``beyond``,
+    (n_records,), is how far each record was outside the reach of the mapper that predicted it. ``findings`` say in
+    which weather residuals are not to be trusted.
     """
 
     weather: Array
@@ -95,8 +95,6 @@ class BaselineResiduals:
         """
 
         def of_known(known: Array) -> Array:
-            if self.errors is not None and self.reach is None:
-                return self._spread(self._scattered, known, np.zeros(len(known)))
             reach = self.reach or TrainingRange.of(self.weather, slice(None))
             return self._spread(self._scattered, known, reach.excess(known).mean(axis=1))
 

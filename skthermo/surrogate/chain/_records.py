@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.arrays import Array, as_floats, median, refuse_no_table, robust_deviation, spread_evenly
+from skthermo._core.arrays import Array, as_columns, as_floats, median, refuse_no_table, robust_deviation, spread_evenly
 from skthermo._core.estimators import last_step, predict_with_std, reach_of
 from skthermo._core.frames import Table, column_names, frame_like, row_times
 from skthermo._core.memory import remembered
@@ -133,23 +133,26 @@ class TrainingRecords(SavesFrames):
         residuals = BaselineResiduals(
             inputs[known], values[known], own[known], fold_of[known], order[known], (theta / predicted)[known]
         )
-        if np.isnan(deviations).all():
+        reach = reach_of(learner, inputs)
+        if reach is None:
             consequence = "Standard deviations, intervals and noise are unreliable there"
             return replace(residuals, findings=tuple(unseen_weather(records, fold_of, consequence)))
-        errors = model.propagated(predicted, deviations)[known]
-        reach = (reach_of(learner, inputs) or (None,))[0]
-        return replace(residuals, errors=errors, reach=reach, beyond=beyond[known, 0])
+        errors = model.propagated(predicted, np.nan_to_num(deviations))[known]
+        return replace(residuals, errors=errors, reach=reach[0], beyond=beyond[known, 0])
 
 
 def stated_by(mapper: BaseEstimator, inputs: Array) -> Array:
-    """What a fitted mapper predicts, with standard deviations, NaN where it knows none, side by side.
+    """Predictions of a fitted mapper, standard deviations, and how far inputs are outside its weather, side by side.
 
-    The last column is how far inputs are outside the weather that it is based on.
+    Only a mapper with ``reach_``, the weather that it is based on, says the latter two.
     """
-    theta, deviations = predict_with_std(mapper, inputs)
     reach = reach_of(mapper, inputs)
-    beyond = np.zeros(len(inputs)) if reach is None else reach[0].excess(reach[1]).mean(axis=1)
-    return np.column_stack([theta, np.full_like(theta, np.nan) if deviations is None else deviations, beyond])
+    if reach is None:  # standard deviations of such a mapper are added to the scatter of all residuals
+        theta = as_columns(mapper.predict(inputs))
+        return np.column_stack([theta, np.full_like(theta, np.nan), np.zeros(len(inputs))])
+    theta, deviations = predict_with_std(mapper, inputs)
+    deviations = np.full_like(theta, np.nan) if deviations is None else deviations
+    return np.column_stack([theta, deviations, reach[0].excess(reach[1]).mean(axis=1)])
 
 
 def remembering_folds(records: pd.DataFrame, inputs: Array, own: Array) -> NDArray[np.intp]:

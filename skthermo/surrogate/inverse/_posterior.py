@@ -266,8 +266,8 @@ class Posterior:
         return found
 
 
-def inverted(posterior: Posterior, inputs: Array, n_jobs: int | None) -> Bunch:
-    """What `PosteriorInverse.invert` gives, for rows of inputs."""
+def inverted(taught_by: Any, inputs: Array, posterior: Posterior, n_jobs: int | None) -> Bunch:
+    """What `PosteriorInverse.invert` gives, for rows of inputs; a memory knows a posterior by what has taught it."""
     shape, some = (len(inputs), len(posterior.prior.own)), ~np.isnan(inputs).all(axis=1)
     result = Bunch(
         theta=np.full(shape, np.nan),
@@ -521,9 +521,10 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
-        asked = first, in_order, self.reduce, learns_prior, learns_noise, self.n_jobs
+        asked = first, in_order, self.reduce, learns_prior, learns_noise
         with collected() as self.findings_:
-            known = remembered(self.memory, taught, *asked, ignore=["n_jobs"])
+            known = remembered(self.memory, taught, *asked, self.n_jobs, ignore=["n_jobs"])
+        self._taught_by = None if self.memory is None else asked
         self.simulator_ = replace(known.simulator, model=model)  # not a copy that was read
         self.posterior_ = replace(known, simulator=self.simulator_)
         self.prior_, self.noise_ = known.prior, known.noise[: model.n_modes]
@@ -611,7 +612,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_is_fitted(self)
         inputs = self._read(X)
         with collected() as findings:
-            found = remembered(self.memory, inverted, self.posterior_, inputs, self.n_jobs, ignore=["n_jobs"])
+            asked = self._taught_by, inputs, self.posterior_, self.n_jobs
+            found = remembered(self.memory, inverted, *asked, ignore=["posterior", "n_jobs"])
         findings += doubts_of(found)
         names = self.get_feature_names_out()
         tables = {name: frame_like(X, found[name], names) for name in ("theta", "std")}
