@@ -52,8 +52,9 @@ class BayesianLogs(Logs):
         values = super().predict(X)
         if not return_std:
             return values
-        std = np.sqrt(np.einsum("ijj->ij", self.predict_covariance(X)))
-        return values, std[:, 0] if self.is_single_ else std
+        covariances = self.predict_covariance(X)
+        deviations = np.sqrt(np.einsum("ijj->ij", covariances))
+        return values, deviations[:, 0] if self.is_single_ else deviations
 
     def predict_covariance(self, X):
         B = basis(X)

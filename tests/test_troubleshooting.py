@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from skthermo.preprocessing.checks._findings import WARNINGS
+from skthermo.preprocessing.checks._record_findings import WARNINGS
 
 ROOT = Path(__file__).parents[1]
 SOURCE = "\n".join(path.read_text() for path in sorted((ROOT / "skthermo").rglob("*.py")))

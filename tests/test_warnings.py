@@ -1,74 +1,81 @@
-"""Warnings are of a few kinds, which Python's filters distinguish, and leave nothing behind."""
+"""Warnings are of a few kinds, which Python's filters distinguish, at the line of the user."""
 
 import pickle
-import re
-import threading
 import warnings
+from collections import Counter
 from copy import deepcopy
 
-import numpy as np
 import pytest
+from sklearn.base import clone
 from sklearn.inspection import partial_dependence, permutation_importance
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
 
-from skthermo._core.warnings import (
-    counted_warnings,
-    explain_rows,
-    explained_rows,
-    reported_by_caller,
-    warn_user,
-    warnings_once,
-)
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.exceptions import FewRecordsWarning, WeatherWarning
-from skthermo.surrogate import DataInformedFEM
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, WeatherWarning
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+
+YEAR = make_truss_campaign(samples_per_year=90, random_state=0)
+T, F = YEAR.temperatures, YEAR.frequencies.copy()
+F.iloc[5, 2] = -999.0  # what a logger writes in place of a missing value
+CHAIN = DataInformedFEM(make_truss(), mapper=TemperatureMapper(Ridge()), random_state=0)
+COMPENSATED = make_pipeline(TemperatureCompensator(Ridge(), targets=list(F)), MahalanobisDetector())
+FITS = {
+    "chain": lambda: clone(CHAIN).fit(T, F),
+    "compensator": lambda: clone(COMPENSATED[0]).fit(T.join(F)),
+    "detector": lambda: MahalanobisDetector().fit(F),
+    "pipeline": lambda: clone(COMPENSATED).fit(T.join(F)),
+}
 
 
-def test_filters_tell_kinds_apart_and_point_to_the_line_of_the_user():
+def given(*calls, action="always"):
+    """The warnings of skthermo that calls give."""
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        warnings.simplefilter("ignore", WeatherWarning)
-        with warnings_once("more"):
-            for number in range(3):
-                warn_user("it is hot", WeatherWarning, "weather")
-                warn_user(f"{number} records", FewRecordsWarning, "few-rows")
-    assert [(one.category, one.filename) for one in caught] == [(FewRecordsWarning, __file__)]
-    assert re.fullmatch(r"0 records .and 2 times more more. \[few-rows\]", str(caught[0].message))
+        warnings.simplefilter(action)
+        for call in calls:
+            call()
+    return [one for one in caught if isinstance(one.message, SkthermoWarning)]
+
+
+@pytest.mark.parametrize("action", ["default", "always"])
+def test_two_lines_that_fit_warn_twice(action):
+    lines = [
+        lambda: MahalanobisDetector().fit(F),
+        lambda: clone(COMPENSATED).fit(T.join(F)),
+        lambda: clone(COMPENSATED).fit(T.join(F)),
+        lambda: clone(CHAIN).fit(T, F),
+        lambda: clone(CHAIN).fit(T, F),
+    ]
+    found = [one for one in given(*lines, action=action) if one.message.kind == "set-aside"]
+    assert [(one.filename, one.lineno) for one in found] == [
+        (line.__code__.co_filename, line.__code__.co_firstlineno) for line in lines
+    ]
+
+
+@pytest.mark.parametrize("fit", FITS.values(), ids=FITS)
+def test_a_fit_warns_at_most_once_of_a_kind_and_equal_records_in_equal_words(fit):
+    found = given(fit)
+    kinds = Counter(one.message.kind for one in found)
+    assert kinds["set-aside"] == 1
+    assert max(kinds.values()) == 1
+    assert [str(one.message) for one in given(fit)] == [str(one.message) for one in found]
+
+
+def test_filters_tell_categories_apart():
     with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         warnings.simplefilter("error", WeatherWarning)
-        with pytest.raises(WeatherWarning):
-            warn_user("it is hot", WeatherWarning, "weather")
+        MahalanobisDetector().fit(F)
+        warnings.simplefilter("error", RecordsWarning)
+        with pytest.raises(RecordsWarning, match=r"\[set-aside\]$"):
+            MahalanobisDetector().fit(F)
 
 
-def test_the_code_ends_the_text_once_however_often_a_warning_is_repeated_or_counted():
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        with warnings_once("outside") as outside:
-            for _ in range(2):
-                with warnings_once("inside"):
-                    for number in range(3):
-                        warn_user(f"{number} records", FewRecordsWarning, "few-rows")
-    (one,) = caught
-    assert [str(one.message)] == outside
-    assert re.fullmatch(r"0 records \(.*inside\) \(.*outside\) \[few-rows\]", outside[0])
-    again = pickle.loads(pickle.dumps(one.message))
-    assert (str(again), again.kind) == (outside[0], "few-rows")
-    with counted_warnings() as counts:
-        for _ in range(3):
-            warnings.warn(FewRecordsWarning("few", "few-rows"), stacklevel=1)
-    assert counts == {("few-rows", "few"): 3}
-
-
-def test_what_is_explained_stays_so_after_the_estimator_around():
-    rows = np.array([True, False])
-    with reported_by_caller(["few-rows"]):
-        table = explain_rows(np.array([np.nan, 1.0]), rows)
-        warn_user("few", FewRecordsWarning, "few-rows")
-    assert explained_rows(table).tolist() == [True, False]
-    assert not explained_rows(table.copy())
-    table[0] = 1.0
-    assert not explained_rows(table).any()
-    with pytest.warns(FewRecordsWarning):
-        warn_user("few", FewRecordsWarning, "few-rows")
+def test_the_code_ends_the_text_also_of_a_copy():
+    warning = FewRecordsWarning("3 records", "few-rows")
+    again = pickle.loads(pickle.dumps(warning))
+    assert (str(again), again.kind) == (str(warning), "few-rows") == ("3 records [few-rows]", "few-rows")
 
 
 def test_an_inspection_warns_once_for_each_estimator_and_line():
@@ -86,13 +93,3 @@ def test_an_inspection_warns_once_for_each_estimator_and_line():
     for _ in range(2):
         with pytest.warns(WeatherWarning):
             one.predict(T)
-
-
-def test_another_thread_has_a_context_of_its_own():
-    table = explain_rows(np.array([np.nan]), np.array([True]))
-    found = []
-    thread = threading.Thread(target=lambda: found.append(explained_rows(table)))
-    thread.start()
-    thread.join()
-    assert explained_rows(table).all()
-    assert not found[0]

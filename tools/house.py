@@ -1,12 +1,24 @@
-"""How large each package is, and how many files a reader opens who follows a chain and a study.
+"""How large each package is, how many files and functions a call enters, and how plain the source is.
 
     python tools/house.py [--files]
 
-For each package: its files and their lines, packages within it included, and how many of its files are entered by
-``DataInformedFEM.fit`` and ``simulate``, ``DetectabilityStudy.run`` and ``Monitor.update`` on the truss, as Python's
-profiler sees it; below, how many functions are. At the end, what a user meets: the public names of each package, and
-the most parameters, fields and methods that one of them has, beside the limits of ``tests/test_public_surface.py``.
+For each package: its files and their lines, packages within it included, and how many of its files the calls below
+enter, as Python's profiler sees it; then how many functions they enter. Of the source of all rooms and of the ground
+rooms: files, lines, lines of code, constants, constructors called ``of``, kinds of warnings, uses of hidden state. At
+the end, what a user meets: the public names of each package, and the most parameters, fields and methods that one of
+them has, beside the limits of ``tests/test_public_surface.py``.
 Reads the skthermo that is imported (``PYTHONPATH`` chooses another tree).
+
+======== ==========================================================
+fit      ``DataInformedFEM.fit``, truss
+raw fit  the same, KW51: inputs with a memory, outliers
+simulate ``DataInformedFEM.simulate``
+run      ``DetectabilityStudy.run``
+update   ``Monitor.update``
+mapper   ``TemperatureMapper.fit``
+detector ``MahalanobisDetector.fit``, residuals
+whole    ``CompensatedDetector.fit``, where the package has it
+======== ==========================================================
 """
 
 import argparse
@@ -17,18 +29,32 @@ from pathlib import Path
 import pandas as pd
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
+from threadpoolctl import threadpool_limits
 
 import skthermo
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo import detection
+from skthermo.datasets import make_kw51, make_kw51_campaign, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.studies import DetectabilityStudy, sweep
-from skthermo.surrogate import DataInformedFEM
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.source import (
+    GROUND,
+    constants,
+    constructors_called_of,
+    hidden_state,
+    kinds_of_warnings,
+    lines_of_code,
+    names_in_two_files,
+    trees,
+)
 from tests.test_public_surface import LIMITS, by_package, surface
 
 PACKAGE = Path(skthermo.__file__).parent
+MOST_FUNCTIONS = {"raw fit": 150, "detector": 25, "whole": 120}
+MOST_FRAMES = 6
 
 
 def entered(call, *arguments, **options):
@@ -63,12 +89,66 @@ def actions():
     )
     run, _ = entered(study.run, later.temperatures)
     compensator = TemperatureCompensator(LinearRegression(), targets=list(year.frequencies.columns))
+    mapper, _ = entered(TemperatureMapper().fit, year.temperatures, chain.parameters_)
     records, new = year.temperatures.join(year.frequencies), later.temperatures.join(later.frequencies)
     records.index = pd.date_range("2020-01-01", periods=len(records))
     new.index = pd.date_range(records.index[-1] + pd.Timedelta(days=1), periods=len(new))
+    residuals = compensator.fit_transform(records)
+    detector, _ = entered(MahalanobisDetector().fit, residuals)
     monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records)
     update, _ = entered(monitor.update, new)
-    return {"fit": fit, "simulate": simulate, "run": run, "update": update}
+    whole = set()
+    if hasattr(detection, "CompensatedDetector"):
+        whole, _ = entered(detection.CompensatedDetector(targets=list(year.frequencies)).fit, records)
+    bridge = make_kw51_campaign(random_state=0)
+    T, F = bridge.temperatures[::4], bridge.frequencies[::4]
+    raw, _ = entered(DataInformedFEM(make_kw51(), random_state=0).fit, T, F)
+    found = {"fit": fit, "raw fit": raw, "simulate": simulate, "run": run, "update": update}
+    return found | {"mapper": mapper, "detector": detector, "whole": whole}
+
+
+def frames_above_eigenvalues():
+    """Frames of the package, that of the call included, from ``DataInformedFEM.predict`` to ``eigvalsh``."""
+    year = make_truss_campaign(random_state=0)
+    chain = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    deepest = []
+
+    def note(frame, event, _):
+        nonlocal deepest
+        if event == "call" and frame.f_code.co_name == "eigvalsh":
+            stack = []
+            while frame is not None:
+                if frame.f_code.co_filename.startswith(str(PACKAGE)):
+                    stack.insert(0, frame.f_code.co_qualname)
+                frame = frame.f_back
+            deepest = max(deepest, stack, key=len)
+
+    with threadpool_limits(1):  # in this thread
+        sys.setprofile(note)
+        try:
+            chain.predict(year.temperatures)
+        finally:
+            sys.setprofile(None)
+    return deepest
+
+
+def plainness(rooms=None):
+    """What the source of some rooms, or of all, holds."""
+    found = trees(PACKAGE, rooms)
+    texts = [(PACKAGE / file).read_text() for file in found]
+    return {
+        "files": len(found),
+        "lines": sum(len(text.splitlines()) for text in texts),
+        "lines of code": sum(map(lines_of_code, texts)),
+        "constants": sum(len([*constants(tree, in_tuples=False)]) for tree in found.values()),
+        "constants assigned as tuples": sum(
+            len([*constants(tree)]) - len([*constants(tree, in_tuples=False)]) for tree in found.values()
+        ),
+        "constructors called of": sum(len(constructors_called_of(tree)) for tree in found.values()),
+        "names of classes and constants in two files": len(names_in_two_files(found)),
+        "kinds of warnings": len({kind for tree in found.values() for kind in kinds_of_warnings(tree)} - {None}),
+        "uses of hidden state": sum(len(hidden_state(tree)) for tree in found.values()),
+    }
 
 
 def main():
@@ -86,7 +166,11 @@ def main():
         inside = [file for file in files if package in file.parents]
         print_row("  " * (len(package.parts) - 1) + package.name, inside, lines, by_action)
     print_row("all", files, lines, by_action)
-    print(f"{'functions':39}" + "".join(f"{len(found):10}" for found in functions.values()))
+    print(f"{'functions':39}" + "".join(f"{len(found) or 'none':>10}" for found in functions.values()))
+    print(f"{'functions at most':39}" + "".join(f"{MOST_FUNCTIONS.get(name, ''):>10}" for name in functions))
+    frames = frames_above_eigenvalues()
+    print(f"\nframes from predict to eigvalsh: {len(frames)}, at most {MOST_FRAMES}", *frames, sep="\n  ")
+    print("", pd.DataFrame({"all rooms": plainness(), "ground rooms": plainness(GROUND)}).to_string(), sep="\n")
     found = by_package(surface())
     limits = LIMITS.reindex(found.index).rename(columns="limit of {}".format)
     print("", found.join(limits).to_string(), f"{'all':17}{found['names'].sum():8}", sep="\n")

@@ -43,7 +43,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weather of another variance", "np.sqrt(1 - decay**2) * noise[1:]", "(1 - decay) * noise[1:]"),
         ("a law that is not reversed in frost", "gain=-law.gain)", "gain=law.gain)"),
     ],
-    ("preprocessing/_records.py", "preprocessing/test_sensors.py"): [
+    ("preprocessing/_transformers.py", "preprocessing/test_sensors.py"): [
         (
             "a failing sensor that moves the mean",
             "level = as_floats(values) - self.offsets_",
@@ -178,8 +178,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("parameters distinguished", "values > SMALLEST_SHARE * values[0]", "values >= 0"),
     ],
     ("_core/arrays.py", "updating/test_sensitivity.py"): [
-        ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
-        ("information taken for rounding", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-6"),
+        ("rounding taken for information", "negligible: float = 1e-12", "negligible: float = 1e-20"),
+        ("information taken for rounding", "negligible: float = 1e-12", "negligible: float = 1e-6"),
     ],
     ("updating/_residuals.py", "updating/test_ensemble.py"): [
         ("models that are all the most probable one", "* self.values - residuals.noise", "* self.values"),
@@ -297,7 +297,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("preprocessing/_hampel.py", "preprocessing/test_hampel.py"): [
         ("outliers where records scatter more", "np.fmax(local, self.deviations_", "np.fmin(local, self.deviations_"),
     ],
-    ("preprocessing/_records.py", "preprocessing/test_hinges.py"): [
+    ("preprocessing/_transformers.py", "preprocessing/test_hinges.py"): [
         ("places of knots", "self.n_knots + 2)[1:-1]", "self.n_knots + 2)[:-2]"),
         ("weighted quantiles", "shares * (position[-1] - window)", "shares * position[-1]"),
     ],
@@ -419,7 +419,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
-    ("_core/effects.py", "studies/test_identify_causes.py"): [
+    ("surrogate/effects.py", "studies/test_identify_causes.py"): [
         ("derivatives by relative changes", "self.directions / (1 + self", "self.directions / (1 + 0 * self"),
         ("weather of each mode's own records", "mean, square = places @ shares", "mean, square = 0 * places @ shares"),
     ],

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, check_path
 from skthermo._core.matrix_files import read_matlab
-from skthermo._core.warnings import warn_user
+from skthermo._core.warnings import warn_each
 from skthermo.datasets._results import KW51Monitoring
-from skthermo.exceptions import RecordsWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 
 MOST_LABELS = 1000
 UNIX_EPOCH = 719529  # as a MATLAB date number
@@ -101,23 +101,24 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     file = check_path(path)
     if not file.is_file():
         raise FileNotFoundError(f"{file} is not a file; expected trackedmodes.zip or trackedmodes.mat")
-    data = _data(read_matlab(file), file)
+    data, findings = _data(read_matlab(file), file)
     stored = file.read_bytes()
-    if stored[126:128] in (b"IM", b"MI"):
-        return KW51Monitoring(**data, is_published=None)
-    md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
-    if md5 != PUBLISHED_MD5:
-        warn_user(
+    is_published = None  # of the unpacked file there is no checksum
+    if stored[126:128] not in (b"IM", b"MI"):
+        md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
+        is_published = md5 == PUBLISHED_MD5
+    if is_published is False:
+        text = (
             f"{file} has the MD5 checksum {md5}, the published trackedmodes.zip has {PUBLISHED_MD5}. Its content may "
-            "differ from what was published. Download it again, unless you changed it",
-            RecordsWarning,
-            "other-kw51-file",
+            "differ from what was published. Download it again, unless you changed it"
         )
-    return KW51Monitoring(**data, is_published=md5 == PUBLISHED_MD5)
+        findings.append(RecordsWarning(text, "other-kw51-file"))
+    warn_each(findings)
+    return KW51Monitoring(**data, is_published=is_published)
 
 
-def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
-    """Tables and shapes from the struct `modes`, whose fields must agree."""
+def _data(content: dict[str, object], file: Path) -> tuple[dict[str, Any], list[SkthermoWarning]]:
+    """Tables and shapes from the struct `modes`, whose fields must agree, and findings about its numbers."""
     modes = content.get("modes")
     if not isinstance(modes, dict):
         found = "'modes' is no single struct" if "modes" in content else f"the variables are {sorted(content)[:50]}"
@@ -141,15 +142,15 @@ def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
     doubtful = np.isin(env, STAND_FOR_MISSING) & ~np.isin(channels, TEMPERATURES)
     limits = [CELSIUS if channel in TEMPERATURES else None for channel in channels]
     _check_possible(np.where(doubtful, np.nan, env), channels, limits, f"{file}: field 'env'")
+    findings: list[SkthermoWarning] = []
     if doubtful.any():
         row, column = np.argwhere(doubtful)[0]
-        warn_user(
+        text = (
             f"{file}: field 'env' has {doubtful.sum()} values that look like codes for missing values, the first in "
             f"row {row}, column {channels[column]!r}: {env[row, column]:g}. They are used as measured. Compare the "
-            "file with the published one, or put NaN there",
-            RecordsWarning,
-            "placeholders",
+            "file with the published one, or put NaN there"
         )
+        findings.append(RecordsWarning(text, "placeholders"))
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):
         for part in (shapes.real, shapes.imag):
@@ -157,7 +158,7 @@ def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
     time = _time_of(sdn.ravel(), f"{file}: field 'sdn'")
     tables = {"temperatures": (env, channels), "frequencies": (f, f_names), "damping": (xi, xi_names)}
     frames = {name: pd.DataFrame(values, index=time, columns=columns) for name, (values, columns) in tables.items()}
-    return frames | {"shapes": shapes, "sensors": sensors, "state": state_of(time)}
+    return frames | {"shapes": shapes, "sensors": sensors, "state": state_of(time)}, findings
 
 
 def _numbers_of(value: object, what: str, *, complex_too: bool = False) -> NDArray:

@@ -13,8 +13,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import ModelWarning
+from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._factors import Elimination, elimination
 
 Key = tuple[str, ...]
@@ -23,18 +22,16 @@ ROWS_PER_CHUNK = 256  # largest number of samples solved together
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably a percentage given instead of a fraction
 
 
-def warn_of_failures(theta: Array, solved: Array) -> None:
-    """Warn of rows without NaN that have no solution: their number and the theta of the first."""
-    failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim))) & ~np.isnan(theta).any(axis=1)
-    if failed.any():
-        first = np.flatnonzero(failed)[0]
-        warn_user(
-            f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or the solver "
-            f"failed. The first is theta = {theta[first].tolist()} (row {first}). Narrow the bounds, or correct the "
-            "model there",
-            ModelWarning,
-            "no-solution",
-        )
+def failures(theta: Array, frequencies: Array) -> list[SkthermoWarning]:
+    """The finding that some rows of known theta have no solution."""
+    failed = np.isnan(frequencies).any(axis=1) & ~np.isnan(theta).any(axis=1)
+    if not failed.any():
+        return []
+    text = (
+        "some rows of theta have no solution, and their frequencies are NaN: the stiffness there is not positive "
+        "definite, or the solver failed. Narrow the bounds, or correct the model there"
+    )
+    return [ModelWarning(text, "no-solution")]
 
 
 def by_name(row: Array, parameter_names: Sequence[str]) -> dict[str, float]:

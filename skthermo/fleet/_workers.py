@@ -27,7 +27,7 @@ from sklearn.base import BaseEstimator, clone
 import skthermo
 from skthermo._core.answers import content_of
 from skthermo._core.estimators import seed_parts
-from skthermo._core.parallel import single_blas_thread, without_bars
+from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import counted_warnings
 from skthermo.metrics import mape
 from skthermo.monitoring import Monitor, MonitorStatus
@@ -227,11 +227,10 @@ def not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warn
 
 @contextmanager
 def _on_its_own() -> Iterator[Counter[tuple[str, str]]]:
-    """Work of one bridge: one core, no bar, its own warnings."""
+    """Work of one bridge: one core, its own warnings."""
     with ExitStack() as stack:
         stack.enter_context(parallel_config("sequential"))
         stack.enter_context(single_blas_thread())
-        stack.enter_context(without_bars())
         yield stack.enter_context(counted_warnings())
 
 

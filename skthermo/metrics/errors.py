@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
 from skthermo._core.arrays import as_columns, real_array
-from skthermo._core.frames import MARKERS, check_same_rows, column_names, row_weights
+from skthermo._core.frames import MISSING_CODES, check_same_rows, column_names, row_weights
 
 AVERAGE = "Average"
 
@@ -205,7 +205,7 @@ def _paired(
         _refuse(np.isinf(values), table, name, "a finite number, or NaN where a value is missing")
     if are_frequencies:
         _refuse(measured <= 0, y_true, "y_true", "a positive frequency, or NaN where it is missing")
-        _refuse(np.isin(predicted, MARKERS), y_pred, "y_pred", "a frequency, or NaN where it is missing")
+        _refuse(np.isin(predicted, MISSING_CODES), y_pred, "y_pred", "a frequency, or NaN where it is missing")
     return measured, predicted
 
 

@@ -233,7 +233,7 @@ class BaselineResiduals:
     @cached_property
     def _normal(self) -> Gaussian:
         """Normal distribution of the residuals without outliers."""
-        found = Gaussian.of(self.usual)
+        found = Gaussian.fitted(self.usual)
         return Gaussian(found.mean, found.covariance + JITTER * np.diag(np.diag(found.covariance)))
 
     def draw_records(self, weather: Array, random_state: np.random.RandomState) -> tuple[NDArray[np.intp], list[Array]]:
@@ -338,7 +338,7 @@ class BaselineResiduals:
         if self.errors is None or not self.errors.any():
             return self.values
         variances = self.errors[:, :, np.newaxis] ** 2 * np.eye(self.n_modes)
-        own = np.diag(Gaussian.of(self.values, variances).covariance)
+        own = np.diag(Gaussian.fitted(self.values, variances).covariance)
         return self.values * np.sqrt(own / (own + self.errors**2))
 
     @cached_property

@@ -148,7 +148,7 @@ class SensorRegression:
         values = as_floats(temperatures)
         telling = _telling_rows(values)
         learned = ~np.isnan(telling).all(axis=0)
-        found = Gaussian.of(telling[:, learned])
+        found = Gaussian.fitted(telling[:, learned])
         variances = np.diag(found.covariance)
         own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
         reach = TrainingRange.of(temperatures, np.ones(len(values), dtype=bool))

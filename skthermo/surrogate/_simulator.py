@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import DEFAULT_TOLERANCE, Array, Reduce, is_auto, tolerance
+from skthermo._core.arrays import Array, Reduce, is_auto, tolerance
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, FrequencySurface, evaluate, linearise, linearise_modes
 
@@ -38,7 +38,7 @@ class Simulator:
     model: FEModel
     reduced: Any = None
     box: Array | None = None
-    tol: float = DEFAULT_TOLERANCE
+    tol: float = 1e-5
     reason: str = ""
     usual: Array | None = None
 
@@ -53,7 +53,7 @@ class Simulator:
         """
         auto, box = is_auto(reduce), box_around(theta)
         tol = tolerance(model, reduce, 3 * (len(theta) if n_rows is None else n_rows))
-        allowed = DEFAULT_TOLERANCE if auto else tol
+        allowed = 1e-5 if auto else tol
         if known is not None and known.box is not None and allowed is not None:
             covers = (known.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= known.box[:, 1]).all()
             if covers and known.tol <= allowed:

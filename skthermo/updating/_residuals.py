@@ -1,7 +1,7 @@
 """Measured modes, the model's modes paired with them, the residuals between them and the search for their minimum."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +19,7 @@ from skthermo._core.arrays import (
     shape_array,
 )
 from skthermo._core.parallel import single_blas_thread
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import RecordsWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel
 
 
@@ -35,6 +34,7 @@ class Measured:
     shapes: Array  # (n_dofs, n_measured), of unit length; NaN where only the frequency was measured
     dofs: NDArray[np.intp]  # empty where no shapes were measured
     shape_weights: Array  # 0 where no shape was measured
+    findings: list[SkthermoWarning] = field(default_factory=list)  # about the shapes
 
     @property
     def has_frequency(self) -> NDArray[np.bool_]:
@@ -71,7 +71,7 @@ def read_measured(
         )
     counts = np.isfinite(F).sum(axis=0)
     means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
-    places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names, labels)
+    places, unit, findings = _read_shapes(shapes, dofs, n_modes, n_dof, names, labels)
     weights = _per_mode(shape_weight, names, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
         raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
@@ -91,22 +91,21 @@ def read_measured(
         shapes=unit[:, columns],
         dofs=places,
         shape_weights=np.where(with_shape, weights, 0.0)[columns],
+        findings=findings,
     )
 
 
-def _real_shapes(shapes: NDArray) -> Array:
-    """Real parts of complex shapes, each rotated by the phase that makes its real part largest."""
+def _real_shapes(shapes: NDArray) -> tuple[Array, list[SkthermoWarning]]:
+    """Real parts of complex shapes, each rotated by the phase that makes its real part largest, and what is lost."""
     squares = np.nansum(shapes**2, axis=0)
     turned = shapes * np.exp(-0.5j * np.angle(squares))
     lengths = np.sqrt(np.nansum(np.abs(shapes) ** 2, axis=0))
     lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
-    warn_user(
+    text = (
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
-        "shape's length, is dropped. If that is more than a few percent, check how the shape was identified",
-        RecordsWarning,
-        "complex-shapes",
+        "shape's length, is dropped. If that is more than a few percent, check how the shape was identified"
     )
-    return np.where(np.isnan(shapes), np.nan, turned.real)
+    return np.where(np.isnan(shapes), np.nan, turned.real), [RecordsWarning(text, "complex-shapes")]
 
 
 def _given(shapes: Array) -> NDArray[np.bool_]:
@@ -116,12 +115,12 @@ def _given(shapes: Array) -> NDArray[np.bool_]:
 
 def _read_shapes(
     shapes, dofs, n_modes: int, n_dof: int, names: list[str], labels: Sequence[Label]
-) -> tuple[NDArray[np.intp], Array]:
+) -> tuple[NDArray[np.intp], Array, list[SkthermoWarning]]:
     if (shapes is None) != (dofs is None):
         given, missing = ("shapes", "dofs") if dofs is None else ("dofs", "shapes")
         raise ValueError(f"{given} were given without {missing}; expected both, or neither")
     if shapes is None:
-        return np.empty(0, dtype=np.intp), np.empty((0, n_modes))
+        return np.empty(0, dtype=np.intp), np.empty((0, n_modes)), []
     places = check_dofs(dofs, n_dof, labels)
     array = shape_array(shapes, "shapes")
     if array.shape != (len(places), n_modes):
@@ -129,14 +128,14 @@ def _read_shapes(
             f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
             "column for each mode of F"
         )
-    array = _real_shapes(array) if np.iscomplexobj(array) else array
+    array, findings = _real_shapes(array) if np.iscomplexobj(array) else (array, [])
     for name, column in zip(names, array.T, strict=True):
         if np.isnan(column).any() and not np.isnan(column).all():
             row = np.flatnonzero(np.isnan(column))[0]
             raise ValueError(f"the shape of {name!r} is NaN in row {row} but not in all; expected all rows or none")
         if np.isinf(column).any() or not column.any():
             raise ValueError(f"the shape of {name!r} is zero throughout or infinite; expected a mode shape")
-    return places, array / np.linalg.norm(array, axis=0)
+    return places, array / np.linalg.norm(array, axis=0), findings
 
 
 def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[str]) -> Array:

@@ -3,11 +3,13 @@
 import argparse
 import atexit
 import importlib
+import io
 import json
 import os
 import resource
 import statistics
 import sys
+import tempfile
 import time
 import tracemalloc
 import warnings
@@ -17,6 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 from sklearn.pipeline import make_pipeline
+from versions import CACHE, OtherVersion, has_failed, side_by_side
 
 from skthermo.datasets import load_z24
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
@@ -26,6 +29,7 @@ DATA = Path(os.environ["SKTHERMO_DATA"]) if os.environ.get("SKTHERMO_DATA") else
 EXAMPLES = Path(__file__).parents[2] / "examples"
 sys.path.append(str(EXAMPLES))  # whose recipes some benchmarks measure, by imports after that of this module
 TABLES = {}  # what was shown, by title, as CSV
+OTHER = {}  # tables of another version that were not shown yet, by title, with its commit
 KW51_NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
 
 
@@ -34,13 +38,16 @@ def recipes(name):
     return importlib.import_module(f"{name}_recipes")
 
 
-def arguments(text, **options):
+def arguments(text, /, *, takes_turns=False, **options):
     """Options of the command line, by name: a default, or a tuple of it, a help, choices; warnings are off from here.
 
     A mapping is the choices, all by default; a list takes several values, a type has no default, and False is a flag.
-    Without a flag: ``name``, and ``folder`` of the data, by default the one that SKTHERMO_DATA names.
+    Without a flag: ``name``, and ``folder`` of the data, by default the one that SKTHERMO_DATA names. With
+    ``--against COMMIT`` the benchmark is run with that version first, unless it ``takes_turns`` with it by itself.
     """
-    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=text, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, parents=[shared()]
+    )
     for name, given in options.items():
         default, help_, choices = (*given, None, None)[:3] if isinstance(given, tuple) else (given, None, None)
         flags, more = [f"--{name.replace('_', '-')}"], {"help": help_}
@@ -59,19 +66,65 @@ def arguments(text, **options):
         else:
             more |= {"type": type(default), "default": default, "choices": choices}
         parser.add_argument(*flags, **more)
-    parser.add_argument("--out", type=Path, help="a file for the tables that are printed, as JSON")
     found = parser.parse_args()
     if found.out is not None:
         atexit.register(lambda: found.out.write_text(json.dumps(TABLES)))
+    if found.against is not None and not takes_turns:
+        run_other(OtherVersion.built(found.against, found.against_folder))
+        atexit.register(show_rest)
     warnings.simplefilter("ignore")  # of weather, gaps and models that are meant to be so
     return found
 
 
+def shared():
+    """Options of every benchmark."""
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--out", type=Path, help="a file for the tables that are printed, as JSON")
+    parser.add_argument("--against", metavar="COMMIT", help="run also with the package at this commit, as 43ba4fa4")
+    parser.add_argument("--against-folder", type=Path, default=CACHE, help="of such packages, kept for the next time")
+    return parser
+
+
+def run_other(version):
+    """Run this benchmark with another version of the package on the same data and options, and keep its tables."""
+    _, words = shared().parse_known_args()
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "tables.json"
+        done = version.run(sys.argv[0], [*words, "--out", str(out)])
+        if has_failed(done):
+            sys.exit(f"{version.commit}: {done.stderr[-3000:]}")
+        tables = json.loads(out.read_text())
+    OTHER.update({title: (version.commit, table) for title, table in tables.items()})
+
+
+def show_rest():
+    """Show the tables that only the other version has."""
+    for title, (commit, table) in OTHER.items():
+        print_and_keep(f"{title} ({commit})", as_text(table, [0]))
+
+
 def shown(title, table, digits=2):
-    """Print a table, rounded or, as "3g", to some digits in all, and keep it for ``--out``."""
+    """Print a table, rounded or, as "3g", to some digits in all, and keep it for ``--out``.
+
+    With ``--against``, columns of the other version stand beside it.
+    """
     table = table.to_frame("") if isinstance(table, pd.Series) else table
     form = f".{digits}" if isinstance(digits, str) else f".{digits}f"
     table = table.map(lambda value: format(value, form) if isinstance(value, float) and value == value else value)
+    if title in OTHER:
+        commit, other = OTHER.pop(title)
+        levels = list(range(table.index.nlevels))
+        table = side_by_side(*(as_text(one, levels) for one in (table.to_csv(), other)), commit)
+    print_and_keep(title, table)
+
+
+def as_text(table, levels):
+    """A table whose numbers stay as they were written."""
+    table = pd.read_csv(io.StringIO(table), index_col=levels, dtype=str, keep_default_na=False)
+    return table.rename_axis([None if str(name).startswith("Unnamed") else name for name in table.index.names])
+
+
+def print_and_keep(title, table):
     print(f"\n{title}\n{table.to_string(na_rep='')}", flush=True)
     TABLES[title] = table.to_csv()
 

@@ -1,22 +1,21 @@
 """What users wait for: processor seconds and peak memory of works, beside other ways to the same.
 
     OMP_NUM_THREADS=1 SKTHERMO_DATA=... python tests/benchmarks/speed.py
-    OMP_NUM_THREADS=1 python tests/benchmarks/speed.py --before HEAD~20 --rows lags study-truss
+    OMP_NUM_THREADS=1 python tests/benchmarks/speed.py --against 43ba4fa4 --rows lags study-truss
 
 Each work runs in a process of its own. Printed are medians of processor seconds (worker processes included), how many
 times as long the other way takes in the same process, and the largest peak memory of the process, imports and the other
 way included. The first line of a work's function says what it is and, after "beside", what the other way is; a loop of
-``eigsh`` is that of ``scipy.sparse.linalg`` over ready-made matrices. With ``--before``, works run by turns with a copy
-of the code of this folder and of another revision. Works on the building frame need its file in the folder that
-SKTHERMO_DATA names. The exit code is 1 if something has become slower by more than 10 %: if even the fastest round
-takes more than 1.1 times the median of before.
+``eigsh`` is that of ``scipy.sparse.linalg`` over ready-made matrices. With ``--against``, works run by turns with the
+package of now and of that commit. Works on the building frame need its file in the folder that SKTHERMO_DATA names.
+The exit code is 1 if something has become slower by more than 10 %: if even the fastest round takes more than 1.1 times
+the median of that commit.
 """
 
 import contextlib
 import inspect
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -35,6 +34,7 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from structures import Footbridge, building_frame, footbridge, frame_bridge, lagged
+from versions import OtherVersion, run_present
 
 from skthermo.datasets import make_kw51, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
@@ -337,41 +337,25 @@ def said(work):
     return what, other
 
 
-def copy_of(revision, folder):
-    """A folder with the package at this revision, or as it is here now, ready as if it were installed."""
-    folder.mkdir()
-    root = Path(__file__).parents[2]
-    if revision:
-        command = ["git", "archive", revision, "skthermo"]
-        archive = subprocess.run(command, cwd=root, check=True, capture_output=True).stdout
-        subprocess.run(["tar", "-x", "-C", folder], input=archive, check=True)
-    else:
-        shutil.copytree(root / "skthermo", folder / "skthermo")
-    subprocess.run([sys.executable, "-m", "compileall", "-q", folder], check=True)
-    return folder
-
-
-def measure(name, packages, options):
-    """Rounds of a work with each state of the code, by turns; none of a state in which it fails."""
-    rounds, command = {state: [] for state in packages}, [sys.executable, __file__, "--work", name]
+def measure(name, versions, options):
+    """Rounds of a work with each version, by turns; none of a version in which it fails."""
+    rounds, words = {version: [] for version in versions}, ["--work", name, *["--quick"][: options.quick]]
     for _ in range(options.rounds):
-        for state, package in packages.items():
-            environment = os.environ | {"PYTHONPATH": str(package), "OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-            words = [*command, *["--quick"][: options.quick]]
-            done = subprocess.run(words, env=environment, cwd=package, capture_output=True, text=True)
+        for version, run in versions.items():
+            done = run(__file__, words)
             if done.returncode:
-                print(f"{name}, {state}: {done.stderr.strip().splitlines()[-1]}")
+                print(f"{name}, {version}: {done.stderr.strip().splitlines()[-1]}")
             else:
-                rounds[state].append(json.loads(done.stdout.splitlines()[-1]))
+                rounds[version].append(json.loads(done.stdout.splitlines()[-1]))
         if max(sum(one["seconds"] for one in found) for found in rounds.values()) > options.long:
             break
-    return {state: pd.DataFrame(found) for state, found in rounds.items() if found}
+    return {version: pd.DataFrame(found) for version, found in rounds.items() if found}
 
 
 def main():
     options = arguments(
         __doc__,
-        before=(str, "a git revision to compare with"),
+        takes_turns=True,
         rows=(WORKS, "works"),
         rounds=3,
         long=(20.0, "seconds after which no further round begins"),
@@ -383,29 +367,27 @@ def main():
         WORKS[options.work](clock, options.quick)
         print(json.dumps({"seconds": clock.seconds, "beside": clock.reference, "megabytes": peak_megabytes()}))
         return 0
-    slower = []
-    with tempfile.TemporaryDirectory() as folder:
-        states = ({"before": options.before} if options.before else {}) | {"now": None}
-        packages = {state: copy_of(revision, Path(folder) / state) for state, revision in states.items()}
-        for title, works in GROUPS.items():
-            rows = {}
-            for name in [one for one in works if one in options.rows and (DATA or not one.startswith("frame"))]:
-                found, (what, other) = measure(name, packages, options), said(works[name])
-                seconds = {state: table["seconds"].median() for state, table in found.items()}
-                row = rows[what] = {"seconds": seconds.get("now")}
-                if "before" in seconds:
-                    row |= {"seconds before": seconds["before"]}
-                if len(found) == 2:
-                    row["times as long before"] = seconds["before"] / seconds["now"]
-                    slower += [name] * bool(found["now"]["seconds"].min() > 1.1 * seconds["before"])
-                if "now" in found:
-                    times = found["now"]["beside"].median() / seconds["now"]
-                    row |= {"other way, times as long": times if other else None, "other way": other}
-                    row["peak memory, MB"] = found["now"]["megabytes"].max()
-            if rows:
-                shown(
-                    f"{title}: processor seconds, median of up to {options.rounds} rounds", pd.DataFrame(rows).T, "3g"
-                )
+    os.environ.update(OMP_NUM_THREADS="1", MPLBACKEND="Agg")
+    slower, versions = [], {"now": run_present}
+    if options.against:
+        versions = {"before": OtherVersion.built(options.against, options.against_folder).run} | versions
+    for title, works in GROUPS.items():
+        rows = {}
+        for name in [one for one in works if one in options.rows and (DATA or not one.startswith("frame"))]:
+            found, (what, other) = measure(name, versions, options), said(works[name])
+            seconds = {version: table["seconds"].median() for version, table in found.items()}
+            row = rows[what] = {"seconds": seconds.get("now")}
+            if "before" in seconds:
+                row |= {f"seconds {options.against}": seconds["before"]}
+            if len(found) == 2:
+                row[f"times as long {options.against}"] = seconds["before"] / seconds["now"]
+                slower += [name] * bool(found["now"]["seconds"].min() > 1.1 * seconds["before"])
+            if "now" in found:
+                times = found["now"]["beside"].median() / seconds["now"]
+                row |= {"other way, times as long": times if other else None, "other way": other}
+                row["peak memory, MB"] = found["now"]["megabytes"].max()
+        if rows:
+            shown(f"{title}: processor seconds, median of up to {options.rounds} rounds", pd.DataFrame(rows).T, "3g")
     print(f"slower by more than 10 %: {', '.join(slower) or 'nothing'}")
     return int(bool(slower))
 

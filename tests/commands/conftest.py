@@ -2,7 +2,7 @@
 
 import pytest
 
-from skthermo.commands._proposal import SINGLE, Candidate, Proposal
+from skthermo.commands._proposal import ANY_CHANGE, Candidate, Proposal
 from tests.commands.folders import made_bridge
 from tests.monitoring.nightly import truss_records
 
@@ -10,7 +10,7 @@ from tests.monitoring.nightly import truss_records
 @pytest.fixture
 def one_detector(monkeypatch):
     """``init`` need not choose a detector where its files are what matters."""
-    monkeypatch.setattr(Proposal, "detectors", [Candidate(*SINGLE, "", 1.0)])
+    monkeypatch.setattr(Proposal, "detectors", [Candidate(ANY_CHANGE, {}, "each record for itself", "", 1.0)])
 
 
 @pytest.fixture(scope="session")

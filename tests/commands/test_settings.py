@@ -15,7 +15,7 @@ import skthermo.detection
 from skthermo.commands._proposal import toml
 from skthermo.commands._settings import CLASSES, SECTIONS, class_named, read_settings, settings_of
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, DirectionalDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import ExponentialMeans, HingeFeatures
 from skthermo.surrogate import DataInformedFEM
@@ -45,7 +45,7 @@ def read(tmp_path, proposed):
 def by_python(detector, *steps, compensator=None, **parameters):
     regression = make_pipeline(*steps) if len(steps) > 1 else steps[0]
     options = {"targets": MODES} | (compensator or {})
-    detector = make_pipeline(TemperatureCompensator(regression, **options), detector)
+    detector = CompensatedDetector(detector, regression, **options)
     return Monitor(
         detector,
         **{"false_alarms_per_year": 1.0, "watch_per_year": 12.0, "units": "Hz", "random_state": 0} | parameters,
@@ -73,17 +73,15 @@ def test_the_file_makes_what_python_makes(read):
     assert repr(read().monitor()) == repr(by_python(DirectionalDetector(), HingeFeatures(), Ridge()))
     paper = read('class = "DirectionalDetector"', 'class = "MahalanobisDetector"').monitor()
     assert repr(paper) == repr(by_python(MahalanobisDetector(), HingeFeatures(), Ridge()))
-    window = 'class = "WindowedAlarm"\nwindow = "5D"\ndetector = {class = "DirectionalDetector", omnibus = 0.1}'
-    windowed = read('class = "DirectionalDetector"', window).monitor()
-    inner = DirectionalDetector(omnibus=0.1)
-    assert repr(windowed) == repr(by_python(WindowedAlarm("5D", detector=inner), HingeFeatures(), Ridge()))
+    windowed = read("# window = ...", 'window = "5D"').monitor()
+    assert windowed.detector.window == "5D"
     means = '[[features]]\nclass = "ExponentialMeans"\ntime_constants = ["2D", "20D"]\n\n[[features]]\nclass = "H'
     two = read('[[features]]\nclass = "H', means).monitor()
     assert repr(two) == repr(
         by_python(DirectionalDetector(), ExponentialMeans(["2D", "20D"]), HingeFeatures(), Ridge())
     )
-    others = read('# whiten = "auto"', 'whiten = "none"').monitor()
-    assert others.detector[0].whiten is None
+    others = read('# regimes = "auto"', 'regimes = "none"').monitor()
+    assert others.detector.regimes is None
     softening = read("# persistence = 3", 'persistence = 5\nmax_delay = "3D"').monitor()
     expected = by_python(DirectionalDetector(), HingeFeatures(), Ridge(), persistence=5, max_delay="3D")
     assert repr(softening) == repr(expected)
@@ -93,15 +91,11 @@ def test_the_file_makes_what_python_makes(read):
 def test_directions_are_those_of_the_chain_where_there_is_one(read):
     year = make_truss_campaign(random_state=0)
     fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-    inner = 'class = "WindowedAlarm"\nwindow = "5D"\ndetector = {class = "DirectionalDetector"}'
-    window = read('class = "DirectionalDetector"', inner)
-    assert read().monitor(fem).detector[-1].directions is fem
-    assert window.monitor(fem).detector[-1].detector.directions is fem
-    assert read('# directions = "softening"', "directions = [[-1, 0, 0, 0, 0, 0]]").monitor(fem).detector[
-        -1
-    ].directions == [[-1, 0, 0, 0, 0, 0]]
+    assert read().monitor(fem).detector.detector.directions is fem
+    given = read('# directions = "softening"', "directions = [[-1, 0, 0, 0, 0, 0]]").monitor(fem)
+    assert given.detector.detector.directions == [[-1, 0, 0, 0, 0, 0]]
     paper = read('class = "DirectionalDetector"', 'class = "MahalanobisDetector"')
-    assert isinstance(paper.monitor(fem).detector[-1], MahalanobisDetector)
+    assert isinstance(paper.monitor(fem).detector.detector, MahalanobisDetector)
 
 
 def test_defaults_that_the_file_shows_are_those_that_hold(proposed, read, tmp_path):

@@ -30,7 +30,7 @@ def with_gaps(rows, share=0.3, seed=0):
 
 F = records(400)
 GAPPY = with_gaps(F)
-LEARNED = Gaussian.of(GAPPY)
+LEARNED = Gaussian.fitted(GAPPY)
 
 
 def log_likelihood(rows, mean, covariance):
@@ -46,14 +46,14 @@ def log_likelihood(rows, mean, covariance):
 
 
 def test_complete_rows_give_mean_and_covariance():
-    learned = Gaussian.of(F)
+    learned = Gaussian.fitted(F)
     np.testing.assert_allclose(learned.mean, F.mean(axis=0), rtol=1e-14)
     np.testing.assert_allclose(learned.covariance, np.cov(F.T, bias=True), rtol=1e-11)
 
 
 def test_the_likelihood_is_flat_at_the_solution():
     rows = GAPPY[:100]
-    learned, step = Gaussian.of(rows), 1e-5
+    learned, step = Gaussian.fitted(rows), 1e-5
     deviations = np.sqrt(np.diag(learned.covariance))
     for i in range(3):
         shift = step * deviations * (np.arange(3) == i)
@@ -75,7 +75,7 @@ def test_the_likelihood_is_flat_at_the_solution():
 )
 def test_units_and_the_order_of_rows_and_modes_do_not_matter(exponents, shift, modes, seed):
     scale, order = 10.0 ** np.array(exponents), np.random.default_rng(seed).permutation(len(GAPPY))
-    other = Gaussian.of((scale * (GAPPY + shift))[order][:, modes])
+    other = Gaussian.fitted((scale * (GAPPY + shift))[order][:, modes])
     np.testing.assert_allclose(other.mean, (scale * (LEARNED.mean + shift))[modes], rtol=1e-7, atol=1e-9 * scale.max())
     expected = (LEARNED.covariance * np.outer(scale, scale))[np.ix_(modes, modes)]
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
@@ -85,7 +85,7 @@ def test_units_and_the_order_of_rows_and_modes_do_not_matter(exponents, shift, m
 def test_the_truth_is_found_where_half_of_the_entries_are_missing():
     rows = with_gaps(records(40_000), 0.6)
     assert np.isnan(rows).mean() > 0.39
-    learned = Gaussian.of(rows)
+    learned = Gaussian.fitted(rows)
     size = np.sqrt(np.outer(np.diag(COVARIANCE), np.diag(COVARIANCE)))
     np.testing.assert_allclose((learned.mean - MEAN) / np.sqrt(np.diag(COVARIANCE)), 0, atol=0.03)
     np.testing.assert_allclose((learned.covariance - COVARIANCE) / size, 0, atol=0.03)
@@ -97,7 +97,7 @@ def test_gaps_that_follow_another_mode_do_not_bias_the_mean():
     rows[rows[:, 1] > MEAN[1], 0] = np.nan
     deviation = np.sqrt(COVARIANCE[0, 0])
     assert abs(np.nanmean(rows[:, 0]) - MEAN[0]) > 0.3 * deviation
-    assert Gaussian.of(rows).mean[0] == pytest.approx(MEAN[0], abs=0.03 * deviation)
+    assert Gaussian.fitted(rows).mean[0] == pytest.approx(MEAN[0], abs=0.03 * deviation)
 
 
 def test_second_moments_have_the_covariance_as_their_mean():
@@ -158,7 +158,7 @@ def test_modes_that_are_never_there_together_leave_the_rest_as_it_is():
     """Records do not say how the two are correlated: any number that fits the rest is as likely, and one is taken."""
     rows = records(20_000)
     rows[::2, 0] = rows[1::2, 1] = np.nan
-    learned = Gaussian.of(rows).covariance
+    learned = Gaussian.fitted(rows).covariance
     assert np.linalg.eigvalsh(learned).min() > 0
     size = np.sqrt(np.outer(np.diag(COVARIANCE), np.diag(COVARIANCE)))
     seen = np.array([[1, 0, 1], [0, 1, 1], [1, 1, 1]], dtype=bool)

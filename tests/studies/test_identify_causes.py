@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from skthermo._core.effects import FrequencyEffects, StructuralChanges, typical_rows
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.studies.identification._causes import read_causes
+from skthermo.surrogate.effects import FrequencyEffects, StructuralChanges, typical_rows
 
 YEAR = make_truss_campaign(random_state=1).temperatures
 WEATHER = YEAR[::150]  # so few records that they are solved one by one

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from skthermo._core.effects import read_groups
 from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.fem.damage import read_groups
 from skthermo.residuals.weather import WeatherFunctions
 from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._curves import Part, ShiftComparison

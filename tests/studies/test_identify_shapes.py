@@ -5,13 +5,13 @@ import warnings
 import numpy as np
 import pytest
 
-from skthermo._core.effects import ChangedStructure
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import mac
 from skthermo.studies import identify_damage
 from skthermo.studies.identification._causes import Cause, read_causes
 from skthermo.studies.identification._identified import precision
 from skthermo.studies.identification._shapes import ShapeEffects, shape_shift
+from skthermo.surrogate.effects import ChangedStructure
 from tests.studies.test_identify_causes import OnlyDamaged, differences
 
 TRUSS, DOFS, MODES = make_truss(), [1, 3, 5, 10, 16, 22], [f"f{i}" for i in range(1, 7)]

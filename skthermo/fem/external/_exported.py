@@ -15,10 +15,9 @@ import scipy.sparse
 
 from skthermo._core.arrays import Matrix, check_names, check_path
 from skthermo._core.matrix_files import MASS, read_half, read_named_matrices
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import ModelWarning
+from skthermo._core.warnings import warn_each
 from skthermo.fem.affine import AffineModel
-from skthermo.fem.external._differences import SAME, difference_terms, relative
+from skthermo.fem.external._differences import SAME, doubtful_matrices, read_differences, relative
 
 
 def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
@@ -204,6 +203,7 @@ def load_affine(
 
     matrices, dofs = read_named_matrices(file, is_used)
     exports = Exports(file, matrices)
+    doubts: list[str] = []
     mass = mass or exports.mass()
     mass_matrix = exports.matrix(mass)
     others = exports.beside(mass, mass_matrix.shape) if keys is None else {}
@@ -215,22 +215,36 @@ def load_affine(
             total = exports.usual(exports.square, TOTAL_NAMES, "total")
     if keys is None:
         changed = [name for name in others if name != total]
-        keys = _keys(changed if factor is not None else exports.terms(others, total, mass))
+        if factor is None:
+            changed, doubts = exports.terms(others, total, mass)
+        keys = _keys(changed)
     if not keys:
         raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
     terms = {name: exports.matrix(name, mass_matrix.shape) for name in keys}
     pairs = [(keys[name], term) for name, term in terms.items()]
-    pairs += exports.rest(total, terms, says_total) if total and factor is None else []
+    if total and factor is None and (rest := exports.rest(total, terms)) is not None:
+        pairs.append(((), rest))
+        doubts += [] if says_total else [more_than_the_sum(total, terms)]
     nominal = None if factor is None else exports.nominal(total, mass_matrix.shape)
     try:
         if nominal is not None and factor is not None:
-            differences = difference_terms(nominal, terms, factor=factor)
+            differences, doubts = read_differences(nominal, terms, factor)
             pairs = [(keys[key[0]] if key else (), term) for key, term in differences.items()]
-        return AffineModel(
+        model = AffineModel(
             pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track, dofs=dofs
         )
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
+    warn_each(doubtful_matrices([f"{file}: {doubt}" for doubt in doubts]))
+    return model
+
+
+def more_than_the_sum(total: str, terms: Collection[str]) -> str:
+    """The doubt about a total that nobody has named."""
+    return (
+        f"{total!r} is more than the sum of {list(terms)}: the rest is used as a constant part of the stiffness. "
+        "Confirm it by total=..., or give total=False if the terms are all, or name the terms by stiffness=[...]"
+    )
 
 
 @dataclass(frozen=True)
@@ -318,8 +332,9 @@ class Exports:
         found = {name: self.matrices[name] for name in self.square if name not in named}
         return [name for name, one in found.items() if one is not None and one.shape == shape and _is_finite(one)]
 
-    def terms(self, others: Mapping[str, Matrix], total: Total, mass: str) -> list[str]:
-        """Names of the stiffness terms; warns of matrices that look like a total or like mass."""
+    def terms(self, others: Mapping[str, Matrix], total: Total, mass: str) -> tuple[list[str], list[str]]:
+        """Names of the stiffness terms, and doubts about matrices that look like a total or like mass."""
+        doubts = []
         found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
         for name, term in found.items():
             if term.nnz and not (term + term.T).count_nonzero():
@@ -337,7 +352,7 @@ class Exports:
             sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
             if len(sums) == 1:
                 del springs[sums[0]], found[sums[0]]
-                self._warn(
+                doubts.append(
                     f"{sums[0]!r} is the sum of {list(springs)} and used as the total, not as a term. Confirm it by "
                     f"total={sums[0]!r}, or name the terms by stiffness=[...]"
                 )
@@ -347,11 +362,11 @@ class Exports:
                 if ratio := _ratio(term, whole - term):
                     similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
         for name, what in similar.items():
-            self._warn(
+            doubts.append(
                 f"{name!r} is {what}, and used as a stiffness term. If it is none, frequencies are wrong. Name the "
                 "terms by stiffness=[...]"
             )
-        return list(found)
+        return list(found), doubts
 
     def nominal(self, total: Total, shape: tuple[int, ...]) -> Matrix:
         """The stiffness as built, beside those with one parameter multiplied."""
@@ -362,11 +377,11 @@ class Exports:
             )
         return self.matrix(total, shape)
 
-    def rest(self, total: str, terms: Mapping[str, Matrix], is_meant: bool) -> list[tuple[Key, Matrix]]:
-        """The total minus all terms, as a constant term; nothing if nothing is left."""
+    def rest(self, total: str, terms: Mapping[str, Matrix]) -> Matrix | None:
+        """The total minus all terms; None if nothing is left."""
         whole, summed = self.matrix(total, next(iter(terms.values())).shape), reduce(add, terms.values())
         if _same(summed, whole, SAME):
-            return []
+            return None
         rest = scipy.sparse.csc_array(whole - summed)
         less = rest.diagonal() < -SAME * np.abs(whole.diagonal())
         if less.any():
@@ -376,16 +391,7 @@ class Exports:
                 f"{list(terms)}; expected a total of the stiffness, factor=2.0 if each of these is the whole with one "
                 "modulus doubled, stiffness=... that says which matrices are terms, or total=False if none is the total"
             )
-        if not is_meant:
-            self._warn(
-                f"{total!r} is more than the sum of {list(terms)}: the rest is used as a constant part of the "
-                "stiffness. Confirm it by total=..., or give total=False if the terms are all, or name the terms by "
-                "stiffness=[...]"
-            )
-        return [((), rest)]
-
-    def _warn(self, text: str) -> None:
-        warn_user(f"{self.file}: {text}", ModelWarning, "doubtful-matrices")
+        return rest
 
 
 def _is_finite(matrix: Matrix) -> bool:

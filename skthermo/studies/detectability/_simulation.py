@@ -17,12 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.answers import answer_once, answers_kept
+from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array, as_columns, as_floats, is_real
 from skthermo._core.estimators import _num_samples, last_step, seed_parts
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.memory import remembered
-from skthermo._core.origins import Origin, of_origin, origin_of
 from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.warnings import warnings_of_detector, without_warnings
 from skthermo.detection import DamageDetector
@@ -128,10 +127,9 @@ def has_targets(detector: BaseEstimator) -> bool:
     return any(name.rsplit("__", 1)[-1] == "targets" for name in detector.get_params())
 
 
-def transformed_by(steps: Pipeline, table: Table) -> tuple[Pipeline, Table, Origin | None]:
-    """Fitted steps, what they make of the table, and its origin."""
-    rows = steps.fit_transform(table)
-    return steps, rows, origin_of(rows)
+def transformed_by(steps: Pipeline, table: Table) -> tuple[Pipeline, Table]:
+    """Fitted steps, and the table that they give."""
+    return steps, steps.fit_transform(table)
 
 
 def fitted_to(detector: BaseEstimator, table: Table) -> BaseEstimator:
@@ -173,13 +171,7 @@ class Candidate:
         is_pipeline = isinstance(fitted, Pipeline) and len(fitted) > 1
         if is_pipeline:
             before = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
-            begins = before.steps[:-1], healthy
-
-            def learn() -> tuple[Pipeline, Table]:
-                known, rows, origin = remembered(memory, transformed_by, before, healthy)
-                return known, of_origin(rows, origin)
-
-            before, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
+            before, seen = remembered(memory, transformed_by, before, healthy)
             head = tuple(step for _, step in before.steps[:-1])
         last = fitted[-1] if is_pipeline else fitted
         last = remembered(memory, fitted_to, last, seen)
@@ -230,8 +222,8 @@ def _longest_window(detector: BaseEstimator) -> int:
     parts, longest = [detector], 1
     while parts:
         part = parts.pop()
-        longest = max(longest, getattr(part, "width_", 1))
-        parts += [*dict(getattr(part, "steps", ())).values(), *getattr(part, "detectors_", ())]
+        longest = max(longest, getattr(part, "width", 1))
+        parts += [*dict(getattr(part, "steps", ())).values(), *filter(None, [getattr(part, "means_", None)])]
     return longest
 
 

@@ -77,6 +77,7 @@ from skthermo.surrogate.chain._thermal import (
     possible,
     ratio_regressor,
 )
+from skthermo.surrogate.effects import damage_directions
 from skthermo.surrogate.inverse import PosteriorInverse
 
 
@@ -565,6 +566,27 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """
         check_is_fitted(self)
         return self.thermal_.weather(X, validate_data(self, X, dtype=np.float64, reset=False))
+
+    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+
+        Returns
+        -------
+        DataFrame of shape (n_groups, n_modes)
+            Derivatives of ln f by the severity at the mean of the learned parameters, in the measured domain, with the
+            names of the modes. Groups that move no frequency are left out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or none moves a frequency.
+        """
+        return damage_directions(self, groups)
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far the inputs of M2 are outside the training range, row by row.

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, Matrix, as_floats, check_names, is_model
+from skthermo._core.arrays import Array, Matrix, as_floats
 from skthermo._core.estimators import check_is_fitted
+from skthermo.fem.damage import as_directions, names_of_groups
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 NEAR = 1 / 3  # share of the bounds up to which amounts have a reduced model; one for all of them would be large
@@ -19,8 +20,6 @@ MOST_AXES = 6  # largest number of directions in which parameters vary with the 
 SMALLEST = 3e-4  # standard deviation of ln theta along a direction, below which it does not count
 MOST_SOLVED = 5000  # number of rows that are solved together, so that memory stays bounded
 STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
-UNMOVED = 1e-9  # relative change by a whole loss below which a group moves no frequency
-ALL_GROUPS = "all groups"  # the name of an even change of all of them
 
 
 @dataclass(frozen=True)
@@ -259,78 +258,15 @@ def central_differences(function: Callable[[Array], Array], amounts: Array) -> A
     return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * STEP) for h in steps], axis=-1)
 
 
-def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:
-    """Groups of the model by name; several of them where they are joined."""
-    if not hasattr(model, "damaged") or not hasattr(model, "groups"):
-        raise ValueError(f"{model!r} has no damage groups; expected a model that can be damaged, such as AffineModel")
-    known = model.groups
-    if groups is None:
-        members = {name: [name] for name in _not_made_of_others(known)}
-    elif isinstance(groups, Mapping):
-        members = {str(name): [joined] if isinstance(joined, str) else list(joined) for name, joined in groups.items()}
-    else:
-        members = {name: [name] for name in check_names([groups] if isinstance(groups, str) else groups, "groups")}
-    asked = [name for joined in members.values() for name in joined]
-    unknown = [name for name in asked if name not in known]
-    if unknown:
-        raise ValueError(f"unknown damage groups {unknown}; expected some of {sorted(known)}")
-    if not asked or not all(members.values()):
-        raise ValueError(f"groups is {groups!r}; expected one or more of {sorted(known)}")
-    return members
-
-
-def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
-    """Groups without those whose terms are all in smaller groups."""
-    terms = {name: set(positions) for name, positions in known.items()}
-    kept = []
-    for name, own in terms.items():
-        smaller = [other for other in terms.values() if other < own]
-        if not smaller or set().union(*smaller) != own:
-            kept.append(name)
-    return kept
-
-
-def usual_frequencies(fem: Any) -> Array:
-    """Frequencies in Hz of a model at its nominal state, or of a fitted chain at the mean of its parameters."""
-    if is_model(fem):
-        return as_floats(fem.frequencies(np.ones((1, len(fem.parameter_names)))))[0]
-    check_is_fitted(fem)
-    return healthy_frequencies(fem, mean_parameters(fem))[0]
-
-
 def mean_parameters(fem: Any) -> Array:
     """Mean of the parameters of the records of a fitted chain, (1, n_parameters)."""
     return np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
 
 
-def damage_directions(fem: Any) -> pd.DataFrame:
-    """Relative change of each frequency for a loss of stiffness of each damage group, at its beginning.
-
-    Of a model, at its nominal state. Of a fitted chain, at the mean of its parameters, in the measured domain and with
-    the names of its modes. Groups that are made of others are left out, and those that move no frequency.
-    """
-    model, is_chain = getattr(fem, "model", fem), not is_model(fem)
-    groups = list(read_groups(model, None))
-    if is_chain:
-        check_is_fitted(fem)
-        structure = ChangedStructure(fem, StructuralChanges.of_damage(model, groups))
-        effects = FrequencyEffects.at(structure, mean_parameters(fem), np.ones((1, len(fem.mode_names_))))
-        values, names = effects(np.zeros(len(groups)))[1].T, list(fem.mode_names_)
-    else:
-        nominal = np.ones((1, len(model.parameter_names)))
-        names = list(range(model.n_modes))
-        if hasattr(model, "with_damage_parameters"):
-            changed = model.with_damage_parameters(groups)
-            theta = np.ones((1, len(changed.parameter_names)))
-            values = -changed.jacobian(theta)[0][:, -len(groups) :].T / changed.frequencies(theta)[0]
-        else:
-
-            def logarithms(amounts: Array) -> Array:
-                damage = {name: float(loss) for name, loss in zip(groups, amounts, strict=True) if loss}
-                return np.log(as_floats((model.damaged(damage) if damage else model).frequencies(nominal)))[0]
-
-            values = central_differences(logarithms, np.zeros(len(groups))).T
-    moved = (np.abs(values) > UNMOVED).any(axis=1)
-    if not moved.any():
-        raise ValueError(f"no loss of stiffness of the groups {groups} moves a frequency; expected one that does")
-    return pd.DataFrame(values[moved], [name for name, is_so in zip(groups, moved, strict=True) if is_so], names)
+def damage_directions(fem: Any, groups: Sequence[str] | None = None) -> pd.DataFrame:
+    """Directions of a fitted chain, at the mean of its parameters, in the measured domain."""
+    check_is_fitted(fem)
+    names = names_of_groups(fem.model, groups)
+    structure = ChangedStructure(fem, StructuralChanges.of_damage(fem.model, names))
+    effects = FrequencyEffects.at(structure, mean_parameters(fem), np.ones((1, len(fem.mode_names_))))
+    return as_directions(effects(np.zeros(len(names)))[1].T, names, fem.mode_names_)

@@ -17,39 +17,26 @@ import pandas as pd
 
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import import_optional
-from skthermo._core.frames import MARKERS
-from skthermo._core.warnings import warn_user, without_warnings
+from skthermo._core.frames import MISSING_CODES
+from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
 
 ISO, UNIX, UNIX_MS, EXCEL = "ISO8601", "unix", "unix_ms", "excel"
-NUMERIC = {UNIX: ("s", "unix", 5e8, 4e9), UNIX_MS: ("ms", "unix", 5e11, 4e12), EXCEL: ("D", "1899-12-30", 3e4, 7.5e4)}
-"""Stamps that are numbers: their unit, when they begin, and the least and the greatest that are taken for times."""
-STAMP_TEXTS = {
-    ISO: "one like 2026-01-31 13:00", UNIX: "seconds since 1970", UNIX_MS: "milliseconds since 1970",
-    EXCEL: "a serial date of Excel, such as 46053.5417",
+NUMERIC_STAMPS = {
+    UNIX: ("s", "unix", 5e8, 4e9), UNIX_MS: ("ms", "unix", 5e11, 4e12), EXCEL: ("D", "1899-12-30", 3e4, 7.5e4),
 }  # fmt: skip
+"""Stamps that are numbers: their unit, when they begin, and the least and the greatest that are taken for times."""
 PARQUET, WORKBOOKS = (".parquet", ".pq"), (".xlsx", ".xlsm")
-BINARY = (*PARQUET, *WORKBOOKS)
-ENDINGS = (".csv", ".txt", ".dat", ".tsv", *BINARY)
-NO_VALUE = re.compile(
-    r"|-+|#.*|n/?a|k\.? ?a\.?|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?", re.IGNORECASE
-)
-OTHER_SIGNS = str.maketrans("\u2212\u2013", "--")  # a minus of typesetters, and a dash in its place
-BLANK = r"[ '\u2019\u00a0\u202f]"  # between thousands
-DATE = re.compile(r"\d{4}-\d\d-\d\d")
-OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")
-
-SEPARATORS, DECIMALS = (";", "\t", "|", ","), (".", ",")  # a comma last, as it may be a decimal sign
+NO_TEXT_FILES = (*PARQUET, *WORKBOOKS)
+WITH_OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")
+DECIMAL_SIGNS = (".", ",")
 DAYS = (
     "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%y",
     "%d/%m/%y", "%m/%d/%y", "%y/%m/%d", "%d-%m-%y", "%y-%m-%d", "%d-%b-%Y", "%d %b %Y", "%d-%b-%y", "%Y%m%d",
 )  # fmt: skip
 CLOCKS = (" %H:%M:%S", " %H:%M", "", " %H:%M:%S.%f", " %I:%M:%S %p", " %I:%M %p")
-WRITTEN = (ISO, *(day + clock for day, clock in product(DAYS, CLOCKS)))
-YEARS = (1970, 2100)  # of stamps
-TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d(:\d\d(\.\d+)?)?( ?[AaPp][Mm])?$")
-UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
-UNITS = {
+WRITTEN_STAMPS = (ISO, *(day + clock for day, clock in product(DAYS, CLOCKS)))
+UNIT_NAMES = {
     "°c": "°C", "degc": "°C", "deg c": "°C", "c": "°C", "k": "K", "kelvin": "K", "°f": "°F", "degf": "°F", "f": "°F",
     "hz": "Hz", "mm": "mm", "m": "m", "mrad": "mrad", "rad": "rad", "°": "°", "deg": "°", "µm/m": "µm/m", "%": "%",
 }  # fmt: skip
@@ -108,11 +95,20 @@ def read_file(
     A last line without a line break may be cut off: it is left out if asked for or if values are lacking, else there is
     a warning.
     """
+    table, findings = read_and_doubted(file, form, ignore=ignore, leave_unfinished=leave_unfinished)
+    warn_each(findings)
+    return table
+
+
+def read_and_doubted(
+    file: Path, form: CsvFormat, *, ignore: Collection[str] = (), leave_unfinished: bool = False
+) -> tuple[pd.DataFrame, list[RecordsWarning]]:
+    """Records as `read_file` gives them, and what is doubtful about them."""
     if file.suffix.lower() in PARQUET:
-        table = _parquet(file).drop(columns=list(ignore), errors="ignore")
+        table, findings = _parquet(file).drop(columns=list(ignore), errors="ignore"), []
     else:
-        table = _table(file, form, ignore, leave_unfinished)
-    return table.mask(table.isin(list(form.missing))) if len(form.missing) else table
+        table, findings = _table(file, form, ignore, leave_unfinished)
+    return table.mask(table.isin(list(form.missing))) if len(form.missing) else table, findings
 
 
 def in_zone(table: pd.DataFrame, zone: Any, file: Path) -> pd.DataFrame:
@@ -134,20 +130,23 @@ def _parquet(file: Path) -> pd.DataFrame:
     return table
 
 
-def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinished: bool) -> pd.DataFrame:
-    """Numbers are read to the last bit; a stamp comes again with the same values or is an error."""
+def _table(
+    file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinished: bool
+) -> tuple[pd.DataFrame, list[RecordsWarning]]:
+    """Numbers to the last bit, and a finding of a last line that may be cut off; a stamp that comes again with other
+    values is an error."""
     rows, is_finished = rows_in(file, form)
     if leave_unfinished and not is_finished:
         rows, is_finished = rows[:-1], True
     names_line, names = _names(rows, form, file)
+    findings = []
     if not is_finished:
         rows = rows[:-1] if len(rows[-1][1]) < len(names) else rows
-        warn_user(
+        text = (
             f"{file} does not end with a line break. Its last value may be cut off, and a last line with fewer values "
-            "than names is left out. Rename files when they are complete",
-            RecordsWarning,
-            "unfinished-file",
+            "than names is left out. Rename files when they are complete"
         )
+        findings.append(RecordsWarning(text, "unfinished-file"))
     stamp_columns = list(form.stamp_columns) or names[:1]
     wanted = [name for name in names if name not in stamp_columns and name not in ignore]
     if len(names) < 2 or any(names.count(name) != 1 for name in [*wanted, *stamp_columns]):
@@ -168,7 +167,7 @@ def _table(file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinishe
             f"{file}, line {lines[place]}: {table.index[place]} comes again with other values; expected each once. "
             "If the clocks go back then, --zone of init, or [csv] time_zone, says where"
         )
-    return table
+    return table, findings
 
 
 def _names(rows: Sequence[Line], form: CsvFormat, file: Path) -> tuple[int, list[str]]:
@@ -216,9 +215,9 @@ def _longest_sheet(file: Path) -> tuple[Any, list[str]]:
     """Cells of the sheet with the most rows, as others are covers or notes; which one of several it is, in words."""
     try:
         import_optional("openpyxl", extra="excel")
-        with without_warnings(), pd.ExcelFile(file, engine="openpyxl") as book:
+        with pd.ExcelFile(file, engine="openpyxl") as book:
             longest = max(book.sheet_names, key=lambda name: book.book[name].max_row or 0)
-            cells = book.parse(longest, header=None, dtype=object, na_filter=False).to_numpy()
+            cells = pd.read_excel(book, sheet_name=longest, header=None, dtype=object, na_filter=False).to_numpy()
     except OSError:
         raise
     except ImportError as error:  # as of any other file that cannot be read: it keeps no other out
@@ -307,12 +306,15 @@ def number(text: str, decimal: str) -> float:
             return value if isfinite(value) else np.nan
         except ValueError:
             pass
-    if (plain := text.translate(OTHER_SIGNS)) != text:
+    signs = str.maketrans("\u2212\u2013", "--")  # a minus of typesetters, and a dash in its place
+    if (plain := text.translate(signs)) != text:
         return number(plain, decimal)
-    if NO_VALUE.fullmatch(text):
+    no_value = r"|-+|#.*|n/?a|k\.? ?a\.?|<na>|null|none|[-+]?(nan|1[.,]#(qnan|snan|ind|inf)\d*)(\(\w*\))?"
+    if re.fullmatch(no_value, text, re.IGNORECASE):
         return np.nan
     point, sign = re.escape(decimal), "," if decimal == "." else r"\."
-    groups = rf"({BLANK})\d{{3}}(\2\d{{3}})*({point}\d*)?|({sign}\d{{3}})+{point}\d+|({sign}\d{{3}}){{2,}}"
+    blank = r"[ '\u2019\u00a0\u202f]"  # between thousands
+    groups = rf"({blank})\d{{3}}(\2\d{{3}})*({point}\d*)?|({sign}\d{{3}})+{point}\d+|({sign}\d{{3}}){{2,}}"
     if re.fullmatch(rf"[-+]?\d{{1,3}}({groups})", text):
         return float(re.sub(rf"[^-+\d{point}]", "", text).replace(decimal, "."))
     raise ValueError(text)
@@ -320,7 +322,7 @@ def number(text: str, decimal: str) -> float:
 
 def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[int]) -> pd.DatetimeIndex:
     """Texts as times: in the time zone of the records; without one, in UTC if they have offsets."""
-    has_offset = [OFFSET.search(text) is not None for text in texts]
+    has_offset = [WITH_OFFSET.search(text) is not None for text in texts]
     if 0 < sum(has_offset) < len(texts):
         place = has_offset.index(not has_offset[0])
         raise ValueError(
@@ -333,9 +335,13 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
     is_wrong = np.array(index.isna())
     if is_wrong.any():
         place = int(np.argmax(is_wrong))
+        stamp_texts = {
+            ISO: "one like 2026-01-31 13:00", UNIX: "seconds since 1970", UNIX_MS: "milliseconds since 1970",
+            EXCEL: "a serial date of Excel, such as 46053.5417",
+        }  # fmt: skip
         raise ValueError(
             f"{file}, line {lines[place]}: {texts[place]!r:.100} is no time; expected "
-            f"{STAMP_TEXTS.get(form.stamps, f'one like the format {form.stamps}')}; "
+            f"{stamp_texts.get(form.stamps, f'one like the format {form.stamps}')}; "
             f"{is_wrong.sum()} of {len(texts)} stamps are wrong"
         )
     if form.time_zone is None:
@@ -345,16 +351,16 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
 
 def parsed(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
     """Texts as times, NaT for what is none in this format; in UTC if they have offsets."""
-    if form in NUMERIC:
-        unit, origin, least, most = NUMERIC[form]
+    if form in NUMERIC_STAMPS:
+        unit, origin, least, most = NUMERIC_STAMPS[form]
         numbers = pd.to_numeric(pd.Series([text.replace(",", ".") for text in texts], dtype=object), errors="coerce")
         numbers = numbers.astype(float).where(numbers.between(least, most))
         times = pd.to_datetime(numbers, unit=unit, origin=origin, errors="coerce", utc=form != EXCEL)
         index = pd.DatetimeIndex(times).as_unit("ns")
         return index.round("s") if form == EXCEL else index  # a serial date is cut after some decimals
-    has_offsets = any(OFFSET.search(text) for text in texts)
+    has_offsets = any(WITH_OFFSET.search(text) for text in texts)
     index = pd.DatetimeIndex(pd.to_datetime(list(texts), format=form, errors="coerce", utc=has_offsets))
-    is_other = np.array([form == ISO and DATE.match(text) is None for text in texts], dtype=bool)
+    is_other = np.array([form == ISO and re.match(r"\d{4}-\d\d-\d\d", text) is None for text in texts], dtype=bool)
     return index.where(~is_other) if is_other.any() else index
 
 
@@ -362,7 +368,7 @@ def parsed_or_iso(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
     """Texts as times in this format, or as in ISO 8601, which cannot be taken for another one: dates of a workbook."""
     index = parsed(texts, form)
     others = np.flatnonzero(index.isna())
-    if form in (ISO, *NUMERIC) or not len(others):
+    if form in (ISO, *NUMERIC_STAMPS) or not len(others):
         return index
     times, iso = index.to_series(index=range(len(index))), parsed([texts[place] for place in others], ISO)
     if iso.notna().any() and (iso.tz is None) == (index.tz is None):
@@ -375,7 +381,7 @@ def _otherwise_written(texts: Sequence[str], index: pd.DatetimeIndex, form: str,
     by the only other one that they may have. Texts in two formats might be days and months that are exchanged."""
     others = np.flatnonzero(index.isna())
     rows = [[texts[place]] for place in others]
-    for forms in (WRITTEN if form in (ISO, EXCEL) else (), (EXCEL,)) if rows else ():
+    for forms in (WRITTEN_STAMPS if form in (ISO, EXCEL) else (), (EXCEL,)) if rows else ():
         if fitting := _fitting(rows, (0,), forms):
             times = index.to_series(index=range(len(index)))
             found = _times_in(rows, (0,), _certain(rows, (0,), fitting, file)[0])
@@ -410,11 +416,11 @@ def _by_local_clock(index: pd.DatetimeIndex, zone: str, file: Path, lines: Seque
 
 
 @dataclass(frozen=True)
-class Look:
+class FileLook:
     """The form of a file, its records, and what else was found in it.
 
-    ``ignored`` says why columns are no measurements; ``units`` has those that the file names; ``notes`` are sentences
-    for the reader of the settings.
+    ``ignored`` says why columns are no measurements; ``units`` are the units that the file names; ``notes`` are
+    sentences for the reader of the settings; ``findings`` are doubts about the records.
     """
 
     file: Path
@@ -423,9 +429,10 @@ class Look:
     ignored: dict[str, str]
     units: dict[str, str]
     notes: tuple[str, ...]
+    findings: tuple[RecordsWarning, ...] = ()
 
 
-def look_at(file: Path, zone: str | None = None, stamps: str | None = None, wanted: Collection[str] = ()) -> Look:
+def look_at(file: Path, zone: str | None = None, stamps: str | None = None, wanted: Collection[str] = ()) -> FileLook:
     """Find the form of a file and read it, in a time zone and with a format of its stamps if these are known. Columns
     that are wanted are used, whatever they hold."""
     if not file.is_file():
@@ -434,17 +441,17 @@ def look_at(file: Path, zone: str | None = None, stamps: str | None = None, want
         form, units, ignored, notes = CsvFormat(time_zone=zone), {}, {}, []
     else:
         form, units, ignored, notes = _look_at_table(file, zone, stamps)
-    records = read_file(file, form, ignore=ignored)
+    records, findings = read_and_doubted(file, form, ignore=ignored)
     ignored |= {name: why for name, why in _no_measurements(records) if name not in wanted}
     records = records.drop(columns=[name for name in records if name in ignored])
-    marked = [marker for marker in MARKERS if records.isin([marker]).to_numpy().any()]
+    marked = [marker for marker in MISSING_CODES if records.isin([marker]).to_numpy().any()]
     if marked:
         records, form = records.mask(records.isin(marked)), replace(form, missing=marked)
     for name in records:
-        named = UNIT.search(str(name))
-        if named and named[1].lower() in UNITS:
-            units[name] = UNITS[named[1].lower()]
-    return Look(file, form, records, ignored, units, tuple(notes))
+        named = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]", str(name))
+        if named and named[1].lower() in UNIT_NAMES:
+            units[name] = UNIT_NAMES[named[1].lower()]
+    return FileLook(file, form, records, ignored, units, tuple(notes), tuple(findings))
 
 
 def _look_at_table(
@@ -478,18 +485,18 @@ def _look_at_table(
     columns = dict(zip(names, zip(*compress(cells, is_record), strict=True), strict=True))
     stamp_columns = [names[place] for place in places]
     units = {
-        name: UNITS[cell.lower()]
+        name: UNIT_NAMES[cell.lower()]
         for line, row in above
         if line > names_line
         for name, cell in zip(names, row, strict=True)
-        if cell.lower() in UNITS
+        if cell.lower() in UNIT_NAMES
     }
     texts = {}
     for name, column in columns.items():
         kinds = [kind for cell in column if (kind := _is_number(cell, decimal)) is not None]
         if name not in stamp_columns and sum(kinds) < MOSTLY * len(kinds):
             texts[name] = "it holds text"
-    has_offsets = OFFSET.search(_stamp_text(cells[first], places)) is not None
+    has_offsets = WITH_OFFSET.search(_stamp_text(cells[first], places)) is not None
     form = CsvFormat(
         separator,
         decimal,
@@ -509,13 +516,14 @@ def _decimal_of(sheet: Any) -> str:
         rows = _rows_of_cells(sheet[:MOST_LOOKED_AT], decimal)
         return sum(_is_number(cell, decimal) is True for _, row in rows for cell in row)
 
-    return max(DECIMALS, key=n_numbers)
+    return max(DECIMAL_SIGNS, key=n_numbers)
 
 
 def _division(text: str, file: Path) -> tuple[str, str]:
     """Separator and decimal sign by which lines of the usual number of columns have the most numbers."""
     head, found = "\n".join(text.splitlines()[:MOST_LOOKED_AT]), []
-    for rank, (separator, decimal) in enumerate(product(SEPARATORS, DECIMALS)):
+    separators = (";", "\t", "|", ",")  # a comma last, as it may be a decimal sign
+    for rank, (separator, decimal) in enumerate(product(separators, DECIMAL_SIGNS)):
         try:
             rows = [row for _, row in rows_of(head, separator)]
         except ValueError:
@@ -526,7 +534,7 @@ def _division(text: str, file: Path) -> tuple[str, str]:
         numbers = [_is_number(cell, decimal) for row in rows if len(row) == width for cell in row[1:]]
         found.append((numbers.count(True) / len(rows), -rank, separator, decimal))
     if not found or max(found)[0] == 0:
-        raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {SEPARATORS} between")
+        raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {separators} between")
     return max(found)[2:]
 
 
@@ -546,7 +554,7 @@ def _is_number(cell: str, decimal: str) -> bool | None:
 def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> tuple[tuple[int, ...], str, list[str]]:
     """Places of the columns that hold the stamps, their format, and what is doubtful in it."""
     looked = rows[:MOST_LOOKED_AT]
-    for forms in [(given,)] if given else [WRITTEN, (UNIX, UNIX_MS), (EXCEL,)]:
+    for forms in [(given,)] if given else [WRITTEN_STAMPS, (UNIX, UNIX_MS), (EXCEL,)]:
         tried = [(places, _fitting(looked, places, forms)) for places in _places(looked)]
         found = [one for one in tried if one[1]]
         if forms == (EXCEL,) and len(found) > 1:  # whole numbers may be counts of records
@@ -566,7 +574,8 @@ def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> 
 def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
     """Columns that may hold stamps: each with the nearest time of day, and alone."""
     columns = list(zip(*rows, strict=True))
-    clocks = [n for n, cells in enumerate(columns) if 2 * sum(map(bool, map(TIME_OF_DAY.match, cells))) > len(cells)]
+    time_of_day = re.compile(r"\d{1,2}:\d\d(:\d\d(\.\d+)?)?( ?[AaPp][Mm])?$")
+    clocks = [n for n, cells in enumerate(columns) if 2 * sum(map(bool, map(time_of_day.match, cells))) > len(cells)]
     for n in range(len(columns)):
         near = sorted((abs(clock - n), clock < n, clock) for clock in clocks if clock != n)
         yield from ((n, clock) for *_, clock in near[:1])
@@ -580,7 +589,7 @@ def _stamp_text(row: Sequence[str], places: Sequence[int]) -> str:
 def _times_in(rows: Sequence[Sequence[str]], places: Sequence[int], form: str) -> pd.DatetimeIndex:
     """Stamps in some columns of rows, NaT where there is none that is plausible."""
     index = parsed_or_iso([_stamp_text(row, places) for row in rows], form)
-    return index.where((index.year >= YEARS[0]) & (index.year <= YEARS[1]))
+    return index.where((index.year >= 1970) & (index.year <= 2100))
 
 
 def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str]) -> list[str]:

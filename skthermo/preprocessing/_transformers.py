@@ -23,10 +23,8 @@ from skthermo._core.estimators import (
     check_array,
     check_is_fitted,
 )
-from skthermo._core.frames import Table, frame_like, row_weights, warn_of_markers
-
-EVERYWHERE = "ambient"
-SINGULAR = 1e-9  # eigenvalue beside the largest that counts as zero
+from skthermo._core.frames import Table, frame_like, marker_findings, row_weights
+from skthermo._core.warnings import warn_each
 
 
 class RecordTransformer(TransformerMixin, Estimator):
@@ -192,7 +190,6 @@ class HingeFeatures(RecordTransformer):
         return self
 
     def _learn(self, X: Table, values: NDArray, weights: NDArray | None = None) -> None:
-        values = as_floats(values)
         if weights is not None:
             values = np.where(weights[:, np.newaxis] > 0, values, np.nan)
         self._refuse_empty(values)
@@ -203,7 +200,7 @@ class HingeFeatures(RecordTransformer):
             self.knots_ = np.column_stack([weighted_quantiles(column, shares, weights) for column in values.T])
 
     def _transformed(self, X: Table, values: NDArray) -> Table:
-        return frame_like(X, piecewise_linear(as_floats(values), self.knots_), self.get_feature_names_out())
+        return frame_like(X, piecewise_linear(values, self.knots_), self.get_feature_names_out())
 
     def _names(self, columns: Sequence[Hashable]) -> list[Hashable]:
         return [*columns, *(f"{name}_above{knot}" for knot in range(1, self.n_knots + 1) for name in columns)]
@@ -276,7 +273,6 @@ class SensorMeans(RecordTransformer):
         self.roles = roles
 
     def _learn(self, X: Table, values: NDArray) -> None:
-        values = as_floats(values)
         role_of = self._read_roles()
         roles = sorted({role for role in role_of if role is not None})
         self.columns_ = {role: [i for i, own in enumerate(role_of) if own == role] for role in roles}
@@ -285,7 +281,7 @@ class SensorMeans(RecordTransformer):
             self.offsets_[columns] = offsets_between(values[:, columns])
 
     def _transformed(self, X: Table, values: NDArray) -> Table:
-        level = as_floats(values) - self.offsets_
+        level = values - self.offsets_
         means = [means_of_known(level[:, columns], axis=1) for columns in self.columns_.values()]
         return frame_like(X, np.column_stack(means), self.columns_)
 
@@ -295,7 +291,7 @@ class SensorMeans(RecordTransformer):
     def _read_roles(self) -> list[str | None]:
         names = list(getattr(self, "feature_names_in_", range(self.n_features_in_)))
         if self.roles is None:
-            return [EVERYWHERE] * len(names)
+            return ["ambient"] * len(names)
         if set(self.roles) != set(names):
             raise ValueError(
                 f"roles names the columns {sorted(map(str, self.roles))}; expected each of {list(map(str, names))}, "
@@ -314,7 +310,7 @@ def offsets_between(values: NDArray[np.float64]) -> NDArray[np.float64]:
     shares = known / np.maximum(known.sum(axis=1, keepdims=True), 1)
     normal = np.diag(known.sum(axis=0)) - known.T @ shares
     # singular, because only differences are known: its zero eigenvalues are rounding errors of any size
-    return np.linalg.lstsq(normal, np.where(known, values - means, 0.0).sum(axis=0), rcond=SINGULAR)[0]
+    return np.linalg.lstsq(normal, np.where(known, values - means, 0.0).sum(axis=0), rcond=1e-9)[0]
 
 
 class BiasAligner(RecordTransformer):
@@ -335,6 +331,8 @@ class BiasAligner(RecordTransformer):
         Means of the measured frequencies in Hz, NaN ignored.
     reference_ : ndarray of shape (n_modes,)
         Means after `transform`, in Hz.
+    findings_ : list of SkthermoWarning
+        Doubts about the records of `fit`, which it also gives as warnings.
     n_features_in_, feature_names_in_ : int, ndarray of str
         Number of modes and, where `fit` saw a frame with such, their names.
 
@@ -359,7 +357,7 @@ class BiasAligner(RecordTransformer):
 
     def _learn(self, X: Table, values: NDArray) -> None:
         self._refuse_empty(values)
-        warn_of_markers(frame_like(X, values))
+        self.findings_ = marker_findings(frame_like(X, values))
         self.mean_ = np.nanmean(values, axis=0)
         self.reference_ = self._read_reference(values.shape[1])
         if self.method == "scale":
@@ -367,6 +365,7 @@ class BiasAligner(RecordTransformer):
                 if (factors == 0).any():
                     name = self.get_feature_names_out()[factors == 0][0]
                     raise ValueError(f"the {what} of mode {name!r} is zero; expected another number to scale by")
+        warn_each(self.findings_)
 
     def _transformed(self, X: Table, values: NDArray) -> Table:
         if self.method == "scale":
@@ -394,7 +393,7 @@ class BiasAligner(RecordTransformer):
         if hasattr(X, "columns") and hasattr(self, "feature_names_in_"):
             F = self._validated(X, reset=False)
         else:  # frequencies of a model have no column names
-            F = check_array(X, dtype=[np.float64, np.float32])
+            F = check_array(X)
         if F.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")
         if self.method == "scale":

@@ -12,11 +12,7 @@ from numpy.typing import NDArray
 from skthermo._core.frames import midnight
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing._past import MemoryFindings
-
-MEANINGLESS, DOUBTFUL = "meaningless", "doubtful"
-COLUMNS = ["what", "column", "n_rows", "from", "to", "detail", "severity", "consequence", "action"]
-MOST_NAMED = 12  # findings of one kind that a sentence lists
+from skthermo.preprocessing._find_memory import MemoryFindings
 
 WARNINGS = {
     "no-table": "what is given is no table of numbers: {}. Nothing can be learned from it. Give a DataFrame or a "
@@ -104,7 +100,7 @@ ARE_MEANINGLESS = frozenset(
 )
 """Kinds with which no result of a fit means anything."""
 
-SET_ASIDE = frozenset(
+ASIDE_KINDS = frozenset(
     {
         *("infinite-values", "placeholders", "isolated-level", "another-level", "implausible-values", "not-positive"),
         *("stuck-sensor", "stuck-mode"),
@@ -115,15 +111,12 @@ SET_ASIDE = frozenset(
 IMPOSSIBLE = frozenset({"infinite-values", "placeholders", "not-positive"})
 """Those which cannot be in any state of a structure."""
 
-LEFT_OUT = frozenset({"missing-column", "constant"})
+LEFT_OUT_KINDS = frozenset({"missing-column", "constant"})
 """Kinds of columns that say nothing."""
 
-UNWARNED = SET_ASIDE | {"few-rows"}
-"""Estimators set values aside, or need more records, and warn of that."""
 
-
-class Finding(NamedTuple):
-    """What was found in a column, in how many rows, from which row to which, and a sentence that says more."""
+class RecordFinding(NamedTuple):
+    """A finding in a column: its kind, in how many rows, from which row to which, and a sentence that says more."""
 
     what: str
     column: Hashable
@@ -133,9 +126,9 @@ class Finding(NamedTuple):
     detail: str
 
     @classmethod
-    def of(
+    def in_rows(
         cls, index: pd.Index, what: str, column: Hashable, rows: NDArray, detail: str, *, period: bool = False
-    ) -> Finding:
+    ) -> RecordFinding:
         """A finding in some rows of an index, which the detail may end with."""
         if not len(rows):
             return cls(what, column, 0, None, None, detail)
@@ -156,13 +149,14 @@ def label_of(label: Any) -> str:
     return f"{label:%Y-%m-%d}" if label == midnight(label) else f"{label:%Y-%m-%d %H:%M}"
 
 
-def findings_table(findings: Iterable[Finding]) -> pd.DataFrame:
+def findings_table(findings: Iterable[RecordFinding]) -> pd.DataFrame:
     """Findings one by one as a table, with what follows from each if the records are used, and what to do."""
     rows = []
     for found in findings:
-        severity = MEANINGLESS if found.what in ARE_MEANINGLESS else DOUBTFUL
+        severity = "meaningless" if found.what in ARE_MEANINGLESS else "doubtful"
         rows.append([*found, severity, *WARNINGS[found.what].split(". ")[1:3]])
-    return pd.DataFrame(rows, columns=COLUMNS)
+    columns = ["what", "column", "n_rows", "from", "to", "detail", "severity", "consequence", "action"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 @dataclass(frozen=True, repr=False)
@@ -233,7 +227,7 @@ class RecordFindings(SavesFrames):
             Its ``kind`` is what was found.
         """
         for kind, rows in self.table.groupby("what", sort=False):
-            if kind not in UNWARNED.union(exclude):
+            if kind not in {*ASIDE_KINDS, "few-rows", *exclude}:  # estimators warn of these themselves
                 yield RecordsWarning(WARNINGS[kind].format(listed_details(rows["detail"])), kind)
 
     def refuse_meaningless(self, *, exclude: Collection[str] = ()) -> None:
@@ -249,7 +243,7 @@ class RecordFindings(SavesFrames):
         ValueError
             If the severity of a finding is "meaningless".
         """
-        severe = self.table[(self.table["severity"] == MEANINGLESS) & ~self.table["what"].isin(list(exclude))]
+        severe = self.table[(self.table["severity"] == "meaningless") & ~self.table["what"].isin(list(exclude))]
         if len(severe):
             kinds = severe.groupby("what", sort=False)
             texts = [WARNINGS[kind].format(listed_details(rows["detail"])) for kind, rows in kinds]
@@ -257,6 +251,6 @@ class RecordFindings(SavesFrames):
 
 
 def listed_details(details: pd.Series) -> str:
-    """Details of findings one after the other, not more than a reader can take in."""
-    rest = len(details) - MOST_NAMED
-    return "; ".join([*details[:MOST_NAMED], *([f"and {rest} more"] if rest > 0 else [])])
+    """Details of at most a dozen findings one after the other."""
+    rest = len(details) - 12
+    return "; ".join([*details[:12], *([f"and {rest} more"] if rest > 0 else [])])

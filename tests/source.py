@@ -1,0 +1,125 @@
+"""What source files hold: lines of code, constants, names, kinds of warnings, hidden state, private imports."""
+
+import ast
+import io
+import re
+import tokenize
+from collections import Counter
+
+GROUND = ("_core", "fem", "preprocessing", "residuals", "surrogate", "updating", "detection", "metrics", "datasets")
+"""Rooms in which equal inputs give equal results, by their source."""
+
+BESIDE_CODE = {
+    *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT),
+    *(tokenize.ENCODING, tokenize.ENDMARKER),
+}
+HIDDEN = {  # names by which state is hidden, and what they look at
+    "_getframe": "the caller's frames",
+    "currentframe": "the caller's frames",
+    "f_locals": "the caller's variables",
+    "ContextVar": "context variables",
+    "contextvars": "context variables",
+    "weakref": "weak references",
+    "catch_warnings": "filters of warnings",
+}
+OWN = {"self", "cls", "twin"}  # a twin is a copy that a method has just made
+
+
+def trees(package, rooms=None):
+    """Syntax tree of each file, of some rooms only or of all, by its path within the package."""
+    files = {path.relative_to(package): path for path in sorted(package.rglob("*.py"))}
+    inside = {file for file in files if rooms is None or file.parts[0] in rooms}
+    return {file.as_posix(): ast.parse(files[file].read_text()) for file in files if file in inside}
+
+
+def lines_of_code(text):
+    """Number of lines without docstrings, comments and blank ones."""
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    lines = {n for one in tokens if one.type not in BESIDE_CODE for n in range(one.start[0], one.end[0] + 1)}
+    for node in ast.walk(ast.parse(text)):
+        match node:
+            case ast.Expr(value=ast.Constant(value=str())):
+                lines -= set(range(node.lineno, node.end_lineno + 1))
+    return len(lines)
+
+
+def constants(tree, in_tuples=True):
+    """Upper-case names that a module assigns, those of tuples included or not."""
+    for node in tree.body:
+        match node:
+            case ast.Assign(targets=targets):
+                pass
+            case ast.AnnAssign(target=target):
+                targets = [target]
+            case _:
+                continue
+        parts = [part for target in targets for part in (ast.walk(target) if in_tuples else [target])]
+        yield from (
+            part.id for part in parts if isinstance(part, ast.Name) and re.fullmatch(r"_?[A-Z][A-Z0-9_]*", part.id)
+        )
+
+
+def classes(tree):
+    return [node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+
+
+def private_imports(tree):
+    """Private modules of the package, and private names of its modules, that a file imports."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import(names=names):
+                modules = [alias.name for alias in names]
+            case ast.ImportFrom(module=str(module), names=names):
+                modules = [f"{module}.{alias.name}" for alias in names]
+            case _:
+                continue
+        ours = [module for module in modules if module.split(".")[0] == "skthermo"]
+        yield from (module for module in ours if re.search(r"\._[^_]", module))
+
+
+def constructors_called_of(tree):
+    """Class methods and functions that are called ``of``."""
+    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name == "of"]
+
+
+def names_in_two_files(trees):
+    """Classes and constants that more than one file defines."""
+    defined = Counter(name for tree in trees.values() for name in {*constants(tree), *classes(tree)})
+    return {name: times for name, times in defined.items() if times > 1}
+
+
+def kinds_of_warnings(tree):
+    """Kinds that the source gives to warnings; None where it does not show the text."""
+    for call in ast.walk(tree):
+        match call:
+            case ast.Call(func=ast.Name(id=name), args=[_, *_, kind]) if re.fullmatch(r"warn_user|\w+Warning", name):
+                yield kind.value if isinstance(kind, ast.Constant) else None
+
+
+def hidden_state(tree):
+    """Where a file keeps or looks for what no argument gives: pairs of line and what is used there."""
+    found = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name) | ast.Attribute(attr=name) | ast.alias(name=name) if name in HIDDEN:
+                found.add((node.lineno, HIDDEN[name]))
+            case ast.ImportFrom(module=module) if module in HIDDEN:
+                found.add((node.lineno, HIDDEN[module]))
+            case ast.Call(func=ast.Name(id="id")) | ast.Attribute(value=ast.Attribute(attr="ctypes"), attr="data"):
+                found.add((node.lineno, "addresses of objects"))
+            case (
+                ast.Call(func=ast.Name(id="setattr" | "delattr"), args=[ast.Name(id=owner), *_])
+                | ast.Call(
+                    func=ast.Attribute(value=ast.Name(id="object"), attr="__setattr__"), args=[ast.Name(id=owner), *_]
+                )
+            ) if owner not in OWN:
+                found.add((node.lineno, "attributes of other objects"))
+            case (
+                ast.Subscript(value=ast.Call(func=ast.Name(id="vars"), args=[ast.Name(id=owner)]), ctx=ast.Store())
+                | ast.Attribute(
+                    value=ast.Call(func=ast.Name(id="vars"), args=[ast.Name(id=owner)]),
+                    attr="update" | "setdefault" | "pop",
+                )
+            ) if owner not in OWN:
+                found.add((node.lineno, "attributes of other objects"))
+    return sorted(found)

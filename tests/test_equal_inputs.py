@@ -1,0 +1,382 @@
+"""Equal inputs give equal results: every public estimator, whatever holds the numbers that it is given."""
+
+import functools
+import importlib
+import inspect
+import io
+import os
+import pickle
+import pkgutil
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import BaseEstimator, clone
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import OneClassSVM
+
+import skthermo
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.detection import (
+    DirectionalDetector,
+    FusedDetector,
+    MahalanobisDetector,
+    OutlierDetector,
+    TemperatureCompensator,
+    WindowedAlarm,
+)
+from skthermo.fleet import FleetMapper, FleetPrior
+from skthermo.monitoring import Monitor
+from skthermo.preprocessing import (
+    BiasAligner,
+    ExponentialMeans,
+    HampelFilter,
+    HingeFeatures,
+    KNNGapImputer,
+    LagFeatures,
+    ModeTracker,
+    SensorMeans,
+)
+from skthermo.studies import DetectabilityStudy, sweep
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
+from skthermo.updating import ModelUpdater
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+ROOT = Path(__file__).parents[1]
+
+TRUSS = make_truss()
+YEAR = make_truss_campaign(samples_per_year=90, random_state=0)
+T = YEAR.temperatures.reset_index(drop=True)
+F = YEAR.frequencies.reset_index(drop=True)
+MODES = list(F)
+GAPPED = F.mask(np.random.default_rng(0).random(F.shape) < 0.03)
+ONE_GAP = F.mask(F["f3"].max() == F)
+BOTH = T.join(GAPPED)
+FEW = F[MODES[:2]]  # to detectors that draw many samples
+MEASURED = F[:5]
+STAMPED = T.join(FEW).set_axis(pd.date_range("2025-01-01", periods=len(T), name="time"))
+NOMINAL, SHAPES = (values[0] for values in TRUSS.modes(np.ones((1, 4))))
+LINEAR = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=50, noise=0.01, random_state=0)
+CHAIN = DataInformedFEM(TRUSS, inverse=LINEAR, mapper=TemperatureMapper(Ridge()), random_state=0)
+COMPENSATOR = TemperatureCompensator(Ridge(), targets=MODES)
+COMPENSATED = make_pipeline(COMPENSATOR, MahalanobisDetector())
+
+
+@dataclass
+class Case:
+    """A public estimator, the tables that it learns from, and what it answers for the first of them."""
+
+    estimator: BaseEstimator
+    tables: tuple[pd.DataFrame, ...]
+    answers: Callable[..., dict[str, np.ndarray]]
+    needs_frames: bool = False  # settings name columns, or rows have stamps
+    is_slow: bool = False
+
+    def results(self, form=pd.DataFrame):
+        tables = [form(table) for table in self.tables]
+        found = self.answers(clone(self.estimator), *tables)
+        return {name: np.asarray(values, float) for name, values in found.items()}
+
+
+def after_fit(*methods):
+    def answers(estimator, *tables):
+        fitted = estimator.fit(*tables)
+        return {name: getattr(fitted, name)(tables[0]) for name in methods}
+
+    return answers
+
+
+def parameters(updater, X):
+    fitted = updater.fit(X)
+    return {"theta": fitted.theta_, "covariance": fitted.covariance_}
+
+
+def mapped(prior, X, y):
+    return {"predict": prior.fit([(X, y)]).mapper().fit(X, y).predict(X)}
+
+
+def tracked(tracker, X):
+    modes = tracker.fit().transform({"frequencies": X, "shapes": np.tile(SHAPES.T, (len(X), 1, 1))})
+    return {"frequencies": modes.frequencies, "mac": modes.mac}
+
+
+def rates(study, X):
+    chain = fitted_chain()
+    study.set_params(fem=chain, scenarios=sweep(chain, (0.1,), groups=["bottom"]))
+    return {"rates": study.run(X)["rate"]}
+
+
+def evaluated(monitor, X):
+    later = X[:10].set_axis(X.index[:10] + pd.Timedelta(days=365))
+    return {"index": monitor.fit(X).update(later)["index"]}
+
+
+@functools.cache
+def fitted_chain():
+    return clone(CHAIN).fit(T, F)
+
+
+TRANSFORMED = after_fit("transform")
+DETECTED = after_fit("predict", "score_samples", "damage_index")
+BY_POSITION = TemperatureCompensator(Ridge(), targets=[3])
+STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, uncertainty="noise", random_state=0)
+FUSED = FusedDetector([("any direction", MahalanobisDetector()), ("softening", DirectionalDetector())])
+CASES = {
+    "lags": Case(LagFeatures(3), (BOTH,), TRANSFORMED),
+    "means": Case(ExponentialMeans([3]), (BOTH,), TRANSFORMED),
+    "outliers": Case(HampelFilter(), (BOTH,), TRANSFORMED),
+    "hinges": Case(HingeFeatures(), (T,), TRANSFORMED),
+    "sensors": Case(SensorMeans(), (T,), TRANSFORMED),
+    "gaps": Case(KNNGapImputer(), (BOTH,), TRANSFORMED),
+    "shift": Case(BiasAligner(NOMINAL), (GAPPED,), TRANSFORMED),
+    "scale": Case(BiasAligner(NOMINAL, method="scale"), (GAPPED,), TRANSFORMED),
+    "modes": Case(ModeTracker((NOMINAL, SHAPES)), (F,), tracked),
+    "inverse": Case(LINEAR, (F,), TRANSFORMED),
+    "posterior inverse": Case(PosteriorInverse(TRUSS), (GAPPED,), TRANSFORMED),
+    "mapper": Case(TemperatureMapper(), (T, F / F.mean()), after_fit("predict")),
+    "fleet mapper": Case(FleetMapper(), (T, F / F.mean()), after_fit("predict")),
+    "fleet prior": Case(FleetPrior(), (T[:30], F[:30]), mapped, is_slow=True),
+    "updater": Case(ModelUpdater(TRUSS), (MEASURED,), parameters),
+    "chain": Case(CHAIN, (T, ONE_GAP), after_fit("predict", "predict_parameters"), is_slow=True),
+    "study": Case(STUDY, (T[:40],), rates),
+    "Mahalanobis": Case(MahalanobisDetector(), (F,), DETECTED),
+    "Mahalanobis, gaps": Case(MahalanobisDetector(), (GAPPED,), DETECTED),
+    "softening": Case(DirectionalDetector(), (FEW,), DETECTED, is_slow=True),
+    "directions": Case(DirectionalDetector(TRUSS), (GAPPED,), DETECTED),
+    "novelty": Case(OutlierDetector(OneClassSVM()), (F,), DETECTED),
+    "window": Case(WindowedAlarm(3), (F,), DETECTED),
+    "fused": Case(FUSED, (FEW,), DETECTED, is_slow=True),
+    "compensator by position": Case(BY_POSITION, (BOTH,), TRANSFORMED, is_slow=True),
+    "compensator": Case(COMPENSATOR, (BOTH,), TRANSFORMED, needs_frames=True, is_slow=True),
+    "compensated": Case(COMPENSATED, (BOTH,), after_fit("predict", "score_samples"), needs_frames=True, is_slow=True),
+    "monitor": Case(
+        Monitor(MahalanobisDetector(), targets=list(FEW)), (STAMPED[:60],), evaluated, needs_frames=True, is_slow=True
+    ),
+}
+
+
+def within(table, order="C"):
+    """Values in a part of a larger array."""
+    rows, columns = table.shape
+    larger = np.full((rows + 7, columns + 3), 777.0, order=order)
+    larger[4:-3, 1:-2] = table
+    return larger[4:-3, 1:-2]
+
+
+def framed(values, table):
+    """A frame on these very numbers, with a table's names and index."""
+    return pd.DataFrame(values, table.index, table.columns, copy=False)
+
+
+def from_csv(table):
+    text = table.to_csv()
+    stamps = isinstance(table.index, pd.DatetimeIndex)
+    return pd.read_csv(io.StringIO(text), index_col=0, float_precision="round_trip", parse_dates=stamps)
+
+
+def from_parquet(table):
+    pytest.importorskip("pyarrow")
+    file = io.BytesIO()
+    table.to_parquet(file)
+    return pd.read_parquet(file)
+
+
+def in_polars(table):
+    polars = pytest.importorskip("polars")
+    return polars.DataFrame({name: table[name].to_numpy() for name in table})
+
+
+def in_float32(table):
+    return table.to_numpy().astype(np.float32)
+
+
+ARRAYS = {  # equal to an array in C order
+    "again": lambda table: table.to_numpy().copy(order="C"),
+    "part of a larger array": within,
+    "backwards in memory": lambda table: table.to_numpy()[::-1].copy()[::-1],
+    "Fortran order": lambda table: np.asfortranarray(table.to_numpy()),
+    "lists": lambda table: table.to_numpy().tolist(),
+    "pickled": lambda table: pickle.loads(pickle.dumps(table.to_numpy().copy(order="C"))),
+    "frame": lambda table: framed(table.to_numpy().copy(order="C"), table),
+}
+FRAMES = {  # equal to a frame in C order
+    "again": lambda table: framed(table.to_numpy().copy(order="C"), table),
+    "part of a larger array": lambda table: framed(within(table), table),
+    "Fortran": lambda table: framed(np.asfortranarray(table.to_numpy()), table),
+    "columns of their own": lambda table: pd.DataFrame({name: table[name].copy() for name in table}),
+    "pickled": lambda table: pickle.loads(pickle.dumps(framed(table.to_numpy().copy(order="C"), table))),
+    "CSV": from_csv,
+    "Parquet": from_parquet,
+}
+BY_COLUMNS = ("Fortran order", "Fortran", "columns of their own", "CSV", "Parquet")
+IN_SHORT = {"Fortran order", "lists", "columns of their own", "float32", "polars"}  # of cases that are slow
+LAYOUT = "sums follow the layout of a table in memory, which is not copied to C order first"
+SINGLE = "a table of float32 is not copied to float64 first"
+ADDRESS = "residuals are known by the address of their numbers"
+FAILS = (
+    {(case, form): LAYOUT for case in ("shift", "scale", "chain") for form in BY_COLUMNS}
+    | {(case, "float32"): SINGLE for case in ("means", "gaps", "shift", "scale")}
+    | {("compensator by position", "lists"): "a list of rows is taken for a frame, because it has an attribute index"}
+)
+
+
+def marked(case, form):
+    marks = []
+    if CASES[case].is_slow and form not in IN_SHORT:
+        marks.append(pytest.mark.nightly)
+    if (case, form) in FAILS:
+        marks.append(pytest.mark.xfail(reason=FAILS[case, form], strict=True))
+    return pytest.param(case, form, id=f"{case}, {form}", marks=marks)
+
+
+def each(forms, needs_frames=False):
+    """A test of each case that takes what has no names, or of each in whose settings names may stand."""
+    cases = [name for name, case in CASES.items() if needs_frames or not case.needs_frames]
+    return pytest.mark.parametrize(("case", "form"), [marked(case, form) for case in cases for form in forms])
+
+
+@functools.cache
+def of_arrays(case):
+    return CASES[case].results(ARRAYS["again"])
+
+
+@functools.cache
+def of_frames(case):
+    return CASES[case].results(FRAMES["again"])
+
+
+def assert_same(found, expected, **tolerance):
+    assert found.keys() == expected.keys()
+    for name, values in expected.items():
+        assert not np.isnan(values).all()
+        if tolerance:
+            np.testing.assert_allclose(found[name], values, **tolerance, err_msg=name)
+        else:
+            np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+def test_every_public_estimator_has_a_case():
+    rooms = [importlib.import_module(m.name) for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg]
+    public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
+    classes = {thing for thing in public if isinstance(thing, type) and not inspect.isabstract(thing)}
+    estimators = {thing for thing in classes if issubclass(thing, BaseEstimator)}
+    assert estimators <= {type(case.estimator) for case in CASES.values()} | {TemperatureCompensator}
+
+
+@each(ARRAYS)
+def test_equal_arrays_give_equal_results(case, form):
+    assert_same(CASES[case].results(ARRAYS[form]), of_arrays(case))
+
+
+@each(FRAMES, needs_frames=True)
+def test_equal_frames_give_equal_results(case, form):
+    assert_same(CASES[case].results(FRAMES[form]), of_frames(case))
+
+
+@each(["float32"])
+def test_float32_is_read_as_its_float64_copy(case, form):
+    expected = CASES[case].results(lambda table: in_float32(table).astype(float))
+    assert_same(CASES[case].results(in_float32), expected)
+
+
+@each(["polars"], needs_frames=True)
+def test_polars_frames_give_equal_results(case, form):
+    if case in ("monitor", "modes"):
+        pytest.skip("stamps are pandas'; poles are arrays and pandas frames")
+    assert_same(CASES[case].results(in_polars), of_frames(case), rtol=1e-9)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_another_thread_gives_equal_results(case):
+    found = []
+    thread = threading.Thread(target=lambda: found.append(CASES[case].results(FRAMES["again"])))
+    thread.start()
+    thread.join()
+    assert_same(found[0], of_frames(case))
+
+
+PROGRAM = """
+import pickle, sys, warnings
+warnings.simplefilter("ignore")
+from tests.test_equal_inputs import CASES, FRAMES
+found = {name: case.results(FRAMES["again"]) for name, case in CASES.items()}
+sys.stdout.buffer.write(pickle.dumps(found))
+"""
+
+
+def test_another_process_gives_equal_results():
+    paths = os.pathsep.join([str(ROOT), *filter(None, sys.path)])
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=os.environ | {"PYTHONPATH": paths}, capture_output=True, check=True
+    )
+    found = pickle.loads(done.stdout)
+    for case in CASES:
+        assert_same(found[case], of_frames(case))
+
+
+# Residuals
+
+
+@functools.cache
+def residuals():
+    """Of the records of a fit, and of later ones: what the compensator gives, which may know more than its numbers."""
+    compensator = clone(COMPENSATOR)
+    later = make_truss_campaign(samples_per_year=90, random_state=1)
+    return compensator.fit_transform(BOTH), compensator.transform(later.temperatures.join(later.frequencies))
+
+
+COPIES = {
+    "copied": lambda R: R.copy(),
+    "pickled": lambda R: pickle.loads(pickle.dumps(R)),
+    "CSV": from_csv,
+    "array": lambda R: R.to_numpy(copy=True),
+}
+DETECTORS = {
+    "Mahalanobis": MahalanobisDetector(),
+    "softening": DirectionalDetector(),
+    "directions": DirectionalDetector(TRUSS),
+    "novelty": OutlierDetector(OneClassSVM()),
+    "window": WindowedAlarm(3),
+    "fused": FUSED,
+}
+
+
+def evaluated_residuals(name, form):
+    R, later = (form(table) for table in residuals())
+    detector = clone(DETECTORS[name]).fit(R)
+    scores = {"score": detector.score(later)} if hasattr(detector, "score") else {}
+    return scores | {
+        method: getattr(detector, method)(later) for method in ("predict", "score_samples", "damage_index")
+    }
+
+
+@functools.cache
+def of_residuals(name):
+    return evaluated_residuals(name, lambda R: R)
+
+
+KNOWN = pytest.mark.xfail(reason=ADDRESS, strict=True)
+BY_ADDRESS = {"Mahalanobis", "softening", "directions", "fused"}
+
+
+@pytest.mark.parametrize("form", COPIES)
+@pytest.mark.parametrize("name", [pytest.param(one, marks=[KNOWN] * (one in BY_ADDRESS)) for one in DETECTORS])
+def test_copies_of_residuals_give_equal_results(name, form):
+    assert_same(evaluated_residuals(name, COPIES[form]), of_residuals(name))
+
+
+@KNOWN
+def test_a_step_that_writes_into_residuals_changes_no_result():
+    def indices(copy):
+        step = StandardScaler(with_mean=False, copy=copy)
+        return make_pipeline(clone(COMPENSATOR), step, DirectionalDetector()).fit(BOTH).score_samples(BOTH)
+
+    np.testing.assert_array_equal(indices(copy=False), indices(copy=True))

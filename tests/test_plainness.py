@@ -1,0 +1,100 @@
+"""Equal inputs give equal results: what the source of the ground rooms may not hold, and how much of some things.
+
+``python tools/house.py`` prints the present numbers.
+"""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import skthermo
+from tests.source import (
+    GROUND,
+    constants,
+    constructors_called_of,
+    hidden_state,
+    names_in_two_files,
+    private_imports,
+    trees,
+)
+
+PACKAGE = Path(skthermo.__file__).parent
+WARNS = "_core/warnings.py"  # finds the user's line, and collects the warnings of parts
+STILL = {  # what these files hold until it is replaced; entries only go
+    WARNS: {
+        *("the caller's frames", "filters of warnings"),
+        *("the caller's variables", "context variables", "weak references", "attributes of other objects"),
+    },
+    "_core/answers.py": {"context variables", "addresses of objects"},
+    "_core/matrix_child.py": {"filters of warnings"},
+    "_core/origins.py": {"weak references", "addresses of objects"},
+    "_core/parallel.py": {"context variables"},
+    "surrogate/chain/_stages.py": {"filters of warnings"},
+}
+AT_MOST = {  # numbers only fall
+    "constants": 581,
+    "constructors called of": 38,
+    "names in two files": 87,
+    "tests with private imports": 97,
+}
+
+
+@pytest.fixture(scope="module")
+def ground():
+    return trees(PACKAGE, GROUND)
+
+
+def test_no_state_is_hidden(ground):
+    found = {file: hidden_state(tree) for file, tree in ground.items()}
+    assert not [
+        f"skthermo/{file}:{line}: {what}"
+        for file, uses in found.items()
+        for line, what in uses
+        if what not in STILL.get(file, ())
+    ]
+
+
+@pytest.mark.parametrize(
+    ("code", "what"),
+    [
+        ("frame = sys._getframe(1)", "the caller's frames"),
+        ("given = frame.f_locals['self']", "the caller's variables"),
+        ("from contextvars import ContextVar", "context variables"),
+        ("import weakref", "weak references"),
+        ("kept[id(table)] = answer", "addresses of objects"),
+        ("origins[values.ctypes.data] = unit", "addresses of objects"),
+        ("setattr(table, 'unit', 'Hz')", "attributes of other objects"),
+        ("object.__setattr__(table, 'unit', 'Hz')", "attributes of other objects"),
+        ("vars(jobs)['given'] = kinds", "attributes of other objects"),
+        ("vars(jobs).setdefault('given', set())", "attributes of other objects"),
+        ("with warnings.catch_warnings(): pass", "filters of warnings"),
+    ],
+)
+def test_hidden_state_is_found(code, what):
+    assert hidden_state(ast.parse(code)) == [(1, what)]
+
+
+def test_what_an_object_does_with_itself_is_not_hidden():
+    code = "vars(self).update(state)\nsetattr(self, name, 1)\ntwin = copy(self)\nvars(twin).update(changes)"
+    assert hidden_state(ast.parse(code)) == []
+
+
+def test_few_constants(ground):
+    assert sum(len([*constants(tree, in_tuples=False)]) for tree in ground.values()) <= AT_MOST["constants"]
+
+
+def test_constructors_say_what_they_learn_or_read(ground):
+    found = [file for file, tree in ground.items() for _ in constructors_called_of(tree)]
+    assert len(found) <= AT_MOST["constructors called of"], "\n".join(found)
+
+
+def test_no_two_classes_or_constants_share_a_name(ground):
+    found = names_in_two_files(ground)
+    assert len(found) <= AT_MOST["names in two files"], found
+
+
+def test_few_tests_look_inside():
+    files = sorted(Path(__file__).parent.rglob("*.py"))
+    found = [str(file) for file in files if any(private_imports(ast.parse(file.read_text())))]
+    assert len(found) <= AT_MOST["tests with private imports"], "\n".join(found)
