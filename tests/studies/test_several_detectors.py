@@ -11,6 +11,7 @@ from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
+from skthermo.surrogate.chain._stages import StructureInWeather, ThermalModel
 
 from skthermo.detection import (
     DirectionalDetector,
@@ -23,7 +24,6 @@ from skthermo.detection import (
 from skthermo.fem import AffineModel
 from skthermo.studies import Scenario, compare_extensions, sweep
 from skthermo.surrogate import DataInformedFEM
-from skthermo.surrogate.chain._stages import StructureInWeather, ThermalModel
 from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of
 
 COUNTED = {

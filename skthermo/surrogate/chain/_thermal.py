@@ -176,7 +176,7 @@ class ThermalModel(SavesFrames):
     def learned(self, T: Table) -> Array:
         """Parameters at complete temperatures, as the mapper gives them, within the limits."""
         theta = as_columns(self.mapper.predict(T))
-        return np.where(is_possible(theta), np.clip(theta, *self.limits), theta)
+        return np.where(is_impossible(theta), theta, np.clip(theta, *self.limits))
 
     def doubts(self, weather: Weather) -> list[SkthermoWarning]:
         """Findings: filled sensors, unknown weather, impossible parameters."""
@@ -294,14 +294,14 @@ def limits_in_weather(estimates: Array, *, beyond: float = 0.3) -> Array:
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
     theta = as_columns(theta).copy()
-    impossible = ~(is_possible(theta) | np.isnan(theta)).all(axis=1)
+    impossible = is_impossible(theta).any(axis=1)
     theta[impossible] = np.nan
     return theta, impossible
 
 
-def is_possible(theta: Array) -> NDArray[np.bool_]:
-    """Which multipliers a model can have."""
-    return (POSSIBLE[0] <= theta) & (theta <= POSSIBLE[1])
+def is_impossible(theta: Array) -> NDArray[np.bool_]:
+    """Which multipliers no model can have."""
+    return (theta < POSSIBLE[0]) | (theta > POSSIBLE[1])
 
 
 def factors_of(parameters: Mapping[str, float], names: Sequence[str]) -> Array:

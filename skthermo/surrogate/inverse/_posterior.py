@@ -615,9 +615,9 @@ class PosteriorInverse(FrequencyInverse, Estimator):
             asked = self._taught_by, inputs, self.posterior_, self.n_jobs
             found = remembered(self.memory, inverted, *asked, ignore=["posterior", "n_jobs"])
         findings += doubts_of(found)
-        names = self.get_feature_names_out()
-        tables = {name: frame_like(X, found[name], names) for name in ("theta", "std")}
-        return Bunch(**{**found, **tables, "findings": findings})
+        theta = frame_like(X, found.theta, self.parameter_names_)
+        std = frame_like(X, found.std, self.parameter_names_)
+        return Bunch(**{**found, "theta": theta, "std": std, "findings": findings})
 
     @property
     def n_runs_(self) -> int:
