@@ -164,7 +164,7 @@ class FrequencyEffects:
     healthy: Array
 
     @classmethod
-    def of(cls, fem: Any, theta: Array, F: Array, changes: StructuralChanges) -> "FrequencyEffects":
+    def over_records(cls, fem: Any, theta: Array, F: Array, changes: StructuralChanges) -> "FrequencyEffects":
         """Effects at the parameters of some records; a mode's mean is over those records that have it."""
         known = ~(np.isnan(theta).any(axis=1) | np.isnan(F).all(axis=1))
         present = ~np.isnan(F[known])

@@ -188,7 +188,7 @@ def naming(folder, seeds):
             cases = service.cases(kind)
             of.setdefault(KINDS[kind], []).extend(service.is_named(kind, *case) for case in cases)
             if kind == "offset":
-                sensors = SensorRegression.of(service.baseline[0])
+                sensors = SensorRegression.fitted(service.baseline[0])
                 of.setdefault(SIMPLE, []).extend(is_named_simply(service, sensors, *case) for case in cases)
         number, years = false.get(service.name, (0, 0.0))
         false[service.name] = number + (service.healthy["kind"] != "dead").sum(), years + service.years

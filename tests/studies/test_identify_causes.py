@@ -22,7 +22,7 @@ def differences(function, at, step=1e-4):
 
 def effects_of(fem, changes=CHANGES):
     theta = fem.predict_parameters(WEATHER).to_numpy()
-    return FrequencyEffects.of(fem, theta, fem.predict(WEATHER).to_numpy(), changes)
+    return FrequencyEffects.over_records(fem, theta, fem.predict(WEATHER).to_numpy(), changes)
 
 
 def test_causes_have_plain_names_bounds_and_one_sign():
@@ -59,7 +59,7 @@ def test_means_over_a_year_need_few_rows(fem):
     ratios = np.log(damaged / fem.predict(YEAR)).to_numpy(copy=True)
     F[ratios[:, 1] > np.quantile(ratios[:, 1], 0.1), 1], F[::3, 2], F[:, 4] = np.nan, np.nan, np.nan
     theta[7], ratios[7] = np.nan, np.nan
-    found = FrequencyEffects.of(fem, theta, F, CHANGES)
+    found = FrequencyEffects.over_records(fem, theta, F, CHANGES)
     assert len(found.theta) == 9
     expected = np.nanmean(np.where(np.isnan(F) & ~np.isnan(F).all(axis=0), np.nan, ratios), axis=0)
     amounts = np.array([0.2, 0.1, 0, 0, 0, 0, 0, 0])
@@ -129,7 +129,9 @@ def test_models_without_parameters_for_amounts(fem):
     theta = fem.predict_parameters(WEATHER[:3]).to_numpy()
     records = theta, np.ones((3, 6)), CHANGES
     for found, exact in zip(
-        FrequencyEffects.of(Chain, *records)(AT), FrequencyEffects.of(fem, *records)(AT), strict=True
+        FrequencyEffects.over_records(Chain, *records)(AT),
+        FrequencyEffects.over_records(fem, *records)(AT),
+        strict=True,
     ):
         np.testing.assert_allclose(found, exact, rtol=1e-4, atol=1e-7)
 

@@ -169,7 +169,7 @@ class DailyRecords:
     @classmethod
     def of(cls, fem: Any, T: Any) -> DailyRecords:
         """Learn the weather, and the frequencies in it."""
-        return cls(fem, WeatherFunctions.of(weather(fem, T)), QuadraticFrequencies.of(fem, parameters(fem, T)))
+        return cls(fem, WeatherFunctions.fitted(weather(fem, T)), QuadraticFrequencies.of(fem, parameters(fem, T)))
 
     def means(self, T: Any, F: Any, days: pd.DatetimeIndex, before: float = np.nan) -> DailyMeans:
         """Daily means of records; T may begin with earlier rows than F, which lags need."""
@@ -240,7 +240,7 @@ class GroupEffects:
         if len(members) > 1:
             members[ALL_GROUPS] = list(dict.fromkeys(name for joined in members.values() for name in joined))
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
-        frequencies = FrequencyEffects.of(
+        frequencies = FrequencyEffects.over_records(
             fem, parameters(fem, T), as_floats(F), StructuralChanges.of_damage(fem.model, of_model)
         )
         incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])

@@ -296,7 +296,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             check_takes_weights(mapper)
         stages = Stages(self, 5, X, y)
         with collected(), stages.stage("noise"):
-            self.sensors_ = SensorRegression.of(T)
+            self.sensors_ = SensorRegression.fitted(T)
             filled = frame_like(T, self.sensors_.fill(T)[0])
             self.noise_ = measurement_noise(mapper, filled, usable)
         with collected() as findings, stages.stage("inverse", inverse):
@@ -696,7 +696,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             simulator=simulator,
             aligner=self.aligner_,
             discrepancy=Discrepancy.fitted(regressor, records.inputs, records.usable / modelled, weights, **parts),
-            training_range=TrainingRange.of(inputs, records.trained),
+            training_range=TrainingRange.spanned(inputs, records.trained),
             limits=limits_in_weather(theta),
             parameter_names=self.parameter_names_,
             mode_names=self.mode_names_,
