@@ -244,7 +244,7 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
         self.n_independent_ = independent_records(self.baseline_index_[np.argsort(row_times(X), kind="stable")])
-        self.findings_ += few_records(self.n_independent_, self.contamination)
+        self.findings_ += few_records(self.n_independent_, len(F), self.contamination)
         warn_each(self.findings_)
         return self
 
@@ -312,9 +312,12 @@ def read_columns(F: Array, names: list[Any], findings: list[SkthermoWarning]) ->
     return F / level, table
 
 
-def few_records(n_independent: float, contamination: float) -> list[SkthermoWarning]:
-    """A finding if a baseline has fewer independent records than the rate of false alarms needs."""
-    if n_independent >= 1 / contamination - 1:
+def few_records(n_independent: float, n_records: int, contamination: float) -> list[SkthermoWarning]:
+    """A finding if a baseline has fewer independent records than the rate of false alarms needs.
+
+    Twice the estimate counts, since a dozen parts tell the number within a factor of two.
+    """
+    if min(2 * n_independent, n_records) >= 1 / contamination - 1:
         return []
     return [
         FewRecordsWarning(

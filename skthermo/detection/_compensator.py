@@ -94,9 +94,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     The residual of a frequency is relative, ln f - ln f predicted. Another response, which may be zero or negative, has
     the residual measured minus predicted, in its own unit.
 
-    Where the estimator's ``predict`` takes ``return_std``, the residuals of records whose prediction is less certain
-    than usual in the baseline are divided by sqrt(1 + e / s), with the excess e of its variance and the variance s of
-    the baseline's residuals.
+    Residuals of records whose prediction is less certain than usual in the baseline are divided by sqrt(1 + e / s),
+    with the excess e of its variance and the variance s of the baseline's residuals. A prediction is uncertain where
+    temperatures were filled, and where the estimator's ``predict`` takes ``return_std`` and says so.
 
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design: it predicts each row of the baseline by a clone
     fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than those of new
@@ -344,7 +344,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             residuals = self._difference(Y, predicted)
         self.estimator_, self.scale_ = self.regression_.estimator, robust_deviation(residuals)
         self.usual_deviation_ = median(self._deviations(predicted))
-        residuals = self._shrunk(residuals, predicted)
+        residuals = self._shrunk(residuals, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(residuals).all(axis=1) & ~np.isnan(Y).all(axis=1) & (self.folds_ >= 0)
         told += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
@@ -399,7 +399,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         inputs, findings = self._filled(T)
         findings += marker_findings(pd.DataFrame(as_floats(F), columns=self.get_feature_names_out()))
         with collected():
-            predicted = self.regression_.predict(inputs)
+            predicted = self._with_fills(T, inputs, self.regression_.predict(inputs))
         unknown = np.isnan(predicted[0]).all(axis=1)
         findings += [
             *self.training_range_.doubts(inputs),
@@ -415,6 +415,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         ratio = Y / np.where(predicted > 0, predicted, np.nan)
         relative = np.log(np.maximum(ratio, 1e-6))  # a frequency below zero is no less a fall
         return np.where(self.relative_, relative, Y - predicted)
+
+    def _with_fills(self, T: Any, filled: Any, predicted: Array) -> Array:
+        """Predictions whose standard deviations include the errors of filled inputs, sensor by sensor."""
+        variances = predicted[1] ** 2
+        for error in self.sensors_.errors(T):
+            up, down = (
+                self.regression_.predict(frame_like(filled, as_floats(filled) + side))[0] for side in (error, -error)
+            )
+            variances = variances + np.nan_to_num((up - down) / 2) ** 2
+        return np.stack([predicted[0], np.sqrt(variances)])
 
     def _deviations(self, predicted: Array) -> Array:
         """Standard deviations of predictions, relative for relative residuals."""
