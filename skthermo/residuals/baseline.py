@@ -332,9 +332,10 @@ class BaselineResiduals:
         """The residuals, less the share of each that is as a rule an error that the mapper states."""
         if self.errors is None or not self.errors.any():
             return self.values
-        variances = self.errors[:, :, np.newaxis] ** 2 * np.eye(self.n_modes)
-        own = np.diag(Gaussian.fitted(self.values, variances).covariance)
-        return self.values * np.sqrt(own / (own + self.errors**2))
+        errors = np.where(np.isnan(self.values), np.nan, self.errors**2)
+        variances = means_of_known((self.values - means_of_known(self.values)) ** 2)
+        own = np.maximum(variances - means_of_known(errors), np.finfo(float).tiny)
+        return self.values * np.sqrt(own / (own + errors))
 
     @cached_property
     def _scores(self) -> Array:

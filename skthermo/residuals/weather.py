@@ -479,7 +479,7 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
     """
     if len(temperatures) < 30:
         return
-    T, F = Columns(temperatures, "T"), Columns(frequencies, "f")
+    T, F = TypicalColumns(temperatures, "T"), TypicalColumns(frequencies, "f")
     steady = F.variation[F.variation <= 0.15]
     usual = np.median(steady) if len(steady) else np.min(T.variation, initial=0.15)
     is_temperature = (F.variation >= 5.0 * usual) & (len(steady) > 0 or (T.variation <= 0.15).any())
@@ -509,8 +509,8 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
         )
 
 
-class Columns:
-    """Columns of a table, of rows evenly spread, with their robust statistics."""
+class TypicalColumns:
+    """TypicalColumns of a table, of rows evenly spread, with their robust statistics."""
 
     def __init__(self, table: Table, default: str):
         values = as_floats(table)[spread_evenly(np.arange(len(table)), 2000)]
@@ -522,12 +522,12 @@ class Columns:
     def named(self, chosen: NDArray[np.bool_]) -> list:
         return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
 
-    def reach(self, others: Columns) -> NDArray[np.bool_]:
+    def reach(self, others: TypicalColumns) -> NDArray[np.bool_]:
         """Which others have about the magnitude of some of these."""
         lowest, highest = np.nanmin(self.median) / 10, np.nanmax(self.median) * 10
         return (others.median >= lowest) & (others.median <= highest)
 
-    def nearly(self, others: Columns) -> NDArray[np.bool_]:
+    def nearly(self, others: TypicalColumns) -> NDArray[np.bool_]:
         """Which pairs with others could be temperatures of the same place, (n_columns, n_others)."""
         difference = np.abs(self.median[:, np.newaxis] - others.median)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -13,13 +13,7 @@ from skthermo._core.estimators import check_is_fitted
 from skthermo.fem.damage import as_directions, names_of_groups
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
-NEAR = 1 / 3  # share of the bounds up to which amounts have a reduced model; one for all of them would be large
-BEYOND = 0.02  # margin of what multiplies a column
-AROUND = 0.05  # margin of theta around the weather's, within which a reduced model is accurate
-MOST_AXES = 6  # largest number of directions in which parameters vary with the weather
-SMALLEST = 3e-4  # standard deviation of ln theta along a direction, below which it does not count
-MOST_SOLVED = 5000  # number of rows that are solved together, so that memory stays bounded
-STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
+DIFFERENCE_STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
 
 
 @dataclass(frozen=True)
@@ -61,13 +55,13 @@ class StructuralChanges:
         return np.hstack([theta, further]) * self.factors(amounts)[:, np.newaxis]
 
     def are_near(self, amounts: Array) -> NDArray[np.bool_]:
-        """Which sets of amounts a reduced model covers, (n_sets,)."""
-        return (np.abs(amounts) <= NEAR * np.abs(self.bounds).max(axis=1)).all(axis=1)
+        """Which sets of amounts a reduced model covers, (n_sets,): a third of the bounds, for all would be large."""
+        return (np.abs(amounts) <= 1 / 3 * np.abs(self.bounds).max(axis=1)).all(axis=1)
 
     def near(self) -> Array:
         """Lowest and highest factor of each column by the amounts that a reduced model covers, (n_columns, 2)."""
-        ends = 1 + self.directions * NEAR * self.bounds.T[:, :, np.newaxis]
-        margin = BEYOND * self.directions.any(axis=0)
+        ends = 1 + self.directions / 3 * self.bounds.T[:, :, np.newaxis]
+        margin = 0.02 * self.directions.any(axis=0)
         return np.column_stack([ends.min(axis=0).prod(axis=0) - margin, ends.max(axis=0).prod(axis=0) + margin])
 
     def severities(self, amounts: Array) -> Array:
@@ -132,10 +126,13 @@ class ChangedStructure:
         return is_sparse or hasattr(model, "full") or self.fem.simulator_.reduced is not None
 
     def _around(self, theta: Array) -> Array:
-        """Bounds of the parameters that the chain has learned, which are the same for all records, or of theta too."""
+        """Bounds, with a margin of 5 %, of the parameters that the chain has learned, or of theta too.
+
+        Those that the chain has learned are the same for all records.
+        """
         rows = self.fem.records_.learned
         for _ in range(2):
-            lowest, highest = (1 - AROUND) * np.nanmin(rows, axis=0), (1 + AROUND) * np.nanmax(rows, axis=0)
+            lowest, highest = 0.95 * np.nanmin(rows, axis=0), 1.05 * np.nanmax(rows, axis=0)
             if ((lowest <= theta) & (theta <= highest)).all():
                 break
             rows = np.vstack([rows, theta])
@@ -189,10 +186,11 @@ class FrequencyEffects:
     def __call__(self, amounts: Array) -> tuple[Array, Array]:
         """Change of each mode, (..., n_modes), and its derivatives, (..., n_modes, n_causes), for (..., n_causes).
 
-        Many sets of amounts together take less time than one by one.
+        Many sets of amounts together take less time than one by one; some 5000 rows are solved together, so that memory
+        stays bounded.
         """
         sets = np.atleast_2d(amounts)
-        results = [self._changed(part) for part in np.array_split(sets, 1 + len(sets) * len(self.theta) // MOST_SOLVED)]
+        results = [self._changed(part) for part in np.array_split(sets, 1 + len(sets) * len(self.theta) // 5000)]
         change, slopes = (np.concatenate(arrays) for arrays in zip(*results, strict=True))
         return (change[0], slopes[0]) if np.ndim(amounts) == 1 else (change, slopes)
 
@@ -217,9 +215,9 @@ class FrequencyEffects:
         flat = frequencies.reshape(-1, frequencies.shape[-1])
         lower, middle, higher = (
             as_floats(self.structure.fem.aligner_.inverse_transform(flat * (1 + step))).reshape(frequencies.shape)
-            for step in (-STEP, 0, STEP)
+            for step in (-DIFFERENCE_STEP, 0, DIFFERENCE_STEP)
         )
-        return middle, (higher - lower) / (2 * STEP * middle)
+        return middle, (higher - lower) / (2 * DIFFERENCE_STEP * middle)
 
     def _mean(self, values: Array) -> Array:
         """Mean over rows, the second axis, with each mode's weights."""
@@ -239,7 +237,7 @@ def typical_rows(theta: Array, present: NDArray[np.bool_]) -> tuple[Array, Array
     centre = logs.mean(axis=0)
     _, sizes, axes = np.linalg.svd(logs - centre, full_matrices=False)
     deviations = sizes / np.sqrt(len(logs))
-    n_axes = min(int((deviations > SMALLEST).sum()), MOST_AXES)
+    n_axes = min(int((deviations > 3e-4).sum()), 6)
     axes, steps = axes[:n_axes], np.sqrt(max(n_axes, 3)) * deviations[:n_axes, np.newaxis]
     places = ((logs - centre) @ axes.T).T / steps
     mean, square = places @ shares, places**2 @ shares
@@ -254,8 +252,8 @@ def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
 
 def central_differences(function: Callable[[Array], Array], amounts: Array) -> Array:
     """Derivatives of a function by each amount, along a new last axis."""
-    steps = STEP * np.eye(len(amounts))
-    return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * STEP) for h in steps], axis=-1)
+    steps = DIFFERENCE_STEP * np.eye(len(amounts))
+    return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * DIFFERENCE_STEP) for h in steps], axis=-1)
 
 
 def mean_parameters(fem: Any) -> Array:

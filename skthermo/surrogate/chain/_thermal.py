@@ -39,8 +39,6 @@ from skthermo.residuals.weather import PredictionError, SensorRegression, Traini
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
 from skthermo.surrogate._simulator import Simulator
 
-POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
-
 
 def ratio_regressor() -> TemperatureMapper:
     """What learns ratios of frequencies by default, with a penalty for each mode.
@@ -201,8 +199,8 @@ class ThermalModel(SavesFrames):
         if weather.impossible.any():
             findings.append(
                 ModelWarning(
-                    f"the mapper gave multipliers outside {POSSIBLE[0]:g} to {POSSIBLE[1]:g}. These rows are NaN. Use "
-                    "a mapper that extrapolates mildly, such as the default",
+                    "the mapper gave multipliers outside 1e-06 to 1e+06. These rows are NaN. Use a mapper that "
+                    "extrapolates mildly, such as the default",
                     "impossible-parameters",
                 )
             )
@@ -300,8 +298,8 @@ def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def is_impossible(theta: Array) -> NDArray[np.bool_]:
-    """Which multipliers no model can have."""
-    return (theta < POSSIBLE[0]) | (theta > POSSIBLE[1])
+    """Which multipliers no model can have: those with which rounding errors swamp its matrices."""
+    return (theta < 1e-6) | (theta > 1e6)
 
 
 def factors_of(parameters: Mapping[str, float], names: Sequence[str]) -> Array:

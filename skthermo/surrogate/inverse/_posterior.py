@@ -59,7 +59,6 @@ from skthermo.surrogate.inverse._steps import (
 )
 
 LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the relative noise that records teach
-MOST_STEPS = 100  # of each row
 
 
 @dataclass(frozen=True)
@@ -196,8 +195,8 @@ def least_noise(log_frequencies: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Posterior:
-    """Posterior modes of records, by an FE model or by a surface in its place.
+class ThermalPosterior:
+    """ThermalPosterior modes of records, by an FE model or by a surface in its place.
 
     ``noise`` is that of all observations, frequencies and components of shapes, (n_observations,). Rows start where the
     response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes no steps of its own,
@@ -240,7 +239,7 @@ class Posterior:
         start = np.zeros((n_rows, len(self.prior.own)))
         if self.surface is not None:
             by_surface = replace(objective.without_shapes(), linearise=self.surface.linearise)
-            found = minimise(by_surface, start, MOST_STEPS)
+            found = minimise(by_surface, start)
             if self.is_program:
                 return found
             start = found.local.x
@@ -253,20 +252,20 @@ class Posterior:
     def _refine_block(self, objective: Objective, start: Array, n_jobs: int | None, rows: slice) -> Refined:
         """Refine rows; where the steps of a reduced model end outside its box, the full model takes the last ones."""
         some = objective.some(rows)
-        found = refine(some, start[rows], MOST_STEPS, sorts=not getattr(self.simulator.model, "track", False))
+        found = refine(some, start[rows], sorts=not getattr(self.simulator.model, "track", False))
         if self.simulator.reduced is None:
             return found
         outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
         if outside.size:
             full = self.linearise(Simulator(self.simulator.model), n_jobs)
-            last = minimise(replace(some.some(outside), linearise=full), found.local.x[outside], MOST_STEPS)
+            last = minimise(replace(some.some(outside), linearise=full), found.local.x[outside])
             last.full_solves += last.solves
             last.solves += found.solves[outside]
             found.put(outside, last)
         return found
 
 
-def inverted(taught_by: Any, inputs: Array, posterior: Posterior, n_jobs: int | None) -> Bunch:
+def inverted(taught_by: Any, inputs: Array, posterior: ThermalPosterior, n_jobs: int | None) -> Bunch:
     """What `PosteriorInverse.invert` gives, for rows of inputs; a memory knows a posterior by what has taught it."""
     shape, some = (len(inputs), len(posterior.prior.own)), ~np.isnan(inputs).all(axis=1)
     result = Bunch(
@@ -298,7 +297,7 @@ def inverted(taught_by: Any, inputs: Array, posterior: Posterior, n_jobs: int | 
 
 
 def taught(
-    first: Posterior,
+    first: ThermalPosterior,
     inputs: Array,
     reduce: Reduce,
     learns_prior: bool,
@@ -307,7 +306,7 @@ def taught(
     *,
     n_teaching: int = 300,
     n_passes: int = 4,
-) -> Posterior:
+) -> ThermalPosterior:
     """A posterior with prior and noise as records teach them, and a model or surface that suits these records.
 
     At most ``n_teaching`` records, spread evenly, teach. The model is linearised at its nominal state first, and then
@@ -346,7 +345,7 @@ def taught(
 
 
 def with_runs(
-    posterior: Posterior,
+    posterior: ThermalPosterior,
     x: Array,
     runs: list[tuple[Array, Array]],
     n_jobs: int | None,
@@ -354,7 +353,7 @@ def with_runs(
     fewest: int = 200,
     most: int = 600,
     per_term: int = 3,
-) -> Posterior:
+) -> ThermalPosterior:
     """A posterior with a surface through further runs of a program near some ln theta, ``per_term`` of a cubic one."""
     random, n_parameters = np.random.RandomState(len(runs)), x.shape[1]
     number = int(np.clip(per_term * n_terms(n_parameters, 3), fewest, most))
@@ -407,7 +406,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         ``common`` and ``own`` standard deviations, ``covariance``; ``print(prior_)`` says them in words.
     noise_ : ndarray of shape (n_modes,)
         Relative standard deviations of the frequencies.
-    posterior_ : Posterior
+    posterior_ : ThermalPosterior
         Prior, noise and model by which records are inverted.
     simulator_ : Simulator
         The model and, where it is reduced, its reduced model.
@@ -625,7 +624,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_is_fitted(self)
         return self.posterior_.n_runs
 
-    def _first(self, mode_names: Any) -> Posterior:
+    def _first(self, mode_names: Any) -> ThermalPosterior:
         """What is known before the records: what is stated, and first values of the rest."""
         model, shapes = self.model, self.shape_inputs_
         names = tuple(model.parameter_names)
@@ -637,7 +636,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         noise = stated if shapes is None else np.append(stated, shapes.deviations)
         has_derivatives = hasattr(model, "linearised") or hasattr(model, "jacobian")
         is_program = not (has_derivatives if shapes is None else hasattr(model, "linearised_modes"))
-        return Posterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program)
+        return ThermalPosterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program)
 
     def _read(self, X: ArrayLike) -> Array:
         """Measured columns, with shapes normalised."""
@@ -668,8 +667,8 @@ def doubts_of(found: Bunch, *, many: float = 0.01) -> list[ModelWarning]:
     if unconverged(found).sum() > many * len(found.weight):
         findings.append(
             ModelWarning(
-                f"parameters of many records did not converge in {MOST_STEPS} steps, and are what was reached (invert "
-                "says which). Use a model with track=True where modes cross",
+                "parameters of many records did not converge, and are what was reached in 100 steps (invert says "
+                "which). Use a model with track=True where modes cross",
                 "not-converged",
             )
         )
