@@ -27,8 +27,8 @@ Reduce: TypeAlias = bool | float | Literal["auto"]
 
 
 def real_array(values: Any, what: str, *, any_size: bool = False) -> Array:
-    """An array of floats; complex numbers, sparse matrices and what is no number or, without ``any_size``, too
-    large to be squared, are errors."""
+    """An array of floats; complex numbers, sparse matrices, other values than numbers and, without ``any_size``,
+    numbers too large to be squared are errors."""
     if values is None:
         raise ValueError(f"{what} is None; expected numbers")
     if scipy.sparse.issparse(values):
@@ -56,7 +56,7 @@ def shape_array(values: Any, what: str, *, any_size: bool = False) -> NDArray:
 
 
 def as_floats(values: Any) -> Array:
-    """An array of floats; values that are masked or missing become NaN, and what is no number is an error."""
+    """An array of floats; values that are masked or missing become NaN, and other values than numbers are errors."""
     values = without_mask(values)
     if scipy.sparse.issparse(values):
         raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
@@ -67,7 +67,7 @@ def as_floats(values: Any) -> Array:
     refuse_no_numbers(values)
     array: Any = values if is_pandas else np.asarray(values)
     if any(dtype.kind == "c" for dtype in (dtypes if is_pandas else [array.dtype])):
-        raise ValueError("the values are complex; expected real numbers")
+        raise ValueError("Complex data not supported: the values are complex; expected real numbers")
     try:
         return array.to_numpy(dtype=float, na_value=np.nan) if is_pandas else array.astype(float, copy=False)
     except TypeError:  # pandas' NA in an object array is not a float
@@ -78,7 +78,7 @@ def as_floats(values: Any) -> Array:
     try:
         return np.where(isna(objects), np.nan, objects).astype(float)
     except TypeError as error:
-        raise ValueError(f"the input is {values!r:.100}; expected numbers ({error})") from error
+        raise TypeError(f"the input is {values!r:.100}; expected numbers ({error})") from error
 
 
 def without_mask(values: Any) -> Any:
@@ -247,7 +247,7 @@ def refuse_no_numbers(values: Any, what: str = "the input") -> None:
 
 
 def refuse_no_array(values: Any, what: str, expected: str = "expected an array or a frame of numbers") -> None:
-    """Raise an error for what has no rows to count: no list, no dense array and nothing that becomes one."""
+    """Raise an error for an argument without rows: no list, no dense array and nothing that becomes one."""
     if scipy.sparse.issparse(values):
         raise TypeError(f"{what} is a sparse matrix; expected a dense array of numbers")
     if isinstance(values, type) or not (isinstance(values, list | tuple) or hasattr(values, "__array__")):
@@ -255,12 +255,12 @@ def refuse_no_array(values: Any, what: str, expected: str = "expected an array o
 
 
 def refuse_no_table(values: Any, what: str, *, or_vector: bool = False) -> None:
-    """Raise an error for what is no dense table of real numbers, (n_samples, n_columns), or has columns whose names are
-    not all text or all numbers; a vector may stand for a table of one column."""
+    """Raise an error for an argument that is no dense table of real numbers, (n_samples, n_columns), or has columns
+    whose names are not all text or all numbers; a vector may stand for a table of one column."""
     expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
     refuse_no_array(values, what, expected)
     refuse_no_numbers(values, what)
-    shape = np.shape(values)
+    shape = values.shape if hasattr(values, "shape") else np.asarray(values).shape
     if len(shape) != 2 and not (len(shape) == 1 and or_vector):
         if hasattr(values, "iloc"):
             raise ValueError(f"{what} is a Series, {values.name!r}; expected a frame, as {what}.to_frame() gives")
@@ -424,13 +424,13 @@ def check_flag(flag: Any, what: str) -> bool:
 
 
 def check_jobs(n_jobs: Any) -> None:
-    """Raise an error for what is no number of joblib's jobs."""
+    """Raise an error unless this is a number of joblib's jobs."""
     if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
         raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
 
 
 def check_names(names: Any, what: str, known: Iterable[Any] | None = None) -> list[str]:
-    """Different names as a list, some of those that are known; one text in place of several is an error."""
+    """Different names, all of them known, as a list; one text in place of several is an error."""
     given = names if isinstance(names, str | bytes | type) or not isinstance(names, Iterable) else list(names)
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise ValueError(f"{what} is {names!r:.100}; expected a list of names, such as ['deck']")

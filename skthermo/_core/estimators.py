@@ -51,7 +51,7 @@ if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit a
     def _fit_context(*, prefer_skip_nested_validation: bool) -> Callable[[Method], Method]: ...
 
     class TransformerMixin:
-        """Transformers of which frames give frames, and arrays give arrays."""
+        """Transformers that give frames for frames, and arrays for arrays."""
 
         @overload
         def fit_transform(self, X: pd.DataFrame, y: Any = None) -> pd.DataFrame: ...
@@ -71,7 +71,7 @@ except ImportError:
 
 
 class Estimator(BaseEstimator):
-    """Base of estimators that accept NaN in X, and of which clones share FE models."""
+    """Base of estimators that accept NaN in X, and whose clones share FE models."""
 
     def _validate_params(self) -> None:
         if isinstance(getattr(self, "random_state", None), bool):

@@ -145,7 +145,7 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
 
 
 def row_weights(sample_weight: Any, X: Any) -> Array | None:
-    """A weight for each row of X, or None; those of a series are matched to the rows of a frame by index."""
+    """A weight for each row of X, or None; weights in a series are matched to the rows of a frame by index."""
     if sample_weight is None:
         return None
     n_rows = _num_samples(X)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 class SavesFrames:
-    """Objects of which files hold tables in place of frames; reading a file makes them frames again."""
+    """Objects whose files hold tables in place of frames; reading a file makes them frames again."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: to_saved(value) for name, value in super().__getstate__().items()}

@@ -106,7 +106,8 @@ def duration_text(wait: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it: times as texts of ISO 8601, durations in seconds, None for what is not finite."""
+    """A value as JSON has it: times as texts of ISO 8601, durations in seconds, None for numbers that are not
+    finite."""
     if isinstance(value, Mapping):
         return {str(name): plain(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
@@ -130,7 +131,7 @@ def period_text(index: pd.Index | None) -> str:
 
 
 class Sentences(ABC):
-    """What a result says: an answer, what is not known, and remarks."""
+    """A result in sentences: an answer, open questions, and remarks."""
 
     @abstractmethod
     def _answer(self) -> Iterator[str]: ...
@@ -142,17 +143,17 @@ class Sentences(ABC):
         yield from ()
 
     def answer(self) -> list[str]:
-        """What was found, and how surely.
+        """The answer, and how certain it is.
 
         Returns
         -------
         list of str
-            Sentences. The first says what is most probable.
+            Sentences. The first has the most probable answer.
         """
         return list(self._answer())
 
     def limits(self) -> list[str]:
-        """What is not known.
+        """Open questions.
 
         Returns
         -------
@@ -162,7 +163,7 @@ class Sentences(ABC):
         return list(self._limits())
 
     def summary(self) -> str:
-        """What was found, and what is not known.
+        """Answer, open questions and remarks.
 
         Returns
         -------

@@ -455,7 +455,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"constant"})
         responses = set_aside(frequencies=named_F, unit="", needs_all=True)
         findings = [*inputs.others.warnings(), *responses.others.warnings(), *misplaced_columns(named_T, named_F)]
-        return frame_like(T, as_floats(inputs.frequencies)), frame_like(F, as_floats(responses.frequencies)), findings
+        cleaned = (np.ascontiguousarray(as_floats(found.frequencies)) for found in (inputs, responses))
+        T, F = (frame_like(table, values) for table, values in zip((T, F), cleaned, strict=True))
+        return T, F, findings
 
     def _split(self, X: Any) -> tuple[Any, Any]:
         """Inputs and targets of new records."""
@@ -473,7 +475,8 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     """The other columns and the targets, as frames if X is one."""
     columns = np.asarray(getattr(X, "columns", range(values.shape[1])), dtype=object)
     others = np.delete(np.arange(len(columns)), targets)
-    return frame_like(X, values[:, others], columns[others]), frame_like(X, values[:, targets], columns[targets])
+    T, F = (frame_like(X, np.ascontiguousarray(values[:, some]), columns[some]) for some in (others, targets))
+    return T, F
 
 
 def as_findings(category: type[SkthermoWarning], text: str, kind: str) -> list[SkthermoWarning]:

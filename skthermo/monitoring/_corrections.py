@@ -82,7 +82,7 @@ class Corrections:
         sensors: bool = True,
     ) -> Corrections:
         """Learned from a raw baseline; drift is followed where there is a chain."""
-        plausible = Plausible.of(baseline, targets)
+        plausible = Plausible.learned(baseline, targets)
         cleaned = baseline.mask(plausible.implausible(baseline.to_numpy()))
         T, F = cleaned.drop(columns=targets), cleaned[targets]
         watch = SensorWatch.of(T, F, reference=reference, units=units) if sensors else None

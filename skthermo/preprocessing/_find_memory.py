@@ -28,7 +28,7 @@ TIME_CONSTANTS = ("3h", "12h", "2D", "5D", "10D", "20D", "40D", "60D")
 
 @dataclass(frozen=True, repr=False)
 class MemoryFindings(SavesFrames):
-    """What `find_memory` has found.
+    """Result of `find_memory`.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class MemoryFindings(SavesFrames):
     fall: float
 
     def summary(self) -> str:
-        """What was found, in a sentence.
+        """The result in a sentence.
 
         Returns
         -------
@@ -141,7 +141,7 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     first = {name: columns[0] for name, columns in columns_by_sensor(temperatures).items()}
     T, F = T[np.ix_(order, list(first.values()))], F[order]
     is_known = ~np.isnan(F) & ~np.isnan(T).all(axis=1)[:, np.newaxis]
-    is_scarce = is_known.sum(axis=0) < 100  # modes that say nothing
+    is_scarce = is_known.sum(axis=0) < 100  # too few values to count
     F = np.where(is_scarce & ~is_scarce.all(), np.nan, F)
     usable = np.flatnonzero(is_known[:, ~is_scarce | is_scarce.all()].any(axis=1))
     if len(usable) < 100:
@@ -181,8 +181,8 @@ class MemorySearch:
                 self.means[i] = list(tried)
 
     def distances(self, known: Sequence[Any], tried: Sequence[Any] = ()) -> Array:
-        """Distances from predictions out of fold by known blocks, and by these with each of those that are tried:
-        (n_rows, 1 + n_tried, n_modes), relative to the scale of the mode."""
+        """Distances from predictions out of fold by known blocks, and by these with each block that is tried: (n_rows,
+        1 + n_tried, n_modes), relative to the scale of the mode."""
         widths = [self.blocks[key].shape[1] for key in (*known, *tried)]
         columns = np.split(np.arange(sum(widths)), np.cumsum(widths)[:-1])
         base = np.concatenate(columns[: len(known)])

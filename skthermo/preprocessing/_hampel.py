@@ -28,8 +28,9 @@ from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_n
 class HampelFilter(RecordTransformer):
     """NaN in place of values that are far from the median of their neighbours in time.
 
-    With ``targets``, the other columns are the weather, and what it explains of the targets is subtracted before values
-    are compared with their neighbours. A frost night then is no outlier, and neither is damage, which stays.
+    With ``targets``, the other columns are the weather. A regression on the weather is subtracted from the targets
+    before values are compared with their neighbours. A frost night then is no outlier, and neither is damage, which
+    stays.
 
     Parameters
     ----------
@@ -37,8 +38,8 @@ class HampelFilter(RecordTransformer):
         Neighbours of a value, half of them before it: a number of rows or, for frames on a ``DatetimeIndex``, a
         duration such as "1D".
     n_deviations : float, default=5.0
-        Number of standard deviations beyond which a value is removed. They are estimated by medians of distances, those
-        of the neighbours or of all records, whichever is larger.
+        Number of standard deviations beyond which a value is removed. The standard deviation is estimated by the median
+        distance of the neighbours or of all records, whichever is larger.
     targets : sequence of str or sequence of int, optional
         Names of the frequency columns in a frame, or their positions counted from 0. The other columns, temperatures,
         stay as they are. By default all columns are filtered, each by itself.
@@ -53,7 +54,7 @@ class HampelFilter(RecordTransformer):
     targets_ : ndarray of int
         Positions of the columns that are filtered.
     regression_ : object or None
-        What the weather explains of the targets, piecewise-linear in it.
+        The targets as piecewise-linear functions of the weather; None without targets.
     n_features_in_, feature_names_in_ : int, ndarray of str
         Number of columns and, where `fit` saw a frame with such, their names.
 

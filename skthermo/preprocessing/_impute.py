@@ -74,8 +74,8 @@ class KNNGapImputer(KNNImputer):
 
     Notes
     -----
-    The results are those of ``KNNImputer``, in a time that grows as n log n, not as n squared. ``KNNImputer`` itself
-    does the work for few rows, for very many different patterns of missing columns, for another metric, and for other
+    The results equal ``KNNImputer``'s, in a time that grows as n log n, not as n squared. ``KNNImputer`` itself does
+    the work for few rows, for very many different patterns of missing columns, for another metric, and for other
     ``missing_values`` than NaN. Where several rows are equally far away, the two may choose different neighbours; with
     ``weights="distance"`` the ninth digit can differ.
 
@@ -205,7 +205,7 @@ class KNNGapImputer(KNNImputer):
         return mean
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the columns: those of the input, then those of ``add_indicator``.
+        """Names of the columns: the input's names, then the names of the indicators.
 
         Parameters
         ----------

@@ -45,15 +45,15 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         ``frequencies``, ``shapes`` and, optionally, ``sensors``, names by which the sensors of the records are chosen.
         Where shapes are None, frequency alone decides. If frequencies are a Series, its index names the modes.
     max_shift : float, default=0.15
-        Largest relative difference of a pole's frequency from that of its mode.
+        Largest relative difference of a pole's frequency from its mode's frequency.
     min_mac : float, default=0.8
-        Lowest modal assurance criterion (MAC) [AB82]_ of a pole's shape and that of its mode.
+        Lowest modal assurance criterion (MAC) [AB82]_ of a pole's shape and its mode's shape.
     follow : float, str, timedelta or None, default=None
-        Time constant with which exponential means of the assigned frequencies replace those of the reference: a number
-        of records, or a duration such as "30D" for records on a DatetimeIndex. None keeps the reference. Shapes are
-        always compared with those of the reference.
+        Time constant of exponential means of the assigned frequencies, which replace the reference's frequencies: a
+        number of records, or a duration such as "30D" for records on a DatetimeIndex. None keeps the reference. Shapes
+        are always compared with the reference's shapes.
     max_drift : float, default=0.3
-        Largest relative difference of a followed frequency from that of the reference.
+        Largest relative difference of a followed frequency from the reference's frequency.
     close : float, default=0.02
         Reference modes closer than this share of their frequency count as close modes, whose shapes may mix:
         ``min_mac`` then applies to the MAC of a pole with the space that their shapes span.
@@ -73,18 +73,18 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
 
     See Also
     --------
-    skthermo.fem.match_modes : Pairs measured modes with those of an FE model.
+    skthermo.fem.match_modes : Pairs measured modes with the modes of an FE model.
 
     Notes
     -----
     A pole is a candidate for a mode if both tolerances hold. Candidates are assigned one-to-one in every record, at the
     lowest sum of ``(1 - MAC) / (1 - min_mac) + |f / f_reference - 1| / max_shift``; a mode without a pole costs 3, more
-    than any candidate. For close modes, the MAC in this sum is that with their space, and what the mode's own MAC is
-    lower is added. NaN components of a shape, from sensors that failed, are left out of its MAC.
+    than any candidate. For close modes, the MAC in this sum is the pole's MAC with their space, and the amount by which
+    the mode's own MAC is lower is added. NaN components of a shape, from sensors that failed, are left out of its MAC.
 
     With ``follow``, records are taken in the order of time, and every call of `transform` starts at the reference. A
     mode that is missing keeps its mean. :doc:`/guide/modes` says how to set the tolerances. The tracker comes before a
-    pipeline, not into it: its ``frequencies`` are what the other estimators take.
+    pipeline, not into it: the other estimators take its ``frequencies``.
 
     Examples
     --------

@@ -105,7 +105,7 @@ class LagFeatures(PastFeatures):
     tolerance : str or timedelta, optional
         How much older than t - k freq the record for lag k may be. By default 6 freq.
     padding : {"edge", "nan"}, default="edge"
-        Values before the first record: those of the first record, or NaN.
+        Values before the first record: the values of the first record, or NaN.
 
     Attributes
     ----------
@@ -124,8 +124,7 @@ class LagFeatures(PastFeatures):
     lookback_ : int or numpy.timedelta64
         How far back the longest lag looks: a number of rows, or a time on a DatetimeIndex, the tolerance included.
     first_rows_ : ndarray
-        First records of `fit`: the padding of records that begin with them is known from `fit`, and no warning says so
-        again.
+        First records of `fit`. New records that begin with them are padded without a warning.
     n_features_in_, feature_names_in_ : int, ndarray of str
         Number of sensors and, where `fit` saw a frame with such, their names.
 
@@ -345,7 +344,7 @@ class ExponentialMeans(PastFeatures):
     time_zone_ : str or None
         Time zone of the stamps.
     first_row_ : ndarray of shape (n_sensors,)
-        Earliest record of `fit`: means of records that begin with it have no past, and no warning says so again.
+        Earliest record of `fit`. Means of new records that begin with it have no past, and give no warning.
     lookback_ : int or numpy.timedelta64
         How far back means look: a number of rows, or a time on a DatetimeIndex.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -358,8 +357,8 @@ class ExponentialMeans(PastFeatures):
 
     Notes
     -----
-    The mean of a record at time t is that of the known values at s with weights exp(-(t - s) / time constant), for t -
-    s up to four time constants, the record's own value included. Near the first record it is the mean of what is known.
+    The mean of a record at time t has weights exp(-(t - s) / time constant) for the known values at times s from four
+    time constants before t up to t itself. Near the first record it is the mean of the known values.
     Missing values have no weight, and a mean is NaN only where no value is known. Records of `fit` and of `transform`
     count together, as in `LagFeatures`. There is a warning if more than half of the rows have no record that is older
     than the longest time constant, and do not begin as the records of `fit` do.

@@ -178,7 +178,7 @@ class ReferenceModes(NamedTuple):
     sensors: list | None
 
     def close_groups(self, close: float) -> list[NDArray[np.intp]]:
-        """Groups of modes, in each of which neighbours in frequency are no farther apart than a share of it."""
+        """Groups of modes whose neighbours in frequency are no farther apart than a share of it."""
         order = np.argsort(self.frequencies)
         steps = np.diff(self.frequencies[order]) > close * self.frequencies[order][1:]
         return np.split(order, np.flatnonzero(steps) + 1)

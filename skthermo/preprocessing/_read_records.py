@@ -30,11 +30,11 @@ def read_records(
     Parameters
     ----------
     *files : str or Path
-        One file with all columns, or those of temperatures first and those of frequencies second. Files with the same
-        columns follow each other; others are joined by their stamps.
+        One file with all columns, or a file of temperatures and then a file of frequencies. Files with the same columns
+        follow each other; others are joined by their stamps.
     temperatures, responses : sequence of str, optional
-        Names of the columns. By default those of the first and of the second of two files, else as names and units
-        tell.
+        Names of the columns. By default, the columns of the first of two files are temperatures and the columns of the
+        second are responses; names and units decide in one file.
     zone : str, optional
         Time zone of the logger's clock, such as "Europe/Brussels". By default stamps have no time zone, and those with
         an offset are in UTC.

@@ -1,4 +1,4 @@
-"""Transformers of records: what they share, and those that treat each row for itself."""
+"""Transformers of records: their base, and transformers that treat each row for itself."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RecordTransformer(TransformerMixin, Estimator):
 
     @_fit_context(prefer_skip_nested_validation=True)
     def fit(self, X: ArrayLike, y: None = None) -> Self:
-        """Learn from records what `transform` needs of them.
+        """Learn from records.
 
         Parameters
         ----------
@@ -49,8 +49,8 @@ class RecordTransformer(TransformerMixin, Estimator):
         Raises
         ------
         ValueError
-            If X holds what is no number, or has not what a parameter asks for, such as stamps, each once, for a
-            duration.
+            If X holds other values than numbers, or lacks an index that a parameter asks for, such as stamps, each
+            once, for a duration.
         """
         self._learn(X, self._validated(X, reset=True))
         return self
@@ -60,7 +60,7 @@ class RecordTransformer(TransformerMixin, Estimator):
     @overload
     def transform(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def transform(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """What the class says, for each record.
+        """Transform each record as the class describes.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class RecordTransformer(TransformerMixin, Estimator):
 
     @abstractmethod
     def _learn(self, X: Table, values: NDArray) -> None:
-        """What `fit` learns from X and its checked values."""
+        """Learn from X and its checked values."""
 
     @abstractmethod
     def _transformed(self, X: Table, values: NDArray) -> Table:
@@ -120,7 +120,7 @@ class HingeFeatures(RecordTransformer):
 
     Frequencies are piecewise-linear in temperature: a bridge that freezes has a kink at 0 °C. Beyond the data the lines
     go on straight. By linear regression, scikit-learn's ``SplineTransformer(degree=1, extrapolation="linear")`` gives
-    the same lines. Hinges do what it cannot: missing values pass through, and ridge regression penalises changes of
+    the same lines. Beyond it, hinges pass missing values through, and ridge regression on them penalises changes of
     slope rather than values.
 
     Parameters
@@ -246,7 +246,7 @@ class SensorMeans(RecordTransformer):
 
     See Also
     --------
-    LagFeatures : What the means were some time ago.
+    LagFeatures : Earlier values of the means.
 
     Notes
     -----

@@ -19,9 +19,9 @@ from skthermo._core.frames import Table, check_duration, has_stamps, row_times
 class BlockedKFold(BaseCrossValidator):
     """Folds of blocks of time, dealt in turn: the first block to the first fold, the second to the second, and so on.
 
-    Each fold then holds records of all seasons that there are, and so do the records that it is predicted from. With
-    ``KFold``, whose folds are long periods, the records of a fold are predicted from other seasons, and with random
-    folds from their neighbours in time, which are nearly the same records.
+    Each fold then holds records of all seasons, and so do its training records. The folds of ``KFold`` are long
+    periods, whose records are predicted from other seasons. Records of random folds are predicted from their neighbours
+    in time, which are nearly the same records.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class BlockedKFold(BaseCrossValidator):
         Number of folds, at least 2.
     block : int or duration, optional
         Length of a block: a number of rows or, for frames on a ``DatetimeIndex``, a duration such as "7D". It should be
-        several times as long as records remember what was before them. By default a week on a ``DatetimeIndex``, else
+        several times as long as the correlation of successive records. By default a week on a ``DatetimeIndex``, else
         a 52nd of the rows; shorter where the records are fewer than a block for each fold.
 
     See Also
@@ -168,7 +168,7 @@ Rows = NDArray[np.intp]
 
 
 def out_of_fold(learn: Callable[[Rows], Callable[[Rows], ArrayLike]], folds: Rows | list[tuple[Rows, Rows]]) -> Array:
-    """Value of each row, by what was learned from other rows.
+    """Value of each row, predicted by a model of other rows.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from skthermo._core.estimators import check_is_fitted
 from skthermo.fem.damage import as_directions, names_of_groups
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
-DIFFERENCE_STEP = 1e-3  # step of differences in amounts, for models without parameters for them, and in ln frequency
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,7 @@ class StructuralChanges:
     directions: Array
     bounds: Array
     masses: Mapping[str, Matrix] = field(default_factory=dict, repr=False)
+    near_share: float = 1 / 3  # of the bounds, up to which amounts have a reduced model; one for all would be large
 
     @classmethod
     def of_damage(cls, model: Any, groups: Sequence[str]) -> "StructuralChanges":
@@ -55,12 +56,12 @@ class StructuralChanges:
         return np.hstack([theta, further]) * self.factors(amounts)[:, np.newaxis]
 
     def are_near(self, amounts: Array) -> NDArray[np.bool_]:
-        """Which sets of amounts a reduced model covers, (n_sets,): a third of the bounds, for all would be large."""
-        return (np.abs(amounts) <= 1 / 3 * np.abs(self.bounds).max(axis=1)).all(axis=1)
+        """Which sets of amounts a reduced model covers, (n_sets,)."""
+        return (np.abs(amounts) <= self.near_share * np.abs(self.bounds).max(axis=1)).all(axis=1)
 
     def near(self) -> Array:
         """Lowest and highest factor of each column by the amounts that a reduced model covers, (n_columns, 2)."""
-        ends = 1 + self.directions / 3 * self.bounds.T[:, :, np.newaxis]
+        ends = 1 + self.directions * self.near_share * self.bounds.T[:, :, np.newaxis]
         margin = 0.02 * self.directions.any(axis=0)
         return np.column_stack([ends.min(axis=0).prod(axis=0) - margin, ends.max(axis=0).prod(axis=0) + margin])
 
@@ -73,12 +74,12 @@ class StructuralChanges:
 class ChangedStructure:
     """A fitted chain's model with further columns of theta for the amounts of changes.
 
-    Simulators are kept, one for large amounts and one for those that a reduced model covers.
+    For small amounts it has a reduced model, which also covers the rows of theta ``around`` which it will be asked.
     """
 
     fem: Any
     changes: StructuralChanges
-    simulators: dict[bool, Any] = field(default_factory=dict, repr=False)
+    around: Array = field(repr=False)
 
     @property
     def is_exact(self) -> bool:
@@ -98,7 +99,7 @@ class ChangedStructure:
         for near in np.unique(are_near):
             own = are_near == near
             flat = rows[own].reshape(-1, rows.shape[2])
-            solved = self._simulator(bool(near), theta).linearise(flat, self.fem.n_jobs, dofs, relative=True)
+            solved = (self._near if near else self._anywhere).linearise(flat, self.fem.n_jobs, dofs, relative=True)
             results = results or [np.empty((*rows.shape[:2], *array.shape[1:])) for array in solved]
             for result, array in zip(results, solved, strict=True):
                 result[own] = array.reshape(-1, *result.shape[1:])
@@ -125,29 +126,30 @@ class ChangedStructure:
         is_sparse = getattr(model, "prefer", "threads") == "processes" and hasattr(model, "reduced")
         return is_sparse or hasattr(model, "full") or self.fem.simulator_.reduced is not None
 
-    def _around(self, theta: Array) -> Array:
-        """Bounds, with a margin of 5 %, of the parameters that the chain has learned, or of theta too.
+    @cached_property
+    def _anywhere(self) -> Any:
+        """The simulator that has the amounts as further columns of theta."""
+        return self.fem.simulator_.with_columns(self.changes.groups, self.changes.masses, None)
 
-        Those that the chain has learned are the same for all records.
-        """
+    @cached_property
+    def _near(self) -> Any:
+        """The same, with a reduced model for small amounts."""
+        box = self.fem.simulator_.box
+        if box is None:
+            box = self._bounds()
+        n_amounts = len(self.changes.groups) + len(self.changes.masses)
+        box = np.vstack([box, np.ones((n_amounts, 2))]) * self.changes.near()
+        return self.fem.simulator_.with_columns(self.changes.groups, self.changes.masses, box)
+
+    def _bounds(self) -> Array:
+        """Bounds of the parameters that the chain has learned, or of those ``around`` too, with a margin of 5 %."""
         rows = self.fem.records_.learned
         for _ in range(2):
             lowest, highest = 0.95 * np.nanmin(rows, axis=0), 1.05 * np.nanmax(rows, axis=0)
-            if ((lowest <= theta) & (theta <= highest)).all():
+            if ((lowest <= self.around) & (self.around <= highest)).all():
                 break
-            rows = np.vstack([rows, theta])
+            rows = np.vstack([rows, self.around])
         return np.column_stack([lowest, highest])
-
-    def _simulator(self, near: bool, theta: Array) -> Any:
-        """The simulator that has the amounts as further columns of theta, around some rows of it."""
-        if near not in self.simulators:
-            groups, masses, simulator = self.changes.groups, self.changes.masses, self.fem.simulator_
-            box = simulator.box
-            if box is None:
-                box = self._around(theta)
-            box = np.vstack([box, np.ones((len(groups) + len(masses), 2))]) * self.changes.near()
-            self.simulators[near] = simulator.with_columns(groups, masses, box if near else None)
-        return self.simulators[near]
 
 
 @dataclass(frozen=True)
@@ -161,12 +163,12 @@ class FrequencyEffects:
     healthy: Array
 
     @classmethod
-    def over_records(cls, fem: Any, theta: Array, F: Array, changes: StructuralChanges) -> "FrequencyEffects":
+    def averaged(cls, fem: Any, theta: Array, F: Array, changes: StructuralChanges) -> "FrequencyEffects":
         """Effects at the parameters of some records; a mode's mean is over those records that have it."""
         known = ~(np.isnan(theta).any(axis=1) | np.isnan(F).all(axis=1))
         present = ~np.isnan(F[known])
         few, weights = typical_rows(theta[known], np.where(present.any(axis=0), present, True))
-        return cls.at(ChangedStructure(fem, changes), few, weights)
+        return cls.at(ChangedStructure(fem, changes, few), few, weights)
 
     @classmethod
     def at(cls, structure: ChangedStructure, theta: Array, weights: Array) -> "FrequencyEffects":
@@ -186,8 +188,7 @@ class FrequencyEffects:
     def __call__(self, amounts: Array) -> tuple[Array, Array]:
         """Change of each mode, (..., n_modes), and its derivatives, (..., n_modes, n_causes), for (..., n_causes).
 
-        Many sets of amounts together take less time than one by one; some 5000 rows are solved together, so that memory
-        stays bounded.
+        Many sets of amounts together take less time than one by one.
         """
         sets = np.atleast_2d(amounts)
         results = [self._changed(part) for part in np.array_split(sets, 1 + len(sets) * len(self.theta) // 5000)]
@@ -207,7 +208,7 @@ class FrequencyEffects:
             return simulator.frequencies(rows, self.structure.fem.n_jobs)
 
         frequencies = np.stack([at(amounts) for amounts in sets])
-        slopes = np.stack([central_differences(at, amounts) for amounts in sets])
+        slopes = np.stack([amount_slopes(at, amounts) for amounts in sets])
         return [frequencies, slopes / frequencies[..., np.newaxis]]
 
     def _measured(self, frequencies: Array) -> tuple[Array, Array]:
@@ -215,9 +216,9 @@ class FrequencyEffects:
         flat = frequencies.reshape(-1, frequencies.shape[-1])
         lower, middle, higher = (
             as_floats(self.structure.fem.aligner_.inverse_transform(flat * (1 + step))).reshape(frequencies.shape)
-            for step in (-DIFFERENCE_STEP, 0, DIFFERENCE_STEP)
+            for step in (-0.001, 0, 0.001)
         )
-        return middle, (higher - lower) / (2 * DIFFERENCE_STEP * middle)
+        return middle, (higher - lower) / (0.002 * middle)
 
     def _mean(self, values: Array) -> Array:
         """Mean over rows, the second axis, with each mode's weights."""
@@ -245,26 +246,22 @@ def typical_rows(theta: Array, present: NDArray[np.bool_]) -> tuple[Array, Array
     return np.exp(rows), np.vstack([1 - square.sum(axis=0), (square + mean) / 2, (square - mean) / 2])
 
 
-def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
+def healthy_frequencies(fem: Any, theta: Array) -> Array:
     """Frequencies of the undamaged model in the measured domain, without discrepancy, in Hz, (n_rows, n_modes)."""
     return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs)))
 
 
-def central_differences(function: Callable[[Array], Array], amounts: Array) -> Array:
-    """Derivatives of a function by each amount, along a new last axis."""
-    steps = DIFFERENCE_STEP * np.eye(len(amounts))
-    return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * DIFFERENCE_STEP) for h in steps], axis=-1)
-
-
-def mean_parameters(fem: Any) -> Array:
-    """Mean of the parameters of the records of a fitted chain, (1, n_parameters)."""
-    return np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
+def amount_slopes(function: Callable[[Array], Array], amounts: Array, step: float = 1e-3) -> Array:
+    """Central differences of a function by each amount, along a new last axis."""
+    steps = step * np.eye(len(amounts))
+    return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * step) for h in steps], axis=-1)
 
 
 def damage_directions(fem: Any, groups: Sequence[str] | None = None) -> pd.DataFrame:
     """Directions of a fitted chain, at the mean of its parameters, in the measured domain."""
     check_is_fitted(fem)
     names = names_of_groups(fem.model, groups)
-    structure = ChangedStructure(fem, StructuralChanges.of_damage(fem.model, names))
-    effects = FrequencyEffects.at(structure, mean_parameters(fem), np.ones((1, len(fem.mode_names_))))
+    mean = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
+    structure = ChangedStructure(fem, StructuralChanges.of_damage(fem.model, names), mean)
+    effects = FrequencyEffects.at(structure, mean, np.ones((1, len(fem.mode_names_))))
     return as_directions(effects(np.zeros(len(names)))[1].T, names, fem.mode_names_)

@@ -159,12 +159,6 @@ def _per_mode(values: ArrayLike, names: list[str], what: str) -> Array:
     return np.broadcast_to(array, (n_modes,)).copy()
 
 
-DIFFERENCE_STEP = 1e-3  # relative step of central differences for a model without ``jacobian``
-NOMINAL_SHARE = 0.25
-"""Weight of the MAC with the nominal modes beside the MAC with the measured shapes. It decides where sensors are so few
-that several modes look the same at them."""
-
-
 @dataclass
 class PairedModes:
     """The model's modes at one theta, one for each measured mode and in their order."""
@@ -219,7 +213,7 @@ def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
         elif hasattr(model, "jacobian"):
             slopes = model.jacobian(row)
         else:
-            slopes = central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
+            slopes = central_differences(frequencies_at, row, frequencies, 1e-3)
         return slopes[0, measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
     frequencies, exact = model.linearised(row) if hasattr(model, "linearised") else (frequencies_at(row), None)
@@ -229,7 +223,8 @@ def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
 def _by_shape(model: Any, measured: Measured, theta: Array) -> PairedModes:
     modes = model.local_modes(theta)
     shapes = modes.shapes(measured.dofs)
-    mac_sums = NOMINAL_SHARE * modes.nominal_mac[measured.columns]
+    # The MAC with the nominal modes decides where sensors are so few that several modes look the same at them.
+    mac_sums = 0.25 * modes.nominal_mac[measured.columns]
     with_shape = measured.has_shape
     mac_sums[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
     ranks = linear_sum_assignment(np.nan_to_num(mac_sums), maximize=True)[1]
@@ -351,9 +346,6 @@ class Point:
         )
 
 
-TOLERANCE = 1e-9  # relative change of the objective and of theta below which a start has converged
-
-
 class Outcome(NamedTuple):
     """The result of one start; ``n_failed`` of its evaluations met theta without modes."""
 
@@ -394,8 +386,10 @@ class NoDerivatives(Exception):
     """The model has no finite derivatives at some theta."""
 
 
-def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
-    """Minimise the residuals' loss within bounds.
+def optimise(
+    residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int, tol: float = 1e-9
+) -> Outcome:
+    """Minimise the residuals' loss within bounds, until a relative change of it and of theta is below ``tol``.
 
     Where the model has no modes, steps are cut short, which looks like convergence. A search that met such theta is
     therefore started again from its best point, and has converged when it meets none.
@@ -405,10 +399,10 @@ def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max
     with single_blas_thread():
         history = SearchHistory(residuals, start)
         first, before = history.best.objective, np.inf
-        while max_iter > 0 and history.best.objective < (1 - TOLERANCE) * before:
+        while max_iter > 0 and history.best.objective < (1 - tol) * before:
             before, n_failed = history.best.objective, history.n_failed
             try:
-                result = search(history, residuals, bounds, max_iter, first)
+                result = search(history, residuals, bounds, max_iter, first, tol)
             except NoDerivatives:
                 break
             max_iter -= result.get("nit", result.nfev)
@@ -419,7 +413,7 @@ def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max
 
 
 def _least_squares(
-    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float
+    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float, tol: float
 ) -> OptimizeResult:
     def jacobian(theta: Array) -> Array:
         return _finite(history.at(theta).jacobian())
@@ -430,14 +424,16 @@ def _least_squares(
         jacobian,
         bounds=(bounds[:, 0], bounds[:, 1]),
         loss=residuals.loss,
-        ftol=TOLERANCE,
-        xtol=TOLERANCE,
+        ftol=tol,
+        xtol=tol,
         gtol=np.finfo(float).eps,
         max_nfev=max_iter,
     )
 
 
-def _lbfgs(history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _lbfgs(
+    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float, tol: float
+) -> OptimizeResult:
     """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
 
     Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.
@@ -456,7 +452,7 @@ def _lbfgs(history: SearchHistory, residuals: Residuals, bounds: Array, max_iter
 
     scale = first or 1.0
     uphill = np.empty_like(history.theta)
-    options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": TOLERANCE, "gtol": TOLERANCE, "maxcor": 20}
+    options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": tol, "gtol": tol, "maxcor": 20}
     return minimize(share, history.theta, jac=True, method="L-BFGS-B", bounds=Bounds(*bounds.T), options=options)
 
 

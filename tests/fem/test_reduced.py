@@ -145,9 +145,8 @@ def test_small_dense_models_and_varying_mass_reduce_too():
     np.testing.assert_allclose(massless.reduced(0.2).frequencies(theta), massless.frequencies(theta), rtol=1e-5)
 
 
-def test_an_error_that_no_basis_reaches_is_said(monkeypatch):
-    monkeypatch.setattr("skthermo.fem.affine._basis.MAX_ROUNDS", 3)
-    with pytest.raises(RuntimeError, match=r"after 3 rounds .* do not give frequencies to 1e-13"):
+def test_an_error_that_no_basis_reaches_is_said():
+    with pytest.raises(RuntimeError, match=r"after \d+ rounds .* do not give frequencies to 1e-13"):
         make_truss().reduced(0.2, tol=1e-13)
 
 

@@ -20,11 +20,9 @@ from sklearn.linear_model import LinearRegression
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 
-from skthermo._core.warnings import warn_user
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.fleet import Fleet, fit_fleet
-from skthermo.fleet._workers import by_value
 from skthermo.monitoring import Monitor
 
 MODES = ["f1", "f2"]
@@ -52,7 +50,7 @@ class Warns(LinearRegression):
     def fit(self, X, y):
         self.process_ = os.getpid()
         for _ in range(2):
-            warn_user(f"{len(X)} records look odd", RecordsWarning, "odd records")
+            warnings.warn(RecordsWarning(f"{len(X)} records look odd", "odd records"), stacklevel=1)
         warnings.warn("slow", RuntimeWarning, stacklevel=1)
         return super().fit(X, y)
 
@@ -254,15 +252,6 @@ def test_an_interrupt_keeps_what_is_finished(tmp_path):
         f"4 of 6 bridges are finished and kept in {tmp_path}; the same call goes on there"
     ]
     assert len(Fleet(tmp_path).chains) == 4
-
-
-def test_functions_of_a_notebook_count_with_their_code():
-    def source(number):
-        names = {"__name__": "__main__"}
-        exec(f"def law(x):\n    return {number} * x", names)
-        return names["law"]
-
-    assert by_value(source(1)) != by_value(source(2))
 
 
 def test_monitors_evaluate_new_records_each_alone(fleet):

@@ -9,10 +9,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from skthermo._core.frames import days_later, midnight, midnights, midnights_between
 from skthermo.datasets import make_truss_campaign
 from skthermo.monitoring import Monitor
 
@@ -20,23 +17,6 @@ ZONES = sorted(zoneinfo.available_timezones() - {"localtime"})  # a zone of some
 MODES = [f"f{i + 1}" for i in range(6)]
 AT_MIDNIGHT = "Africa/Cairo"  # where clocks are changed
 PER_DAY, N_BASELINE = 4, 4 * 365
-
-
-@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
-@given(zone=st.sampled_from(ZONES), start=st.integers(0, 20_000), hours=st.integers(1, 400))
-@settings(max_examples=60, deadline=None, derandomize=True)
-def test_each_stamp_lies_in_the_day_that_its_midnight_begins(unit, zone, start, hours):
-    first = pd.Timestamp("1975-01-01", tz="UTC") + pd.Timedelta(days=start)
-    stamps = pd.date_range(first, periods=hours, freq="h").as_unit(unit).tz_convert(zone)
-    days = midnights(stamps)
-    assert (days <= stamps).all()
-    assert (days.tz_localize(None).normalize() == stamps.tz_localize(None).normalize()).all()
-    between = midnights_between(stamps[0], stamps[-1])
-    assert between.is_monotonic_increasing
-    assert set(days) <= set(between)
-    assert between[0] == midnight(stamps[0])
-    for one, following in itertools.pairwise(between):
-        assert days_later(one, 1) == following
 
 
 @cache

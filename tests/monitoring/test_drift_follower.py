@@ -9,12 +9,11 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.monitoring.drift import DriftFollower
-from skthermo.monitoring.drift._follower import DELAY
-from skthermo.monitoring.drift._kalman import State
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 NOISE, PER_YEAR, FIRST = 0.002, 365, 365
+DELAY = 30  # days that wait before they are learned from
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +53,7 @@ def with_drift(follower, lost, error):
     start = follower.start()
     mean, covariance = map(np.zeros_like, start.known)
     mean[0], covariance[:4, :4] = np.log1p(-lost), error**2 * np.eye(4)
-    return replace(start, known=State(mean, covariance))
+    return replace(start, known=type(start.known)(mean, covariance))
 
 
 def test_clear_drift_is_taken_out_and_doubtful_drift_is_not(follower, steady):
@@ -90,7 +89,7 @@ def test_an_even_drift_is_one_of_all_groups(follower):
     start, error = follower.start(), 0.004
     mean, covariance = map(np.zeros_like, start.known)
     mean[:4], covariance[:4, :4] = np.log1p(-0.012), error**2 * np.eye(4)
-    report = follower.report(replace(start, known=State(mean, covariance)))
+    report = follower.report(replace(start, known=type(start.known)(mean, covariance)))
     assert report.index[report["significant"]].tolist() == ["all groups"]
     assert report.loc["all groups", "change"] == pytest.approx(-0.012, abs=1e-6)
     assert report.loc["all groups", "standard_error"] < error

@@ -22,8 +22,6 @@ from skthermo.detection import (
     TemperatureCompensator,
 )
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._events import find_events
 from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
 
 TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
@@ -181,50 +179,6 @@ def test_memory_is_what_lags_and_windows_need(name):
     rows = range(N_BASELINE, N_BASELINE + 3)
     alone = [evaluate.alone(ALL, times, row) for row in rows]
     np.testing.assert_allclose(evaluate.index(ALL, N_BASELINE)[:3], alone, atol=1e-6)
-
-
-def test_rounding_does_not_depend_on_the_number_of_records_in_a_call(monkeypatch):
-    monitor, _, _ = fitted("lags")
-    evaluate, exact = monitor.active_, ActiveDetector._exact
-    edge = 3.0000005
-    bits = iter([edge - 1e-12, edge + 1e-12])
-
-    def at_an_edge(self, records):
-        """As if a call with many records moved the last bits."""
-        return np.full(len(records), edge + 1e-12 if len(records) < 10 else next(bits))
-
-    monkeypatch.setattr(ActiveDetector, "_exact", at_an_edge)
-    first, second = (evaluate.index(ALL[: N_BASELINE + 20], N_BASELINE) for _ in range(2))
-    monkeypatch.setattr(ActiveDetector, "_exact", exact)
-    np.testing.assert_array_equal(first, second)
-    assert first[0] == 3.000001
-
-
-def test_large_indices_are_computed_in_one_call(monkeypatch):
-    monitor, _, _ = fitted("lags")
-    evaluate, fallen, calls = monitor.active_, ALL.copy(), []
-    fallen[MODES] *= 0.2
-    exact = evaluate._exact(fallen)
-    monkeypatch.setattr(ActiveDetector, "alone", lambda self, records, times, row: calls.append(row) or exact[row])
-    found = evaluate.index(fallen, N_BASELINE)
-    assert found.min() > 100
-    assert len(calls) < len(found) / 10
-    np.testing.assert_allclose(found, exact[N_BASELINE:], rtol=1e-6)
-
-
-def test_events_are_those_of_the_rule_on_the_whole_series():
-    _, answers, after = fitted("lags")
-    events = find_events(answers["index"].to_numpy(), answers.index, after.false_alarm_estimate_.rule)
-    assert len(events) >= 1
-    pd.testing.assert_frame_equal(
-        after.events_[list(events)], events, check_dtype=False, check_exact=True, check_index_type=False
-    )
-    inside = answers["event"] > 0
-    assert (answers["state"] == "alarm").equals(inside)
-    assert after.events_["n_alarms"].sum() == inside.sum() == after.days_["n_alarms"].sum()
-    assert answers.loc[~inside, "modes"].eq("").all()
-    assert answers.loc[inside, "modes"].ne("").all()
-    assert after.events_["modes"].iloc[-1].split(", ")[0] in ("f1", "f2")
 
 
 def test_days_summarise_their_records():

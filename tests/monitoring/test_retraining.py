@@ -12,8 +12,6 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._records import Memory
-from skthermo.monitoring._retraining import Harvest, margin_of
 
 YEAR = 365
 STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.03}, "repaired": {"diagonal": -0.15}}
@@ -107,45 +105,6 @@ def test_rows_of_an_event_never_train(with_event):
     assert left_out["n_records"] >= 57
     assert "not acknowledged" in left_out["reason"]
     assert found.table.loc["event 1, peak over threshold", "new"] > 1
-
-
-@pytest.mark.parametrize("harmless", [False, True])
-def test_rows_of_a_harmless_event_train(with_event, harmless):
-    monitor = deepcopy(with_event)
-    monitor.acknowledge(1, harmless=harmless)
-    event = monitor.events_.loc[1]
-    found = Harvest.of(monitor.corrected_, monitor.events_, None)
-    inside = found.records.index.to_series().between(event["start"], event["end"])
-    assert inside.sum() == (monitor.corrected_.loc[event["start"] : event["end"]].shape[0] if harmless else 0)
-    assert found.excluded["reason"].str.contains("not as harmless").sum() == (not harmless)
-
-
-def test_nothing_trains_after_an_open_event(with_event):
-    events = with_event.events_.assign(end=pd.NaT)
-    found = Harvest.of(with_event.corrected_, events, None)
-    assert found.records.index[-1] < events["start"].iloc[0] - WEEK
-    assert "still open" in found.excluded["reason"][0]
-
-
-@pytest.mark.parametrize(("path", "margin"), [((), "7D"), (((0, 12 * DAY),), "12D"), (((19, 0), (0, DAY)), "20D")])
-def test_the_margin_before_an_event_holds_what_the_detector_looks_back_on(path, margin, records):
-    assert margin_of(Memory((path,)), records["healthy"]) == pd.Timedelta(margin)
-
-
-def test_values_of_a_faulty_sensor_do_not_train(fitted, records):
-    healthy = records["healthy"][:100]
-    faults = pd.DataFrame(
-        {
-            "column": ["T1", "T2"],
-            "kind": ["stuck", "disagree"],
-            "since": healthy.index[[20, 0]],
-            "until": [healthy.index[40], pd.NaT],
-        }
-    )
-    found = Harvest.of(healthy, fitted.events_, faults)
-    assert found.records["T1"].isna().to_numpy().nonzero()[0].tolist() == list(range(20, 40))
-    pd.testing.assert_frame_equal(found.records.drop(columns="T1"), healthy.drop(columns="T1"))
-    assert found.excluded[["columns", "n_records"]].to_numpy().tolist() == [["T1", 20]]
 
 
 @pytest.mark.nightly

@@ -11,9 +11,8 @@ import pytest
 from sklearn.linear_model import LinearRegression
 
 from skthermo.detection import CompensatedDetector, MahalanobisDetector
-from skthermo.exceptions import FewRecordsWarning, ResultWarning
+from skthermo.exceptions import FewRecordsWarning
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._threshold import LARGE, smallest_by_threshold
 
 MODES, PER_DAY = ["f1", "f2", "f3"], 4
 ANSWER = ["state", "index", "reason", "event"]
@@ -70,22 +69,6 @@ def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_r
     assert changes.within < pd.Timedelta("3D")
 
 
-def test_falls_are_shares_whatever_the_unit_and_grow_with_the_threshold():
-    monitor = of_a_year()
-    scaled = bridge()[:"2025"].copy()
-    scaled[MODES] *= 1000
-    one, other = monitor.smallest_changes_, fitted(scaled).smallest_changes_
-    np.testing.assert_allclose(list(other.single.values()), list(one.single.values()), rtol=1e-6)
-    assert other.common == pytest.approx(one.common, rel=1e-6)
-    active, year = monitor.active_, monitor.trained_
-    smallest_at = smallest_by_threshold(
-        lambda records: active.index(records, 0), year, MODES, year[MODES].std().to_numpy(), pd.Timedelta("2D")
-    )
-    common = [smallest_at(level * monitor.threshold_).common for level in (0.5, 1.0, 2.0, 8.0)]
-    assert sorted(common) == common
-    assert one.common < min(one.single.values())  # in all modes more evidence adds up
-
-
 def test_responses_about_zero_have_falls_in_their_units_and_none_in_common():
     about_zero = bridge()[:"2025"].copy()
     about_zero[MODES] -= about_zero[MODES].mean()
@@ -95,27 +78,6 @@ def test_responses_about_zero_have_falls_in_their_units_and_none_in_common():
     assert np.isnan(first.common)
     np.testing.assert_allclose(list(second.single.values()), 10 * np.array(list(first.single.values())), rtol=1e-6)
     assert first.as_dict()["common"] is None
-
-
-def test_an_index_that_no_fall_moves_sees_none():
-    records = bridge()[:400]
-    ones = smallest_by_threshold(lambda table: np.ones(len(table)), records, MODES, np.ones(3), pd.Timedelta("1D"))
-    changes = ones(2.0)
-    assert np.isnan([changes.common, *changes.single.values()]).all()
-    assert "no fall" in str(changes)
-
-
-@pytest.mark.parametrize("noise", [0.003, 0.03])
-def test_a_threshold_that_leaves_large_changes_healthy_is_one_warning(noise):
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        monitor = fitted(bridge(noise=noise)[:"2025"], MahalanobisDetector())
-    found = [one for one in caught if issubclass(one.category, ResultWarning)]
-    assert (monitor.smallest_changes_.common > LARGE) == bool(found) == (noise == 0.03)
-    assert str(monitor.smallest_changes_) in monitor.summary()
-    assert all(str(monitor.smallest_changes_) in str(one.message) for one in found)
-    plain = monitor.status().as_dict()["smallest_change"]
-    assert plain["common"] == monitor.smallest_changes_.common
 
 
 def test_a_short_baseline_says_in_its_warning_what_is_seen():

@@ -7,11 +7,10 @@ from dataclasses import fields
 
 import pandas as pd
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from skthermo.monitoring import load_monitor
-from skthermo.monitoring._events import Event, event_changes
+from skthermo.monitoring._events import Event
 from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
 
 SPOILT = slice(FIRST + 5, FIRST + 20)  # records in which a thermometer repeats its value
@@ -99,17 +98,6 @@ def replayed(transitions):
     return events, {column for column, number in columns.items() if number}
 
 
-def test_transitions_replay_what_the_tables_say(after, fitted):
-    found = after.transitions()
-    assert fitted.transitions() == []
-    assert json.loads(json.dumps(found)) == found
-    assert [one["id"] for one in found] == list(range(1, after.status().transition + 1))
-    assert {"opened", "fault", "put back"} <= {one["what"] for one in found}
-    events, columns = replayed(found)
-    assert events == set(after.events_.index[after.events_["end"].isna()])
-    assert columns == set(after.faults_.loc[after.faults_["until"].isna(), "column"])
-
-
 @pytest.mark.nightly
 def test_batches_give_the_transitions_of_one_pass_each_once(monitor, records, after, tmp_path):
     parts, known = [], 0
@@ -150,14 +138,3 @@ def events(draw):
     times = sorted(draw(st.sets(st.integers(0, 40), max_size=8)))
     pairs = [(start, end) for start, end in zip(times[::2], [*times[1::2], None], strict=False)]
     return [Event("damage", start, end, 2.0, start, "f1", (), 3) for start, end in pairs]
-
-
-@given(events(), events())
-def test_changes_lead_from_one_list_of_events_to_the_other(before, after):
-    changes = list(event_changes(before, after, 50))
-    number = Counter(one.what for one in changes)
-    withdrawn = sum(before[one.event - 1].end is None for one in changes if one.what == "withdrawn")
-    n_open = [sum(event.end is None for event in some) for some in (before, after)]
-    assert n_open[1] == n_open[0] + number["opened"] - number["closed"] - withdrawn
-    assert len(after) <= len(before) - number["withdrawn"] + number["opened"]
-    assert not list(event_changes(before, before, 50))

@@ -28,6 +28,11 @@ def event_row(start, end, kind="damage", modes="f1", groups="", acknowledged=Fal
     }
 
 
+def smallest_changes(common, single, is_relative, groups=()):
+    """Falls that a threshold sees within three days."""
+    return SmallestChanges(common, single, is_relative, pd.Timedelta("3D"), dict(groups))
+
+
 SET_ASIDE = {
     "column": ["T <1>"],
     "n_rows": [31],
@@ -104,7 +109,7 @@ class FakeMonitor:
             missing_season="",
         )
         self.watch_per_year, self.watch_threshold_ = watch_per_year, None if watch_per_year is None else 2.5
-        self.smallest_changes_ = SmallestChanges(0.01, {"f1": 0.02, "f2": 0.03}, True, pd.Timedelta("3D"))
+        self.smallest_changes_ = smallest_changes(0.01, {"f1": 0.02, "f2": 0.03}, True)
         self.detector_ = SimpleNamespace()
 
     @property

@@ -2,8 +2,12 @@
 
 import base64
 import re
+import tempfile
+from hashlib import sha256
 from html.parser import HTMLParser
+from importlib.resources import files
 from io import StringIO
+from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
@@ -13,13 +17,14 @@ import pytest
 
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import AffineModel
-from skthermo.reporting._templates import POLICY, SCRIPT, rendered
+from skthermo.reporting import owner_report
 from skthermo.studies import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 HOSTILE = "<script>alert(1)</script>"
 QUOTED = "\"onerror='x' & $\\frac{"
 SENSOR, MODES = "<b>air</b>", ["</table><img src=x>", "$x^{", "f3"]
+SCRIPT = "\n" + files("skthermo.reporting").joinpath("page.js").read_text(encoding="utf-8")
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 
 
@@ -51,11 +56,12 @@ def run_study(fem, T, scenarios, **options):
     return study
 
 
-def written(name, facts, **options):
-    """A page as text, for laws of the text around its drawings, which are blank."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skthermo.reporting._figures._svg", lambda figure: b"<svg/>")
-        return rendered(name, {"title": None} | facts(), **options)
+def page_text(subject, *, is_drawn=False, **options):
+    """The page on a subject; drawings are blank unless they are wanted."""
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        if not is_drawn:
+            patch.setattr("skthermo.reporting._figures._svg", lambda figure: b"<svg/>")
+        return owner_report(subject, Path(folder) / "page.html", **options).read_text(encoding="utf-8")
 
 
 def section_text(text, anchor):
@@ -117,7 +123,9 @@ class Page(HTMLParser):
         (policy,) = [tag["content"] for tag in self.all("meta") if "http-equiv" in tag]
         foreign = [tag for tag, _ in self.tags if tag in ("link", "iframe", "object", "form")]
         handlers = [name for _, attributes in self.tags for name in attributes if name.startswith("on")]
-        return policy == POLICY and self.all("script") == [{}] and not foreign and not handlers
+        hashed = base64.b64encode(sha256(SCRIPT.encode()).digest()).decode()
+        is_closed = policy.startswith("default-src 'none';") and policy.endswith(f"script-src 'sha256-{hashed}'")
+        return is_closed and self.all("script") == [{}] and not foreign and not handlers
 
     def drawings(self):
         """Drawings as trees; an error if they are no XML."""

@@ -1,15 +1,14 @@
 """The report on a study of several alarm systems: which one is recommended, and what is not certain."""
 
+import re
+
 import pytest
 from sklearn.mixture import GaussianMixture
 
-from skthermo._core.text import share_text
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.reporting import owner_report
-from skthermo.reporting._choice import Choice
-from skthermo.reporting._study import study_facts
 from skthermo.studies import DetectabilityStudy, sweep
-from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain, section_of, written
+from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
 
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
@@ -53,30 +52,8 @@ def test_the_first_of_the_ranking_is_recommended_and_reported(study, tmp_path):
     other = page_of(study, tmp_path, max_false_alarms=0.1, detector=LOUD)
     assert f"This report is on \N{LEFT DOUBLE QUOTATION MARK}{LOUD}" in other.text
     false_alarms = study.results_.set_index(["detector", "scenario"]).loc[(LOUD, "healthy"), "rate"]
-    assert f"Of the records of the healthy structure, {share_text(false_alarms)} raise an alarm" in other.text
-
-
-def test_the_rest_is_that_of_a_study_with_this_detector_alone(study):
-    choice = Choice.of(study, LOUD, 0.1)
-    alone = DetectabilityStudy(
-        study.fem, study.detectors[LOUD], study.scenarios, n_repeats=5, random_state=0, uncertainty="noise"
-    )
-    alone.run(fitted_chain()[1])
-    one = choice.only()
-    columns = ["scenario", "source", "rate", "ci_low", "ci_high"]
-    assert one.results_[columns].equals(alone.results_[columns])
-    assert one.detector_name() == LOUD
-    assert {key[0] for key in one.indices_} == {LOUD}
-    assert study.results_["detector"].nunique() == 4  # the study itself is as it was
-
-
-def test_none_is_recommended_if_none_keeps_the_limit(study):
-    def facts():
-        made = study_facts(study, None, None, None, 0.1)
-        made["choice"].ranking["within_limit"] = False
-        return made
-
-    assert "None is recommended" in section_of(written("study", facts), "choice").text
+    said = re.search(r"Of the records of the healthy structure, ([\d.]+)\xa0% raise an alarm", other.text)
+    assert float(said[1]) == pytest.approx(100 * false_alarms, rel=0.05)
 
 
 def test_detectors_that_are_not_there_are_named(study, tmp_path):

@@ -1,20 +1,12 @@
 """The page for the owner of many bridges: the worst first, and no bridge healthy of which nothing is known."""
 
-import re
 import time
 from urllib.parse import unquote
 
-import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from skthermo.reporting import owner_report
-from skthermo.reporting._chart import HEIGHT, HIGHEST, chart, line
-from skthermo.reporting.fleet._bridge import Bridge
-from skthermo.reporting.fleet._page import page_names
-from skthermo.reporting.service import Standing
 from tests.reporting.fleets import FakeFleet
 from tests.reporting.monitors import FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
@@ -170,19 +162,6 @@ def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_by_the_size_of_alarm_drift_and_silence():
-    monitors = [FakeMonitor(events=[{**event_row("2025-06-01", None), "peak": peak}]) for peak in (4.0, 30.0)]
-    alarms = [Bridge.watched(0, Standing.of(monitor, NOW)) for monitor in monitors]
-    assert alarms[1].order < alarms[0].order
-    assert alarms[1].highest == 10.0
-    worn = [Bridge.watched(0, Standing.of(FakeMonitor(drift=drift_of(-c)), NOW)) for c in (0.1, 0.3)]
-    assert worn[1].order < worn[0].order
-    silent = [Bridge.watched(0, Standing.of(FakeMonitor(n_days=n), NOW)) for n in (150, 20)]
-    assert silent[1].order < silent[0].order
-    assert silent[1].since == FakeMonitor(n_days=20).last_
-    assert [(bridge.n_evaluated, bridge.n_days) for bridge in silent] == [(1, 31), (0, 31)]
-
-
 @pytest.mark.nightly
 def test_pages_of_two_hundred_bridges_are_small_and_soon_written(tmp_path):
     fleet = FakeFleet({f"bridge {number:03d}": FakeMonitor(n_days=365) for number in range(200)})
@@ -190,54 +169,3 @@ def test_pages_of_two_hundred_bridges_are_small_and_soon_written(tmp_path):
     owner_report(fleet, tmp_path / "fleet.html", now=NOW)
     assert time.process_time() - start < 10
     assert sum(path.stat().st_size for path in tmp_path.rglob("*.html")) < 8e6
-
-
-@pytest.mark.nightly
-@given(st.lists(st.text(max_size=90) | st.integers(), unique=True, max_size=20))
-@settings(max_examples=20, deadline=None)
-def test_names_of_files_are_plain_and_distinct(names):
-    files = page_names(names)
-    assert list(files) == names
-    assert len({name.casefold() for name in files.values()}) == len(names)
-    assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,79}\.html", name) for name in files.values())
-    assert not [name for name in files.values() if re.fullmatch(r"(?i)(con|nul|aux|prn)\.html", name)]
-
-
-def test_files_are_named_after_their_bridges():
-    files = page_names(["KW51", "../../etc/passwd", "Brücke 7", "con", "", "a b", "A/B"])
-    assert [*files.values()][:5] == ["KW51.html", "etc_passwd.html", "Brucke_7.html", "bridge_con.html", "bridge.html"]
-
-
-def places(svg, name):
-    """Positions of the dots or ticks of one kind in a drawing."""
-    path = re.search(rf'<path class="{name}" d="([^"]*)"', svg)
-    pairs = [pair.split() for pair in re.findall(r"M([\d. ]+)", path[1] if path else "")]
-    return np.array(pairs, dtype=float).reshape(-1, 2)
-
-
-def test_a_drawing_has_a_mark_for_every_day():
-    days = pd.date_range("2024-11-01", periods=100)
-    index = pd.Series(np.linspace(0.1, 2.9, 100), days)
-    index.iloc[40:45], index.iloc[90] = np.nan, 1000.0
-    drawn = chart(index, index > 2.5, 2.5, "alt <text>", [(days[80], days[99])])
-    dots, alarms, gaps = (places(drawn, name) for name in ("dots", "dots above", "gaps"))
-    assert len(dots) + len(alarms) + len(gaps) == 100
-    assert len(gaps) == 5
-    assert len(alarms) == int((index > 2.5).sum())
-    assert (np.diff(dots[:, 1]) < 0.051).all()  # the higher the index, the higher the dot
-    level = float(re.search(r'class="threshold" d="M\d+ ([\d.]+)H', drawn)[1])
-    assert (alarms[:, 1] <= level).all()
-    assert (dots[:, 1] >= level).all()
-    assert "1 beyond, up to 1000" in drawn
-    assert "Jan 2025" in drawn
-    assert 0 <= alarms[:, 1].min() < HEIGHT / HIGHEST
-
-
-def test_a_line_shows_the_highest_of_each_week():
-    index = np.ones(70)
-    index[30] = 3.0
-    index[63:] = np.nan
-    drawn = line(index, 2.0)
-    assert len(places(drawn, "dots above")) == 1
-    assert len(re.findall("[ML]", re.search('class="line" d="([^"]*)"', drawn)[1])) == 9
-    assert line(np.full(20, np.nan), 2.0) == ""

@@ -11,16 +11,12 @@ from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
-from skthermo._core.text import share_text
 from skthermo.datasets import make_truss_campaign, truss_structure
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._threshold import SmallestChanges
 from skthermo.reporting import owner_report
-from skthermo.reporting.service import Standing, monitor_facts
-from skthermo.reporting.service._page import _columns
-from tests.reporting.monitors import FakeMonitor, event_row
-from tests.reporting.pages import HOSTILE, QUOTED, Page, section_of, written
+from tests.reporting.monitors import FakeMonitor, event_row, smallest_changes
+from tests.reporting.pages import HOSTILE, QUOTED, Page, page_text, section_of
 
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
@@ -29,18 +25,14 @@ SECTIONS = ["today", "events", "index", "drift", "sensors", "not_evaluated", "fa
 SPACE = "\xa0"
 
 
-def standing_of(monitor, now=None, limit=0.1):
-    """A monitor five hours after its newest record, unless another time is given."""
-    return Standing.of(monitor, monitor.last_ + pd.Timedelta("5h") if now is None else now, limit)
-
-
-def page_of(standing, structure=None):
-    """The page on a monitor, as text."""
-    return written("monitor", lambda: monitor_facts(standing, structure))
+def page_of(monitor, structure=None, now=None, limit=0.1):
+    """The page on a monitor five hours after its newest record, unless another time is given, as text."""
+    now = monitor.last_ + pd.Timedelta("5h") if now is None else now
+    return page_text(monitor, structure=structure, now=now, drift_limit=limit)
 
 
 def part_of(monitor, anchor, now=None):
-    return section_of(page_of(standing_of(monitor, now)), anchor)
+    return section_of(page_of(monitor, now=now), anchor)
 
 
 def today_of(monitor, now=None):
@@ -163,7 +155,7 @@ def test_what_is_not_evaluated_says_since_when_and_why(n_not_evaluated):
     assert f"Because: {reason}." in page.text
     number = int(monitor.counts_["n_not_evaluated"])
     page = part_of(monitor, "not_evaluated")
-    assert f"{number:,} ({share_text(number / 180)}) were not evaluated" in page.text
+    assert f"{number:,} ({100 if number == 180 else 1.7}{SPACE}%) were not evaluated" in page.text
     assert [page.heads[2], page.heads[-1]] == [reason, "Records that came again, and were counted once"]
     assert page.cells == [str(number), "2"]
 
@@ -178,18 +170,11 @@ def test_records_that_were_evaluated_with_a_remark_are_counted():
     assert str(len(rows)) in part_of(monitor, "not_evaluated").cells
 
 
-def test_a_unit_that_is_in_the_name_of_a_column_is_said_once():
-    monitor = FakeMonitor()
-    monitor.units_ = {"T1 [°C]": "°C", "f1 (Hz)": "Hz", "f2": "Hz"}
-    monitor.targets_ = ["f1 (Hz)", "f2"]
-    assert _columns(monitor) == {"responses": ["f1 (Hz)", "f2 (Hz)"], "temperatures": ["T1 [°C]"]}
-
-
 def test_a_new_baseline_after_a_change_of_the_structure_is_said():
     monitor = FakeMonitor()
-    assert "The structure was changed" not in page_of(standing_of(monitor))
+    assert "The structure was changed" not in page_of(monitor)
     monitor.since_ = pd.Timestamp("2024-12-20")
-    text = Page(page_of(standing_of(monitor))).text
+    text = Page(page_of(monitor)).text
     assert f"as it is since 20{SPACE}December{SPACE}2024, it counts as healthy" in text
 
 
@@ -232,19 +217,17 @@ def test_the_smallest_change_that_would_be_seen_is_said():
     page = part_of(monitor, "detectable")
     falls = dict(zip(page.heads[-3:], page.cells[-3:], strict=True))
     assert falls == {"all responses by one share": f"1{SPACE}%", "f1 alone": f"2{SPACE}%", "f2 alone": f"3{SPACE}%"}
-    monitor.smallest_changes_ = SmallestChanges(np.nan, {"f1": 0.5, "f2": np.nan}, False, pd.Timedelta("3D"))
+    monitor.smallest_changes_ = smallest_changes(np.nan, {"f1": 0.5, "f2": np.nan}, False)
     page = part_of(monitor, "detectable")
     assert page.cells[-2:] == [f"0.50{SPACE}Hz", "none is seen"]
 
 
 def test_losses_that_raise_an_alarm_are_listed_and_drawn_on_the_structure():
     monitor = FakeMonitor()
-    monitor.smallest_changes_ = SmallestChanges(
-        0.01, {"f1": 0.02}, True, pd.Timedelta("3D"), {"top": 0.04, "bottom": np.nan}
-    )
+    monitor.smallest_changes_ = smallest_changes(0.01, {"f1": 0.02}, True, {"top": 0.04, "bottom": np.nan})
     assert "a loss of stiffness by 4 % (top)" in today_of(monitor).text
     for structure in (None, truss_structure()):
-        page = section_of(page_of(standing_of(monitor), structure), "detectable")
+        page = section_of(page_of(monitor, structure), "detectable")
         losses = dict(zip(page.heads[-2:], page.cells[-2:], strict=True))
         assert losses == {"loss of stiffness of top": f"4{SPACE}%", "loss of stiffness of bottom": "none is seen"}
         assert len(page.all("img")) == (structure is not None)
@@ -289,17 +272,16 @@ def test_drift_says_how_fast_and_when_a_limit_is_reached():
         ["deck", "piers"],
     )
     monitor = FakeMonitor(drift=found)
-    standing = standing_of(monitor)
-    page = section_of(page_of(standing), "drift")
+    page = section_of(page_of(monitor), "drift")
     whether = "The stiffness changes slowly; a change as large would be seen with a probability of 0.001 by chance."
     assert whether in page.text
     loss = f"deck has lost 2.0{SPACE}% (±{SPACE}0.4{SPACE}%) of its stiffness since the baseline, and loses 1.0{SPACE}%"
     assert loss in page.text
-    years = {rate: f"{standing.last + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
+    years = {rate: f"{monitor.last_ + pd.Timedelta(days=365.25 * 0.08 / rate):%Y}" for rate in (0.01, 0.012, 0.008)}
     reached = f"A loss of 10{SPACE}% is reached in about {years[0.01]} at this rate (between {years[0.012]} and"
     assert f"{reached} {years[0.008]})." in page.text
-    assert Page(page_of(standing)).text.count(loss) == 2  # of today, and of slow change
-    assert f"A loss of 1.5{SPACE}% has been reached." in page_of(standing_of(monitor, limit=0.015))
+    assert Page(page_of(monitor)).text.count(loss) == 2  # of today, and of slow change
+    assert f"A loss of 1.5{SPACE}% has been reached." in page_of(monitor, limit=0.015)
     assert len(page.drawings()) == 1
     assert page.cells[2::3] == ["yes", "no"]
 
@@ -374,7 +356,7 @@ def test_time_zones_and_the_clock():
     assert state_of(today_of(monitor)) == "alarm"
     utc = (monitor.last_ + pd.Timedelta("5h")).tz_convert("UTC")
     assert state_of(today_of(monitor, utc)) == "alarm"
-    assert state_of(section_of(page_of(Standing.of(monitor)), "today")) == "alarm"  # by the clock, long after
+    assert state_of(section_of(page_text(monitor), "today")) == "alarm"  # by the clock, long after
     with pytest.raises(ValueError, match="expected a time without a time zone"):
         today_of(FakeMonitor(), utc)
     early = FakeMonitor()

@@ -11,8 +11,6 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
 from skthermo.studies import Scenario, compare_extensions, pod_curve, sweep
-from skthermo.studies.detectability._extensions import Arrangement, CampaignSimulator
-from skthermo.studies.detectability._simulation import Measurement
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 from tests.studies.studies import MODES, WEATHER, YEAR, study_of
 
@@ -129,30 +127,6 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
     assert table["family"].tolist() == ["mass"]
     curve = study.pod_curve("mass")
     assert table["mdd_now"][0] == pytest.approx(curve.a90, rel=0.15)
-
-
-def test_a_longer_baseline_begins_with_the_shorter_one_and_goes_on_in_time(fem):
-    measurement = Measurement("fitted", "fitted", "fitted")
-    simulators = [
-        CampaignSimulator(fem, WEATHER, {("top", 0.1): {"damage": {"top": 0.1}}}, measurement, n) for n in (365, 800)
-    ]
-    (short, tables), (long, others) = (each.draw(each.clean(), seed=3) for each in simulators)
-    pd.testing.assert_frame_equal(short, long.iloc[:365], check_freq=False)
-    assert len(long) == 800
-    assert (np.diff(long.index) == np.timedelta64(1, "D")).all()
-    np.testing.assert_array_equal(long[["T1", "T2", "T3"]][365:730], YEAR.temperatures)
-    assert not np.allclose(long["f1"][365:730], short["f1"], rtol=1e-4)
-    pd.testing.assert_frame_equal(tables["top", 0.1], others["top", 0.1])
-
-
-def test_damage_that_is_always_or_never_found_has_an_end():
-    random = np.random.RandomState(0)
-    healthy = pd.DataFrame(random.standard_normal((200, 2)), columns=["f1", "f2"])
-    arrangement = Arrangement(MahalanobisDetector(), ["f1", "f2"], 200, True)
-    far = {("far", 0.1): healthy, ("far", 0.2): healthy + 100, ("near", 0.1): healthy, ("near", 0.2): healthy}
-    found = arrangement.smallest(healthy, far)
-    assert 0.1 < found["far"] < 0.2
-    assert found["near"] == np.inf
 
 
 @pytest.mark.parametrize(

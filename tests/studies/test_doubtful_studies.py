@@ -6,7 +6,6 @@ import pytest
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.studies import DetectabilityStudy, Scenario, compare_extensions, sweep
-from skthermo.studies.detectability._rates import prediction_interval
 
 YEAR = make_truss_campaign(random_state=0)
 WEATHER = make_truss_campaign(random_state=1).temperatures
@@ -16,18 +15,6 @@ def study(fem, scenarios, **options):
     return DetectabilityStudy(
         fem, MahalanobisDetector(), scenarios, uncertainty="noise", **({"n_repeats": 2, "random_state": 0} | options)
     )
-
-
-@pytest.mark.one_case
-@pytest.mark.parametrize(("n_repeats", "expected"), [(39, 0.95), (99, 0.95), (10, 9 / 11), (2, 1 / 3)])
-def test_the_band_holds_one_more_campaign_as_often_as_it_says(n_repeats, expected):
-    random, inside = np.random.default_rng(0), []
-    for _ in range(2000):
-        rates = random.uniform(0, 1, n_repeats + 1)
-        decisions = np.where(np.arange(200) < 200 * rates[:, np.newaxis], -1.0, 1.0)
-        lowest, highest = prediction_interval(decisions[:-1], 0.95)
-        inside.append(lowest <= (decisions[-1] < 0).mean() <= highest)
-    assert np.mean(inside) == pytest.approx(expected, abs=0.04)
 
 
 def test_one_repeat_has_no_band(fem):

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import binom, ttest_1samp
+from scipy.stats import ttest_1samp
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.ensemble import IsolationForest
 from sklearn.metrics import roc_auc_score
@@ -11,8 +11,6 @@ from sklearn.metrics import roc_auc_score
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
-from skthermo.studies.detectability._ranking import rank
-from skthermo.studies.detectability._rates import EvaluatedRecords
 from tests.studies.studies import WEATHER, compensated, study_of
 
 SIMULATED = "simulated"
@@ -296,34 +294,3 @@ def test_what_cannot_be_ranked_is_an_error(fem, study):
         single.run(WEATHER)
         with pytest.raises(ValueError, match=message):
             single.ranking()
-
-
-def evaluated(random, names, pods, n_repeats=10, n_records=50, share=0.02):
-    """Records of detectors that find damage with these probabilities, and their rows in the results."""
-    scenarios = {"healthy": Scenario("healthy"), "damaged": Scenario("damaged", {"deck": 0.1})}
-    shape, index = (n_repeats, n_records), pd.Series(np.zeros(n_records))
-    records = []
-    for name, pod in zip(names, pods, strict=True):
-        for scenario, rate in (("healthy", share), ("damaged", pod)):
-            decisions = random.uniform(size=shape) - rate
-            records.append(EvaluatedRecords(name, scenarios[scenario], SIMULATED, index, decisions))
-    return records, pd.DataFrame([one.summary(0.95) for one in records])
-
-
-@pytest.mark.nightly
-def test_the_best_is_seldom_called_significantly_worse():
-    random, names, wrong = np.random.default_rng(0), [*"abcdef"], 0
-    n = 40
-    for _ in range(n):  # all are equally good, so that whoever is clearly behind is so by chance
-        records, rows = evaluated(random, names, [0.5] * 6)
-        table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
-        wrong += table["significantly_worse"][random.choice(names)]
-    assert wrong <= binom.ppf(0.999, n, 0.05)
-
-
-def test_what_is_much_worse_is_called_significantly_worse():
-    random = np.random.default_rng(0)
-    records, rows = evaluated(random, ["good", "bad"], [0.6, 0.3])
-    table = rank(records, rows, {}, {}, 0.9, 0.95, "pod")
-    assert table["significantly_worse"].to_dict() == {"good": False, "bad": True}
-    assert table.loc["bad", "pod_deficit_ci_low"] < 0.3 < table.loc["bad", "pod_deficit_ci_high"]

@@ -11,7 +11,6 @@ from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
-from skthermo.surrogate.chain._stages import StructureInWeather, ThermalModel
 
 from skthermo.detection import (
     DirectionalDetector,
@@ -21,17 +20,9 @@ from skthermo.detection import (
     TemperatureCompensator,
     WindowedAlarm,
 )
-from skthermo.fem import AffineModel
 from skthermo.studies import Scenario, compare_extensions, sweep
-from skthermo.surrogate import DataInformedFEM
 from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of
 
-COUNTED = {
-    StructureInWeather: "simulated",
-    DataInformedFEM: "weather",
-    ThermalModel: "parameters",
-    AffineModel: "frequencies",
-}
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
 
 
@@ -175,31 +166,6 @@ def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fe
     study.set_params(random_state=1).run(WEATHER, SIDE_BY_SIDE)
     study.run(WEATHER, SIDE_BY_SIDE[:-1])
     assert CountedForest.n_fits == 4 * once
-
-
-def test_the_simulation_is_not_repeated_for_each_detector(fem, monkeypatch):
-    counts = Counter()
-
-    def counted(owner, name):
-        original = getattr(owner, name)
-
-        def count(self, *arguments, **options):
-            counts[name] += 1
-            return original(self, *arguments, **options)
-
-        monkeypatch.setattr(owner, name, count)
-
-    study_of(fem, MahalanobisDetector(), SCENARIOS).run(WEATHER)  # the chain keeps its residuals from now on
-    for owner in (StructureInWeather, DataInformedFEM, ThermalModel, AffineModel):
-        counted(owner, COUNTED[owner])
-    found = []
-    for some in (MahalanobisDetector(), detectors() | {"week": WindowedAlarm(7)}):
-        counts.clear()
-        study_of(fem, some, SCENARIOS).run(WEATHER)
-        found.append(dict(counts))
-    assert found[0] == found[1]
-    assert found[0]["simulated"] == len(SCENARIOS)
-    assert found[0]["parameters"] == 1
 
 
 def test_detectors_that_begin_alike_share_these_steps_and_their_residuals(fem, monkeypatch):

@@ -5,31 +5,11 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.signal import lfilter
-from scipy.stats import norm
 
 from skthermo.detection import MahalanobisDetector, WindowedAlarm
-from skthermo.studies import ProgressiveDamage, Scenario
-from skthermo.studies.detectability._rates import EvaluatedRecords
-from skthermo.studies.detectability._simulation import damaged_rows, onsets_of
-from skthermo.studies.detectability._waits import Waits
+from skthermo.studies import ProgressiveDamage
 from tests.studies.studies import WEATHER, WITHIN, study_of
 from tests.surrogate.chains import F, T, chain, mapper
-
-
-def evaluated(decisions, index=None, scenario=None):
-    index = pd.date_range("2030-01-01", periods=decisions.shape[1], freq="D") if index is None else index
-    scenario = scenario or Scenario("a tenth", {"bottom": 0.1})
-    return EvaluatedRecords("detector", scenario, "simulated", pd.Series(0.0, index), decisions)
-
-
-def decisions_with(rate, memory=0.0, shape=(20, 400), seed=0):
-    """Decisions that are negative at this rate, with a normal memory from record to record."""
-    shocks = np.random.default_rng(seed).standard_normal((shape[0], shape[1] + 200))
-    values = lfilter([np.sqrt(1 - memory**2)], [1, -memory], shocks, axis=1)[:, 200:]
-    return values - norm.ppf(rate)
 
 
 @pytest.fixture(scope="module")
@@ -48,75 +28,6 @@ def study(fem):
     study = study_of(fem, detectors, scenarios, n_repeats=8)
     study.run(WEATHER)
     return study
-
-
-@pytest.mark.parametrize("rate", [0.02, 0.1, 0.4])
-def test_independent_records_follow_the_geometric_law(rate):
-    waits = Waits.of(evaluated(decisions_with(rate, shape=(300, 400))))
-    for number in (1, 7, 30):
-        found, lowest, highest = waits.found(number, 0.999)
-        assert lowest <= 1 - (1 - rate) ** number <= highest
-        assert highest - lowest < 0.06
-        assert lowest < found < highest or found > 0.9999
-    expected = np.ceil(np.log(0.5) / np.log(1 - rate))
-    assert waits.within(0.5) == pytest.approx(expected, abs=1, rel=0.03)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(0, 10**6), st.integers(2, 40), st.floats(0.02, 0.9))
-def test_waits_are_those_of_a_count_from_each_onset(seed, n_records, rate):
-    alarms = np.random.default_rng(seed).random((2, n_records)) < rate
-    found = Waits.of(evaluated(np.where(alarms, -1.0, 1.0))).steps
-    for repeat in range(2):
-        for onset in range(n_records):
-            following = np.roll(alarms[repeat], -onset)
-            expected = following.argmax() + 1 if following.any() else np.inf
-            assert found[repeat, onset] == expected
-
-
-def test_dependence_makes_waits_longer_and_bounds_wider():
-    single, lasting = (Waits.of(evaluated(decisions_with(0.1, memory))) for memory in (0.0, 0.95))
-    assert lasting.found(7, 0.95)[0] < single.found(7, 0.95)[0] - 0.1
-    assert lasting.within(0.5) > 1.5 * single.within(0.5)
-    widths = [np.ptp(one.found(7, 0.95)[1:]) for one in (lasting, single)]
-    assert widths[0] > 1.2 * widths[1]
-
-
-@pytest.mark.one_case
-@pytest.mark.parametrize("memory", [0.0, 0.9])
-def test_bounds_hold_the_long_run(memory):
-    truth = Waits.of(evaluated(decisions_with(0.1, memory, (2000, 400), seed=99))).found(7, 0.9)[0]
-    bounds = [Waits.of(evaluated(decisions_with(0.1, memory, (5, 200), seed))).found(7, 0.9)[1:] for seed in range(100)]
-    assert np.mean([lowest <= truth <= highest for lowest, highest in bounds]) >= 0.83
-
-
-def test_records_that_are_not_evaluated_delay():
-    decisions = decisions_with(0.2, shape=(300, 400))
-    every = Waits.of(evaluated(decisions))
-    decisions[:, ::2] = np.nan
-    second = Waits.of(evaluated(decisions))
-    assert second.share_not_evaluated == 0.5
-    assert second.found(10, 0.95)[0] == pytest.approx(every.found(5, 0.95)[0], abs=0.02)
-    assert np.isinf(Waits.of(evaluated(np.full((2, 50), np.nan))).steps).all()
-
-
-def test_stamps_that_are_absent_delay_as_an_outage_does():
-    stamps = pd.date_range("2030-01-01", periods=390, freq="h")
-    decisions, kept = decisions_with(0.2, shape=(20, 390)), np.arange(390) % 40 < 30
-    absent = Waits.of(evaluated(decisions[:, kept], stamps[kept]))
-    empty = Waits.of(evaluated(np.where(kept, decisions, np.nan), stamps))
-    assert absent.length == pd.Timedelta("1h")
-    np.testing.assert_array_equal(absent.steps, empty.steps)
-    assert absent.count(pd.Timedelta("1D")) == 24
-
-
-def test_clocks_that_are_not_exact_and_records_out_of_order_change_nothing():
-    stamps = pd.date_range("2030-01-01", periods=100, freq="D")
-    decisions, shuffled = decisions_with(0.2, shape=(3, 100)), np.random.default_rng(0).permutation(100)
-    late = stamps + pd.to_timedelta(np.random.default_rng(1).uniform(0, 600, 100), "s")
-    expected, found = Waits.of(evaluated(decisions)), Waits.of(evaluated(decisions[:, shuffled], late[shuffled]))
-    np.testing.assert_array_equal(found.steps, expected.steps)
-    assert [found.count(pd.Timedelta(days=days)) for days in (1, 7, 30)] == [1, 7, 30]
 
 
 def test_a_table_has_a_row_for_each_detector_and_scenario(study):
@@ -220,10 +131,3 @@ def test_damage_that_is_not_found_or_as_often_as_chance_is_called_so(fem):
 def test_what_is_no_time_is_refused(study, options, message):
     with pytest.raises(ValueError, match=message):
         study.time_to_detection(**options)
-
-
-@pytest.mark.parametrize(("n_records", "n_window"), [(1, 3), (7, 4), (12, 3), (13, 3), (50, 7), (8, 8)])
-def test_damage_lasts_a_window_after_each_onset(n_records, n_window):
-    onsets = onsets_of(n_records, n_window)
-    expected = [any(0 <= row - onset < n_window for onset in onsets) for row in range(n_records)]
-    np.testing.assert_array_equal(damaged_rows(n_records, n_window), expected)

@@ -54,21 +54,6 @@ Content = tuple[Hashable, tuple[str, ...]]
 Names = tuple[str, ...] | None
 Groups = dict[str, tuple[int, ...]] | None
 
-DENSE_DOFS = 200  # degrees of freedom up to which dense batches are faster
-DENSE_SHARE = 0.3  # share of nonzero entries above which a matrix counts as dense
-
-FULL_DENSE, FULL_SPARSE = (0.05, 1.6e-4), (6.0, 0.008)
-"""Milliseconds of frequencies and derivatives: of a dense model, in all and per squared degree of freedom; of a sparse
-one, in all and per degree of freedom."""
-
-USUAL_MODES = 6  # as few as vibration tests of bridges usually identify
-VECTORS_PER_PARAMETER = 12  # a basis has about as many vectors for each parameter, and for one more
-REDUCED = (0.06, 5e-5)  # milliseconds of a reduced solve, in all and per squared number of basis vectors
-BASIS_SOLVES, BASIS_PER_VECTOR = (20, 4), 2.0
-"""A basis takes so many full solves, in all and per parameter, and so many milliseconds per vector."""
-
-LARGEST_SHARE = 0.5  # largest share of the full model's time that a reduced model may take
-
 
 class AffineModel:
     """FE model K(theta) phi = (2 pi f)^2 M(theta) phi with affine stiffness and mass.
@@ -163,7 +148,7 @@ class AffineModel:
         mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=n_dof)
         self.parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
         self._groups = check_groups(groups, self.parameter_names, stiffness_keys)
-        wanted = USUAL_MODES if n_modes is None else positive_integer(n_modes, "n_modes")
+        wanted = 6 if n_modes is None else positive_integer(n_modes, "n_modes")
         if contents and len(contents) != len(stiffness_keys):
             raise ValueError(f"contents are of {len(contents)} terms; expected {len(stiffness_keys)}, as of stiffness")
         self.contents = tuple(map(tuple, contents))
@@ -754,12 +739,12 @@ class AffineModel:
         (False, True)
         """
         n_parameters = len(self.parameter_names)
-        size = min(self.n_dof, VECTORS_PER_PARAMETER * (n_parameters + 1))
-        fixed, growing = FULL_DENSE if self._core.stiffness.is_dense else FULL_SPARSE
-        full = fixed + growing * self.n_dof ** (2 if self._core.stiffness.is_dense else 1)
-        basis = (BASIS_SOLVES[0] + BASIS_SOLVES[1] * n_parameters) * full + BASIS_PER_VECTOR * size
-        reduced = REDUCED[0] + REDUCED[1] * size**2
-        return bool(basis + n_solves * reduced < LARGEST_SHARE * n_solves * full)
+        size = min(self.n_dof, 12 * (n_parameters + 1))  # vectors of a basis
+        is_dense = self._core.stiffness.is_dense
+        full = 0.05 + 1.6e-4 * self.n_dof**2 if is_dense else 6.0 + 0.008 * self.n_dof  # milliseconds of a solve
+        basis = (20 + 4 * n_parameters) * full + 2.0 * size
+        reduced = 0.06 + 5e-5 * size**2
+        return bool(basis + n_solves * reduced < 0.5 * n_solves * full)
 
     def __repr__(self) -> str:
         counts = ((len(self.parameter_names), "parameter"), (self.n_dof, "degree"), (self.n_modes, "mode"))
@@ -989,7 +974,7 @@ def are_sparse(matrices: Sequence[Matrix], n_modes: int) -> bool:
     """Whether shift-invert is faster than dense batches for this many modes."""
     n_dof = matrices[0].shape[0]
     entries = sum(np.count_nonzero(m) if isinstance(m, np.ndarray) else m.nnz for m in matrices)
-    return n_dof > max(DENSE_DOFS, 4 * n_modes) and entries < DENSE_SHARE * n_dof**2
+    return n_dof > max(200, 4 * n_modes) and entries < 0.3 * n_dof**2
 
 
 def read_mass(mass: MatrixLike, what: str, n_dof: int) -> Matrix:

@@ -21,8 +21,7 @@ Key = tuple[str, ...]
 Terms = dict[Key, scipy.sparse.csc_array]
 Pairs = list[tuple[Key, scipy.sparse.csc_array]]
 
-SAME = 1e-6
-ROUNDING = 16 * np.finfo(float).eps
+SAME_ENTRIES = 1e-6  # largest difference, relative to the diagonal, of entries that count as the same
 
 
 def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
@@ -35,7 +34,7 @@ def split(
     base: scipy.sparse.csc_array, changed: Mapping[str, scipy.sparse.csc_array], factors: Mapping[str, float]
 ) -> Terms:
     """The term of each parameter that changes the matrix when it is multiplied, and the constant part that remains."""
-    diagonal, rounding = base.diagonal(), ROUNDING * (len(changed) + 1)
+    diagonal, rounding = base.diagonal(), 16 * np.finfo(float).eps * (len(changed) + 1)
     terms: Terms = {
         (name,): _without(rounding, matrix - base, diagonal) / (factors[name] - 1) for name, matrix in changed.items()
     }
@@ -161,7 +160,7 @@ def _read_factors(factor: float | Mapping[str, float], names: Sequence[str]) -> 
     if set(factors) != set(names):
         raise ValueError(f"factor names {list(factors)}; expected {list(names)}, as changed does")
     for name, value in factors.items():
-        if not is_real(value) or not np.isfinite(value) or value <= 0 or abs(value - 1) < SAME:
+        if not is_real(value) or not np.isfinite(value) or value <= 0 or abs(value - 1) < SAME_ENTRIES:
             raise ValueError(f"factor of {name!r} is {value!r}; expected a positive number other than 1, such as 2.0")
     return {name: float(factors[name]) for name in names}
 
@@ -178,7 +177,7 @@ def _is_nonnegative(matrix: scipy.sparse.csc_array, base: scipy.sparse.csc_array
         return False
     scale = scipy.sparse.diags_array(1 / np.sqrt(diagonal), format="csc")
     scaled = scale @ matrix[rows][:, rows] @ scale
-    return factorise(scipy.sparse.csc_array(scaled + SAME * scipy.sparse.eye_array(len(rows)))) is not None
+    return factorise(scipy.sparse.csc_array(scaled + SAME_ENTRIES * scipy.sparse.eye_array(len(rows)))) is not None
 
 
 def _check_rest(base: scipy.sparse.csc_array, terms: Terms, factors: Mapping[str, float]) -> None:
@@ -212,7 +211,11 @@ def _doubtful_factors(terms: Terms, factors: Mapping[str, float]) -> list[str]:
         rows = np.flatnonzero((abs(part).sum(axis=0) > 0) & (shared == 0))
         alone, beside = part[rows], rest[rows]
         ratio = float((alone * beside).sum() / max((alone * alone).sum(), np.finfo(float).tiny))
-        if alone.nnz > len(rows) and ratio > SAME and abs(beside - ratio * alone).max() < SAME * abs(beside).max():
+        if (
+            alone.nnz > len(rows)
+            and ratio > SAME_ENTRIES
+            and abs(beside - ratio * alone).max() < SAME_ENTRIES * abs(beside).max()
+        ):
             doubts.append(
                 f"where parameter {name!r} is the only one, the constant rest of the stiffness is {ratio:.4g} times "
                 "its term. The term is too small if its factor is not the one that was used. Give the factor "
@@ -234,7 +237,7 @@ def _check_sum(base: scipy.sparse.csc_array, terms: Terms, check: tuple[Mapping[
     changes = ((multipliers[name] - 1) * terms[name,] for name in multipliers)
     entries = (whole - reduce(add, changes, base)).tocoo()
     share = relative(entries, base.diagonal())
-    if share.size and share.max() > SAME:
+    if share.size and share.max() > SAME_ENTRIES:
         row = int(entries.row[np.argmax(share)])
         involved = [name for name in multipliers if terms[name,].diagonal()[row] > 0]
         raise ValueError(
@@ -242,9 +245,6 @@ def _check_sum(base: scipy.sparse.csc_array, terms: Terms, check: tuple[Mapping[
             f"{share.max():.2%} of the diagonal; expected a stiffness that is linear in "
             f"{involved or list(multipliers)}, each of which acts alone"
         )
-
-
-MATRICES = ("stiffness", "mass")
 
 
 class Program:
@@ -262,7 +262,7 @@ class Program:
         if not isinstance(result, tuple | list) or len(result) != 2:
             raise ValueError(f"the program returned a {type(result).__name__} {where}; expected (stiffness, mass)")
         matrices = []
-        for matrix, what in zip(result, MATRICES, strict=True):
+        for matrix, what in zip(result, ("stiffness", "mass"), strict=True):
             try:
                 _, (read,) = read_terms(matrix, what, self.n_dof)
             except ValueError as error:
@@ -293,11 +293,11 @@ def check_affine(program: Program, terms: tuple[Pairs, Pairs], row: Array) -> No
 def _difference(program: Program, terms: tuple[Pairs, Pairs], row: Array) -> tuple[str, float] | None:
     """Which matrix of a program differs from the affine one, and by which share of the diagonal."""
     theta = by_name(row, program.parameter_names)
-    for what, matrix, pairs in zip(MATRICES, program(row), terms, strict=True):
+    for what, matrix, pairs in zip(("stiffness", "mass"), program(row), terms, strict=True):
         affine = reduce(add, (np.prod([theta[name] for name in key]) * term for key, term in pairs))
         entries = (matrix - affine).tocoo()
         share = relative(entries, matrix.diagonal())
-        if share.size and share.max() > SAME:
+        if share.size and share.max() > SAME_ENTRIES:
             return what, float(share.max())
     return None
 

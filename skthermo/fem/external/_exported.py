@@ -14,10 +14,10 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import Matrix, check_names, check_path
-from skthermo._core.matrix_files import MASS, read_half, read_named_matrices
+from skthermo._core.matrix_files import MASS_OF, read_half, read_named_matrices
 from skthermo._core.warnings import warn_each
 from skthermo.fem.affine import AffineModel
-from skthermo.fem.external._differences import SAME, doubtful_matrices, read_differences, relative
+from skthermo.fem.external._differences import SAME_ENTRIES, doubtful_matrices, read_differences, relative
 
 
 def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
@@ -81,7 +81,6 @@ Total = str | Literal[False] | None
 
 MASS_NAMES = ("m", "m0", "mass", "maax", "maa", "mgg")
 TOTAL_NAMES = ("k", "k0", "stiffness", "nominal", "kaax", "kaa", "kgg")
-EXACTLY_SAME = 1e-8
 
 
 def load_affine(
@@ -199,7 +198,7 @@ def load_affine(
 
     def is_used(name: str) -> bool:
         is_named = keys is None or name in (*keys, mass, total)
-        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS))
+        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS_OF))
 
     matrices, dofs = read_named_matrices(file, is_used)
     exports = Exports(file, matrices)
@@ -292,17 +291,17 @@ class Exports:
     def mass(self) -> str:
         """The mass matrix: the one with a usual name, or that of all exports."""
         found = self.usual(self.square, MASS_NAMES, "mass")
-        masses = [name for name in self.square if name.endswith(MASS)]
+        masses = [name for name in self.square if name.endswith(MASS_OF)]
         if found is None and not masses:
             raise ValueError(f"{self.file}: {self._no_mass()}; say mass=..., one of {self.square or [*self.matrices]}")
         if found is not None:
             return found
-        nominal = [name for name in masses if name.removesuffix(MASS).lower() in TOTAL_NAMES]
+        nominal = [name for name in masses if name.removesuffix(MASS_OF).lower() in TOTAL_NAMES]
         chosen = (nominal or masses)[0]
         reference = self.matrix(chosen)
         for name in masses:
-            if not _same(self.matrix(name, reference.shape), reference, SAME):
-                both = f"{name.removesuffix(MASS)!r} differs from that of {chosen.removesuffix(MASS)!r}"
+            if not _same(self.matrix(name, reference.shape), reference, SAME_ENTRIES):
+                both = f"{name.removesuffix(MASS_OF)!r} differs from that of {chosen.removesuffix(MASS_OF)!r}"
                 raise ValueError(
                     f"{self.file}: the mass of {both}; expected exports of the same mass, or mass=..., one of them"
                 )
@@ -323,7 +322,7 @@ class Exports:
             name: self.matrix(name, shape)
             for name, one in self.matrices.items()
             if name != mass
-            and not (name in self.square and name.endswith(MASS))
+            and not (name in self.square and name.endswith(MASS_OF))
             and (name in self.square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
         }
 
@@ -349,7 +348,7 @@ class Exports:
         springs = {name: term for name, term in found.items() if name not in similar}
         if total is None and len(springs) > 2:
             whole = reduce(add, springs.values())
-            sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
+            sums = [name for name, term in springs.items() if _same(term, whole - term, 1e-8)]
             if len(sums) == 1:
                 del springs[sums[0]], found[sums[0]]
                 doubts.append(
@@ -380,10 +379,10 @@ class Exports:
     def rest(self, total: str, terms: Mapping[str, Matrix]) -> Matrix | None:
         """The total minus all terms; None if nothing is left."""
         whole, summed = self.matrix(total, next(iter(terms.values())).shape), reduce(add, terms.values())
-        if _same(summed, whole, SAME):
+        if _same(summed, whole, SAME_ENTRIES):
             return None
         rest = scipy.sparse.csc_array(whole - summed)
-        less = rest.diagonal() < -SAME * np.abs(whole.diagonal())
+        less = rest.diagonal() < -SAME_ENTRIES * np.abs(whole.diagonal())
         if less.any():
             row = int(np.argmax(less))
             raise ValueError(
@@ -402,7 +401,7 @@ def _ratio(term: Matrix, reference: Matrix) -> float:
     """The factor by which a term is a multiple of the reference; 0 if it is not."""
     reference = scipy.sparse.csc_array(reference)
     ratio = float((term * reference).sum() / max((reference * reference).sum(), np.finfo(float).tiny))
-    return ratio if ratio and _same(term, ratio * reference, SAME) else 0.0
+    return ratio if ratio and _same(term, ratio * reference, SAME_ENTRIES) else 0.0
 
 
 def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:

@@ -240,7 +240,7 @@ class GroupEffects:
         if len(members) > 1:
             members[ALL_GROUPS] = list(dict.fromkeys(name for joined in members.values() for name in joined))
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
-        frequencies = FrequencyEffects.over_records(
+        frequencies = FrequencyEffects.averaged(
             fem, parameters(fem, T), as_floats(F), StructuralChanges.of_damage(fem.model, of_model)
         )
         incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])

@@ -1,4 +1,4 @@
-"""What the weather shows: modes exchanged, outliers, temperatures of another time, steps and trends of frequencies."""
+"""Checks of frequencies beside the weather: exchanged modes, outliers, temperatures of another time, steps, trends."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from skthermo._core.arrays import (
     median,
     range_sums,
     robust_deviation,
+    rows_by_pattern,
     spread_evenly,
 )
 from skthermo._core.estimators import check_array
@@ -39,12 +40,12 @@ def check_records(
 ) -> RecordFindings:
     """Look at temperatures and frequencies for faults that would otherwise be learned.
 
-    It looks for gross errors first: what is no table of numbers, wrong times, numbers that stand for missing values,
-    other units, empty, constant or equal columns, tables that are exchanged or have different rows. Whatever it is
-    given as a table, it does not fail. Such values are then left out, and it looks for sensors and modes that are
-    stuck, weather that explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory,
-    steps and trends. Of one table alone, it tells the gross errors, within milliseconds for a year of hourly records. A
-    finding is a reason to look at the records, no proof of a fault.
+    It looks for gross errors first: arguments that are no tables of numbers, wrong times, numbers that stand for
+    missing values, other units, empty, constant or equal columns, tables that are exchanged or have different rows. No
+    argument makes it fail. Such values are then left out, and it looks for stuck sensors and modes, weather that
+    explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory, steps and trends.
+    One table alone is checked for gross errors only, which takes milliseconds for a year of hourly records. A finding
+    is a reason to look at the records, no proof of a fault.
 
     Parameters
     ----------
@@ -61,7 +62,8 @@ def check_records(
     Returns
     -------
     RecordFindings
-        Its ``table`` has a row for each finding, ``summary()`` a line; ``refuse_meaningless`` raises an error.
+        Its ``table`` has a row for each finding, ``summary()`` a line; ``temperatures`` and ``frequencies`` are the
+        cleaned tables; ``refuse_meaningless`` raises an error.
 
     Raises
     ------
@@ -71,13 +73,13 @@ def check_records(
     See Also
     --------
     HampelFilter : Puts NaN in place of outliers.
-    find_memory : Means of earlier temperatures that explain the frequencies, also those of hours.
+    find_memory : Means of earlier temperatures, also over hours, that explain the frequencies.
     residual_trend : The trend of residuals of any regression.
 
     Notes
     -----
-    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` what its findings mean. The ``severity`` of a
-    gross error is "meaningless" if results of a fit would be.
+    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` explains its findings. The ``severity`` of a
+    gross error is "meaningless" if results of a fit would be meaningless.
 
     Examples
     --------
@@ -102,13 +104,15 @@ def check_records(
         findings = [*findings, *records.findings()]
         far.iloc[records.order] |= records.are_outliers
         memory = records.memory
-    return RecordFindings(findings_table(findings), cleaned.n_rows, far, memory)
+    table = findings_table(findings)
+    cleaned.set_stuck_aside()
+    return RecordFindings(table, cleaned.n_rows, far, memory, **cleaned.tables(), left_out=cleaned.left_out())
 
 
 class RecordsInOrder:
-    """Records in order of time; what is found to be wrong becomes NaN.
+    """Records in order of time, in which values with a finding become NaN.
 
-    Of every sensor they are what it shows at that time, and of rows with one time the first.
+    Each sensor has its present value, without lags; of several rows with one time, the first counts.
     """
 
     def __init__(self, cleaned: CleanedRecords, unit: str):
@@ -138,7 +142,7 @@ class RecordsInOrder:
             self.inertia = max(int(24 / self.hours), 1)
 
     def findings(self) -> Iterator[RecordFinding]:
-        """What is found, one after the other; each search passes over what was found before."""
+        """Findings one after the other; each search passes over the values of earlier findings."""
         yield from self._stuck("stuck-sensor", self.T, self.sensors, " °C")
         yield from self._stuck("stuck-mode", self.F, self.modes, self.unit)
         if np.count_nonzero(~np.isnan(self.T).all(axis=1) & ~np.isnan(self.F).all(axis=1)) < 50:
@@ -182,7 +186,7 @@ class RecordsInOrder:
     def _exchanged_modes(self, lines: Array, folds: Rows) -> Iterator[RecordFinding]:
         """Pairs of modes that the weather explains much better with their values exchanged in some rows.
 
-        Rows with one value of two count if it is far from what its own column should be and near to the other's.
+        A row with one value of two counts if the value is far from its own column's prediction and near to the other's.
         """
         found = []
         for first, second in combinations(range(len(self.modes)), 2):
@@ -220,7 +224,8 @@ class RecordsInOrder:
             self.F[np.ix_(rows, both)] = self.F[np.ix_(rows, both[::-1])]
 
     def _far_from_neighbours(self, lines: Array, folds: Rows) -> NDArray[np.bool_]:
-        """Values far from their neighbours and from what the weather explains or, without weather, implausible ones."""
+        """Values far from their neighbours and from a regression on the weather or, without weather, implausible
+        ones."""
         F, has_weather = self.F, ~np.isnan(lines).any(axis=1)[:, np.newaxis]
         rest = F - np.where(has_weather, predicted_by_weather(lines, F, folds), median(F))
         distances, local = distances_from_neighbours(rest, np.arange(len(F)), 25)
@@ -269,7 +274,7 @@ class RecordsInOrder:
                 yield RecordFinding.in_rows(self.index, "slow-temperatures", sensor, usable, detail), inputs
 
     def _shift(self, lines: Array, past: Array, places: Array, F: Array, folds: Rows) -> RecordFinding | None:
-        """Temperatures of other rows, if they explain clearly more than those of the row and its past."""
+        """A finding where temperatures of other rows explain clearly more than the row's own and its past."""
         n_rows, inputs, found = len(F), np.hstack([lines, past]), []
         for shift in proposed_shifts(places, F, self.inertia):
             rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
@@ -300,7 +305,7 @@ class RecordsInOrder:
         return RecordFinding.in_rows(self.index, "time-shift", "", rows, detail)
 
     def _changes(self, inputs: Array) -> tuple[list[RecordFinding], Array]:
-        """Steps and trends that are found beside the weather, and what they add to each frequency."""
+        """Steps and trends beside the weather, and their share in each frequency."""
         level = np.zeros(self.F.shape)
         found: list[RecordFinding] = []
         rows = spread_evenly(np.arange(len(inputs)), 20_000)
@@ -310,21 +315,22 @@ class RecordsInOrder:
         if self.has_faulty_sensors or self.has_wrong_times or is_short:
             return found, level
         times = row_times(pd.DataFrame(index=self.index))
-        span = np.ptp(times[rows])
-        beside, deviations = Inputs(inputs[rows]), robust_deviation(F)
-        for mode, name in enumerate(self.modes):
-            known = np.flatnonzero(~np.isnan(self.F[:, mode]))
+        span, deviations = np.ptp(times[rows]), robust_deviation(F)
+        for known, basis, mode in bases_of(inputs[rows], F):
+            name, n_inputs = self.modes[mode], inputs.shape[1]
+            all_known = np.flatnonzero(~np.isnan(self.F[:, mode]))
             of_frequency = 0.1 * deviations[mode]
-            row, change, error = largest_step(beside, F[:, mode])
+            row, change, error = largest_step(basis, known, F[:, mode], n_inputs)
             if abs(change) > max(5 * error, of_frequency):
                 level[rows[row] :, mode] = change
                 detail = (
                     f"{name!r} changes by {change:+.2g}{self.unit} about {period_of(self.index, rows[[row]])}, "
                     f"standard error {error:.1g}"
                 )
-                found.append(RecordFinding.in_rows(self.index, "sudden-change", name, known, detail))
+                found.append(RecordFinding.in_rows(self.index, "sudden-change", name, all_known, detail))
                 continue
-            change, error, first, last, number = trend_of(beside, (times[rows] - times[rows[0]]) / span, F[:, mode])
+            places = (times[rows] - times[rows[0]]) / span
+            change, error, first, last, number = trend_of(basis, known, places, F[:, mode], n_inputs)
             least = max(5 * error, 0.5 * error * np.sqrt(number / 12), of_frequency)  # half of the residuals' deviation
             if abs(change) > least:
                 level[:, mode] = change * (times - times[0]) / np.ptp(times)
@@ -333,8 +339,8 @@ class RecordsInOrder:
                     f"{name!r} changes by {change:+.2g}{self.unit}, standard error {error:.1g}{a_year}; first fifth "
                     f"{first:+.2g}{self.unit}, last fifth {last:+.2g}{self.unit}"
                 )
-                found.append(RecordFinding.in_rows(self.index, "trend", name, known, detail))
-        return found, level
+                found.append(RecordFinding.in_rows(self.index, "trend", name, all_known, detail))
+        return sorted(found, key=lambda one: self.modes.index(one.column)), level
 
 
 def _are_implausible(F: Array) -> NDArray[np.bool_]:
@@ -353,7 +359,7 @@ def explained(inputs: Array, frequencies: Array, folds: Rows) -> Array:
 
 
 def unexplained(inputs: Array, frequencies: Array, folds: Rows) -> Array:
-    """Mean square that inputs leave of each mode out of fold, over that which the mean of the other folds leaves."""
+    """Mean square of each mode's residuals out of fold by the inputs, over that by the mean of the other folds."""
     values = np.where(np.isnan(inputs).any(axis=1)[:, np.newaxis], np.nan, frequencies)
     means = out_of_fold(lambda train: lambda test: np.tile(means_of_known(values[train]), (len(test), 1)), folds)
     means = np.where(np.isnan(means), median(values), means)  # where the other folds have no value
@@ -430,8 +436,8 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
 
     Notes
     -----
-    The line is that of least squares. Its variance is that of independent records times the correlation time, 1 + 2 *
-    the sum of the autocorrelations, of what remains beside the line.
+    The line is fitted by least squares. Its variance is the variance for independent records times the correlation time
+    of the rest beside the line, 1 + 2 * the sum of its autocorrelations.
 
     Examples
     --------
@@ -448,52 +454,42 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
     order = np.argsort(times, kind="stable")
     span = np.ptp(times) if len(times) else 0.0
     places = (times[order] - times[order][:1]) / span if span > 0 else np.zeros(len(times))
-    beside = Inputs(np.ones((len(values), 1)))
-    rows = [trend_of(beside, places, column) for column in values[order].T]
+    rows = np.full((values.shape[1], 5), np.nan)
+    for known, basis, mode in bases_of(np.ones((len(values), 1)), values[order]):
+        rows[mode] = trend_of(basis, known, places, values[order, mode], 1)
     estimates = ["change", "standard_error", "first", "last", "n_independent"]
     table = pd.DataFrame(rows, index=list(names), columns=estimates)
     table.insert(2, "per_year", table["change"] * (YEAR.value / span if has_stamps(residuals) and span > 0 else np.nan))
     return table
 
 
-class Inputs:
-    """Inputs beside which trends and steps of columns are sought, (n_samples, n_inputs), in order of time.
-
-    Their orthonormal basis is found once for columns one after the other that have values in the same rows.
-    """
-
-    def __init__(self, values: Array):
-        self.values = values
-        self.are_known = ~np.isnan(values).any(axis=1)
-        self.least_known = 10 + 2 * values.shape[1]
-        self._last: tuple[Rows, Array] | None = None
-
-    def known(self, column: Array) -> Rows:
-        """Rows in which the inputs and a column are known."""
-        return np.flatnonzero(self.are_known & ~np.isnan(column))
-
-    def basis(self, rows: Rows) -> Array:
-        """Orthonormal columns that span what the inputs do in some rows."""
-        if self._last is None or not np.array_equal(self._last[0], rows):
-            basis, triangle = np.linalg.qr(self.values[rows])
+def bases_of(inputs: Array, values: Array) -> Iterator[tuple[Rows, Array, int]]:
+    """For each mode that has enough values: the rows in which it and the inputs are known, orthonormal columns that
+    span what the inputs do there, and its position."""
+    usable = ~np.isnan(inputs).any(axis=1)
+    for is_known, modes in rows_by_pattern(~np.isnan(values.T) & usable):
+        known = np.flatnonzero(is_known)
+        if len(known) >= 10 + 2 * inputs.shape[1]:
+            basis, triangle = np.linalg.qr(inputs[known])
             directions, sizes, _ = np.linalg.svd(triangle)
-            self._last = rows, basis @ directions[:, sizes > 1e-8 * sizes.max()]
-        return self._last[1]
+            basis = basis @ directions[:, sizes > 1e-8 * sizes.max()]
+            yield from ((known, basis, int(mode)) for mode in modes)
 
 
-def trend_of(inputs: Inputs, places: Array, column: Array) -> tuple[float, float, float, float, float]:
-    """Change from place 0 to 1, its standard error, means of the first and last part, and the effective number."""
-    known = inputs.known(column)
+def trend_of(
+    basis: Array, known: Rows, places: Array, column: Array, n_inputs: int
+) -> tuple[float, float, float, float, float]:
+    """Change from place 0 to 1 beside inputs, its standard error, means of the first and last fifth, and the effective
+    number."""
     x, y = places[known], column[known]
-    if len(y) < inputs.least_known or np.ptp(x) == 0:
+    if np.ptp(x) == 0:
         return (np.nan,) * 5
-    basis = inputs.basis(known)
-    # Frisch-Waugh: the trend of what the inputs leave of values, over what they leave of time
+    # Frisch-Waugh: both the values and the times without their parts that the inputs explain
     both = np.column_stack([x, y])
     alone, rest = (both - basis @ (basis.T @ both)).T
     change = alone @ rest / (alone @ alone)
     scatter = rest - change * alone
-    error, time = _standard_error(scatter, known, len(column), alone @ alone, inputs.values.shape[1])
+    error, time = _standard_error(scatter, known, len(column), alone @ alone, n_inputs)
     at = scatter + change * (x - x.mean())
     is_first, is_last = x <= 1 / 5, x >= 1 - 1 / 5
     first = at[is_first].mean() if is_first.any() else np.nan
@@ -502,7 +498,7 @@ def trend_of(inputs: Inputs, places: Array, column: Array) -> tuple[float, float
 
 
 def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_inputs: int) -> tuple[float, float]:
-    """Of the coefficient of a regressor with this sum of squares, and the correlation time of what it leaves."""
+    """Standard error of the coefficient of a regressor with this sum of squares, and the scatter's correlation time."""
     in_time = np.full(n_rows, np.nan)
     in_time[known] = scatter
     time = min(correlation_time(in_time), len(known) / 2)
@@ -510,17 +506,15 @@ def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_i
     return float(np.sqrt(variance * time / square)), time
 
 
-def largest_step(inputs: Inputs, column: Array) -> tuple[int, float, float]:
+def largest_step(basis: Array, known: Rows, column: Array, n_inputs: int) -> tuple[int, float, float]:
     """The step that explains most of a column beside inputs: its row, the change and its standard error.
 
     The change is 0 where a straight line does nearly as well. Rows are in order of time. As for a trend, the standard
-    error holds if what remains depends on what was before.
+    error allows for correlation of the rest.
     """
-    known = inputs.known(column)
     n_places = min(100, len(known) // 10)
-    if len(known) < inputs.least_known or n_places < 2:
+    if n_places < 2:
         return 0, 0.0, np.inf
-    basis = inputs.basis(known)
     at = np.arange(1, n_places) * len(known) // n_places
     line, y = np.arange(len(known)) / len(known), column[known]
     line, rest = line - basis @ (basis.T @ line), y - basis @ (basis.T @ y)
@@ -533,5 +527,5 @@ def largest_step(inputs: Inputs, column: Array) -> tuple[int, float, float]:
     if rest @ rest - change * products[best] > 0.9 * (rest @ rest - explained_by_line):
         return 0, 0.0, np.inf
     scatter = rest - change * ((np.arange(len(known)) >= at[best]) - basis @ within[best])
-    error, _ = _standard_error(scatter, known, len(column), squares[best], inputs.values.shape[1])
+    error, _ = _standard_error(scatter, known, len(column), squares[best], n_inputs)
     return int(known[at[best]]), float(change), error

@@ -1,4 +1,4 @@
-"""What the columns of one table show: values that cannot be, and values that say nothing; other units and signs."""
+"""Checks of the columns of one table: impossible values, columns without information, other units and signs."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ IN_KELVIN = (183.0, 373.0)  # the same range in kelvin
 
 
 class Reading:
-    """A table of records as numbers in order of time, NaN where they cannot be used, and what was found on the way.
+    """A table of records as numbers in order of time, NaN where they cannot be used, and findings on the way.
 
-    Whatever is no table has no column. Rows are row ``order`` of the table that was given. Columns that are ``useless``
-    have one value, or very few. The ``unit`` is what a sentence says after a value.
+    An argument that is no table has no column. ``order`` has the positions of the rows in the table that was given.
+    Columns that are ``useless`` have one value, or very few. Sentences write the ``unit`` after a value.
     """
 
     def __init__(self, table: Any, what: str, unit: str):
@@ -269,7 +269,7 @@ def texts_of(levels: Array) -> str:
 
 
 def look_at_temperatures(T: Reading) -> None:
-    """Put aside what no thermometer in the open shows, and name columns in another unit or with another sign."""
+    """Put aside values that no thermometer in the open shows, and name columns in another unit or with another sign."""
     varying = []
     for name, places in columns_by_sensor(T).items():  # lags repeat what a sensor shows
         column = Column(T, places[0], name)
@@ -335,9 +335,9 @@ def _opposite_signs(T: Reading, columns: list[Column]) -> list[Column]:
 
 
 def _is_in_another_unit(column: Column, place: int, quantiles: Array) -> bool:
-    """Whether a sensor shows what the others do in degrees Fahrenheit, or in tenths of a degree; and say so.
+    """Whether a sensor shows the others' temperatures in degrees Fahrenheit, or in tenths of a degree; and say so.
 
-    By the 5th, 50th and 95th percentile of each sensor, (3, n_sensors), in rows in which all have a value.
+    ``quantiles`` are the 5th, 50th and 95th percentile of each sensor, (3, n_sensors), in rows where all have a value.
     """
     others = np.delete(quantiles, place, axis=1)
     low, middle, high = quantiles[:, place]
@@ -376,7 +376,7 @@ def _is_scaled(column: Column) -> bool:
 
 
 def look_at_responses(F: Reading, *, in_hertz: bool, beside_weather: bool) -> None:
-    """Put aside what is no frequency, or no response of another kind.
+    """Put aside values that are no frequencies, or no responses of another kind.
 
     Beside the weather, single values far from others are left to the search for exchanged modes and outliers.
     """
@@ -404,7 +404,7 @@ def look_at_responses(F: Reading, *, in_hertz: bool, beside_weather: bool) -> No
 
 
 def compare_with_model(F: Reading, model: Any) -> None:
-    """Name frequencies in another unit than the nominal ones of a model, and those of another mode."""
+    """Name frequencies in another unit than a model's nominal ones, and frequencies of another mode."""
     nominal = np.ravel(model.frequencies(np.ones((1, len(model.parameter_names)))))
     if len(nominal) != len(F.columns):
         F.found("number-of-modes", "", F.whole, f"{len(F.columns)} columns for {len(nominal)} modes")

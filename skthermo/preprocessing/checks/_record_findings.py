@@ -1,21 +1,21 @@
-"""What is found in records: its kinds, what each one means and what to do; as a table, text, warnings and an error."""
+"""Findings about records: their kinds, consequences and remedies; as a table, text, warnings and an error."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.frames import midnight
+from skthermo._core.frames import Table, midnight
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing._find_memory import MemoryFindings
 
 WARNINGS = {
-    "no-table": "what is given is no table of numbers: {}. Nothing can be learned from it. Give a DataFrame or a "
+    "no-table": "the argument is no table of numbers: {}. Nothing can be learned from it. Give a DataFrame or a "
     "two-dimensional array of numbers, a row for each record",
     "no-numbers": "columns hold something other than numbers: {}. Nothing can be learned from them. Convert or drop "
     "these columns",
@@ -66,10 +66,10 @@ WARNINGS = {
     "temperatures-are-frequencies": "a column stands in both tables: {}. The frequency would predict itself and hide "
     "all damage. Give temperatures only in the first table",
     "number-of-modes": "frequencies and model have different numbers of modes: {}. A column would be read as another "
-    "mode. Give a column for each mode of the model, or model.with_modes of those that match_modes finds",
+    "mode. Give a column for each mode of the model, or model.with_modes of the modes that match_modes finds",
     "unit-of-frequencies": "frequencies are in another unit than the model's: {}. Changes of the frequencies would be "
     "wrong by that factor. Convert them to Hz",
-    "unit-of-a-mode": "a mode is far from the model's: {}. Its changes would be read as those of another mode or "
+    "unit-of-a-mode": "a mode is far from the model's: {}. Its changes would be read as changes of another mode or "
     "unit. Convert it to Hz, or order the columns as the model's modes",
     "stuck-sensor": "values of a sensor only repeat: {}. They count as missing. Put NaN where it is stuck",
     "stuck-mode": "values of a mode only repeat: {}. They count as missing. Put NaN where it is stuck",
@@ -79,17 +79,17 @@ WARNINGS = {
     "be learned. Join the tables by their times",
     "exchanged-modes": "modes look exchanged in some rows: {}. The scatter of both would hide damage. Exchange them "
     "back, or track modes by shape",
-    "frequency-outliers": "frequencies are far from their neighbours in time and from what the weather explains: {}. "
-    "Those that cannot be are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
+    "frequency-outliers": "frequencies are far from their neighbours in time and from a regression on the weather: {}. "
+    "Impossible values are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
     "HampelFilter does",
     "slow-temperatures": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
     "taken for changes of the structure. Append these means to the inputs of the regression",
-    "sudden-change": "frequencies change at once by what the weather does not explain: {}. Both levels would be "
+    "sudden-change": "frequencies change at once, and the weather does not explain it: {}. Both levels would be "
     "learned as healthy. Fit on records of one structure, in one state and by one way of identification",
-    "trend": "what the weather leaves of the frequencies has a trend: {}. A detector takes a trend that goes on for "
-    "damage. Check whether the structure or a sensor drifts",
+    "trend": "residuals of the frequencies beside the weather have a trend: {}. A detector takes a trend that goes on "
+    "for damage. Check whether the structure or a sensor drifts",
 }
-"""By kind: what was found, with a place for details; what follows from it; what to do."""
+"""By kind: the finding, with a place for details; its consequence; the remedy."""
 
 ARE_MEANINGLESS = frozenset(
     {
@@ -106,10 +106,10 @@ ASIDE_KINDS = frozenset(
         *("stuck-sensor", "stuck-mode"),
     }
 )
-"""Kinds of values that cannot be, which count as missing."""
+"""Kinds of values that cannot be measurements, which count as missing."""
 
 IMPOSSIBLE = frozenset({"infinite-values", "placeholders", "not-positive"})
-"""Those which cannot be in any state of a structure."""
+"""Kinds of values that are impossible in any state of a structure."""
 
 LEFT_OUT_KINDS = frozenset({"missing-column", "constant"})
 """Kinds of columns that say nothing."""
@@ -150,7 +150,7 @@ def label_of(label: Any) -> str:
 
 
 def findings_table(findings: Iterable[RecordFinding]) -> pd.DataFrame:
-    """Findings one by one as a table, with what follows from each if the records are used, and what to do."""
+    """Findings one by one as a table, each with its consequence and its remedy."""
     rows = []
     for found in findings:
         severity = "meaningless" if found.what in ARE_MEANINGLESS else "doubtful"
@@ -161,21 +161,25 @@ def findings_table(findings: Iterable[RecordFinding]) -> pd.DataFrame:
 
 @dataclass(frozen=True, repr=False)
 class RecordFindings(SavesFrames):
-    """What `check_records` has found.
+    """Findings of `check_records`, and the cleaned tables.
 
     Parameters
     ----------
     table : DataFrame
-        A row for each finding: ``what`` was found (its code in the guide) in which ``column``, in how many rows
-        (``n_rows``), ``from`` and ``to`` which row by the labels of the records' index, a sentence that says more
-        (``detail``), its ``severity`` ("meaningless" if results of a fit would be, else "doubtful"), its
+        A row for each finding: its kind (``what``, the code in the guide), its ``column``, the number of rows
+        (``n_rows``) and the labels of the first and the last of them (``from``, ``to``), a sentence with details
+        (``detail``), its ``severity`` ("meaningless" if results of a fit would be meaningless, else "doubtful"), its
         ``consequence``, and the ``action`` to take. Empty where nothing was found.
     n_rows : int
         Number of records.
     outliers : DataFrame of bool of shape (n_records, n_modes), optional
         Which frequencies are outliers, on the records' index.
     memory : MemoryFindings, optional
-        What `find_memory` has found; None where nothing was looked for.
+        The result of `find_memory`; None where memory was not looked for.
+    temperatures, frequencies : array-like or DataFrame, optional
+        The tables as they were given, NaN in place of values that cannot be measurements, as `set_aside` gives them.
+    left_out : dict, optional
+        Columns that cannot be used, each with the reason.
 
     Examples
     --------
@@ -193,6 +197,9 @@ class RecordFindings(SavesFrames):
     n_rows: int
     outliers: pd.DataFrame | None = None
     memory: MemoryFindings | None = None
+    temperatures: Table | None = None
+    frequencies: Table | None = None
+    left_out: dict[Hashable, str] = field(default_factory=dict)
 
     def summary(self) -> str:
         """A line for each finding, and for each kind a line with its consequence and what to do.
@@ -219,12 +226,12 @@ class RecordFindings(SavesFrames):
         Parameters
         ----------
         exclude : collection of str, default=()
-            Kinds of findings of which there is no warning.
+            Kinds of findings that give no warning.
 
         Yields
         ------
         RecordsWarning
-            Its ``kind`` is what was found.
+            Its ``kind`` is that of the finding.
         """
         for kind, rows in self.table.groupby("what", sort=False):
             if kind not in {*ASIDE_KINDS, "few-rows", *exclude}:  # estimators warn of these themselves
@@ -236,7 +243,7 @@ class RecordFindings(SavesFrames):
         Parameters
         ----------
         exclude : collection of str, default=()
-            Kinds of findings that do no harm to what is done with the records.
+            Kinds of findings that do no harm to the use of these records.
 
         Raises
         ------

@@ -1,4 +1,5 @@
-"""What is set aside before anything is learned: values that cannot be, columns of which most are such, wrong rows."""
+"""The gate of records: values that cannot be measurements become NaN, columns without use are left out, wrong rows and
+tables are errors."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, check_model, spread_evenly
-from skthermo._core.frames import MISSING_CODES, Table, as_stamps, frame_like
+from skthermo._core.frames import MISSING_CODES, Table, as_stamps, named_frame
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
@@ -39,7 +40,7 @@ WRONG_TIMES = {"missing-stamps", "equal-stamps", "stamps-from-numbers", "stamps-
 
 @dataclass(frozen=True)
 class SetAside(SavesFrames):
-    """Tables of records without values that cannot be, and what has become of them.
+    """Tables with NaN in place of values that cannot be measurements, and a table of these values.
 
     Parameters
     ----------
@@ -106,10 +107,10 @@ def set_aside(
     needs_all: bool = False,
     is_baseline: bool = True,
 ) -> SetAside:
-    """Records without values that cannot be.
+    """Put NaN in place of values that cannot be measurements.
 
-    Infinite values, numbers that loggers write for a missing one, frequencies that are not positive, values at another
-    level far from all others, and those of a sensor that is stuck become NaN. A column is left out if it has no value,
+    These are infinite values, numbers that loggers write for a missing value, frequencies that are not positive, values
+    at another level far from all others, and values of a stuck sensor. A column is left out if it has no value,
     a single one, if more than half of its values are set aside, or more than a fifth as another level.
 
     Parameters
@@ -169,49 +170,19 @@ def set_aside(
     harmless = ASIDE_KINDS | (set() if needs_all else LEFT_OUT_KINDS) | set(exclude)
     others = RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows)
     others.refuse_meaningless()
-    cleaned: dict[str, Table] = {}
-    left_out: dict[Hashable, str] = {}
-    found: list[RecordFinding] = []
-    for reading, table in zip(records.readings, records.given, strict=True):
-        what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
-        for place, rows in () if what in exclude else stuck_columns(reading.values):
-            name, value = reading.columns[place], f"{reading.values[rows[0], place]:.6g}{reading.unit}"
-            reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
-            reading.set_aside(what, rows, place)
-        for kind, rows, place, before in reversed(reading.aside):
-            if kind not in kinds:  # these values are used as they are
-                reading.values[rows, place] = before
-        own = dict(_left_out(reading, exclude))
+    records.set_stuck_aside(exclude)
+    records.use(ASIDE_KINDS - kinds)
+    left_out = records.left_out(exclude)
+    for reading in records.readings:
+        own = [left_out[name] for name in reading.columns if name in left_out]
         if own and len(own) == len(reading.columns):
-            raise ValueError(
-                f"no column of the {reading.what} can be used: {'; '.join(own.values())}; expected measurements"
-            )
-        left_out |= own
-        found += [one for one in reading.findings if one.what in LEFT_OUT_KINDS.union(kinds)]
-        values = np.empty_like(reading.values)
-        values[reading.order] = reading.values
-        cleaned[reading.what] = frame_like(table, values, reading.columns)
+            raise ValueError(f"no column of the {reading.what} can be used: {'; '.join(own)}; expected measurements")
     if needs_all and left_out:
         raise ValueError(f"columns cannot be used: {'; '.join(left_out.values())}; expected measurements in each")
-    result = SetAside(cleaned.get("temperatures"), cleaned.get("frequencies"), findings_table(found), left_out, others)
+    found = [one for reading in records.readings for one in reading.findings if one.what in LEFT_OUT_KINDS | kinds]
+    result = SetAside(**records.tables(), table=findings_table(found), left_out=left_out, others=others)
     warn_each(result.warnings())
     return result
-
-
-def _left_out(reading: Reading, exclude: Collection[str]) -> Iterator[tuple[Hashable, str]]:
-    """Columns that have no value or one, and those of which most values were set aside, each with a reason."""
-    known = np.count_nonzero(reading.were_known, axis=0)
-    n_aside = np.count_nonzero(reading.were_known & np.isnan(reading.values), axis=0)
-    for place, name in enumerate(reading.columns):
-        own: list[RecordFinding] = [found for found in reading.findings if found.column == name]
-        elsewhere = sum(found.n_rows for found in own if found.what == "another-level")
-        # of two levels, it is not certain which one is right
-        if n_aside[place] > 0.5 * known[place] or elsewhere > 0.2 * known[place]:
-            yield name, "; ".join(found.detail for found in own if found.what in ASIDE_KINDS)
-        else:
-            useless = [found for found in own if found.what in LEFT_OUT_KINDS and found.what not in exclude]
-            if useless:
-                yield name, f"{useless[0].detail} ({useless[0].what})"
 
 
 class CleanedRecords:
@@ -256,6 +227,48 @@ class CleanedRecords:
         far = np.zeros(F.values.shape, dtype=bool)
         far[F.order] = F.were_known & np.isnan(F.values)
         return pd.DataFrame(far, F.given_index if F.is_frame else None, pd.Index(F.columns, tupleize_cols=False))
+
+    def set_stuck_aside(self, exclude: Collection[str] = ()) -> None:
+        """Make values NaN in rows in which a sensor or a mode was stuck."""
+        for reading in self.readings:
+            what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
+            for place, rows in () if what in exclude else stuck_columns(reading.values):
+                name, value = reading.columns[place], f"{reading.values[rows[0], place]:.6g}{reading.unit}"
+                reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
+                reading.set_aside(what, rows, place)
+
+    def use(self, kinds: Collection[str]) -> None:
+        """Values that were put aside for these kinds of findings are used as they were given."""
+        for reading in self.readings:
+            for kind, rows, place, before in reversed(reading.aside):
+                if kind in kinds:
+                    reading.values[rows, place] = before
+
+    def left_out(self, exclude: Collection[str] = ()) -> dict[Hashable, str]:
+        """Columns without a value or with one, and columns of which most values were set aside, with the reasons."""
+        reasons: dict[Hashable, str] = {}
+        for reading in self.readings:
+            known = np.count_nonzero(reading.were_known, axis=0)
+            n_aside = np.count_nonzero(reading.were_known & np.isnan(reading.values), axis=0)
+            for place, name in enumerate(reading.columns):
+                own: list[RecordFinding] = [found for found in reading.findings if found.column == name]
+                elsewhere = sum(found.n_rows for found in own if found.what == "another-level")
+                useless = [found for found in own if found.what in LEFT_OUT_KINDS and found.what not in exclude]
+                # of two levels, it is not certain which one is right
+                if n_aside[place] > 0.5 * known[place] or elsewhere > 0.2 * known[place]:
+                    reasons[name] = "; ".join(found.detail for found in own if found.what in ASIDE_KINDS)
+                elif useless:
+                    reasons[name] = f"{useless[0].detail} ({useless[0].what})"
+        return reasons
+
+    def tables(self) -> dict[str, Table | None]:
+        """Temperatures and frequencies in the order of rows that were given; None where they were not given."""
+        tables: dict[str, Table | None] = {"temperatures": None, "frequencies": None}
+        for reading, given in zip(self.readings, self.given, strict=True):
+            values = np.empty_like(reading.values)
+            values[reading.order] = reading.values
+            tables[reading.what] = named_frame(given, values)
+        return tables
 
     def useful_values(self, reading: Reading) -> Array:
         """Values, NaN in columns that are constant or have very few different values."""
@@ -387,7 +400,7 @@ class Plausible:
     most: Array
 
     @classmethod
-    def of(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
+    def learned(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
         """No temperature in kelvin, and none that is 100 degrees beyond the baseline; targets may have any value."""
         is_target = baseline.columns.isin(targets)
         found = cls.beside(*_range(baseline.to_numpy()))

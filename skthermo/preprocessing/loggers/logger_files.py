@@ -1,4 +1,4 @@
-"""Files of records: CSV in any common form, Excel workbooks, and parquet; what their form is, and what they hold."""
+"""Files of records: CSV in any common form, Excel workbooks, and parquet; their form and their contents."""
 
 from __future__ import annotations
 
@@ -90,7 +90,8 @@ class CsvFormat:
 def read_file(
     file: Path, form: CsvFormat, *, ignore: Collection[str] = (), leave_unfinished: bool = False
 ) -> pd.DataFrame:
-    """Records on their stamps in the order of the file; what is no stamp or number is an error that names its line.
+    """Records on their stamps in the order of the file; a text that is no stamp or number is an error that names its
+    line.
 
     A last line without a line break may be cut off: it is left out if asked for or if values are lacking, else there is
     a warning.
@@ -103,7 +104,7 @@ def read_file(
 def read_and_doubted(
     file: Path, form: CsvFormat, *, ignore: Collection[str] = (), leave_unfinished: bool = False
 ) -> tuple[pd.DataFrame, list[RecordsWarning]]:
-    """Records as `read_file` gives them, and what is doubtful about them."""
+    """Records as `read_file` gives them, and doubts about them."""
     if file.suffix.lower() in PARQUET:
         table, findings = _parquet(file).drop(columns=list(ignore), errors="ignore"), []
     else:
@@ -350,7 +351,7 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
 
 
 def parsed(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
-    """Texts as times, NaT for what is none in this format; in UTC if they have offsets."""
+    """Texts as times, NaT for a text in another format; in UTC if they have offsets."""
     if form in NUMERIC_STAMPS:
         unit, origin, least, most = NUMERIC_STAMPS[form]
         numbers = pd.to_numeric(pd.Series([text.replace(",", ".") for text in texts], dtype=object), errors="coerce")
@@ -552,7 +553,7 @@ def _is_number(cell: str, decimal: str) -> bool | None:
 
 
 def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> tuple[tuple[int, ...], str, list[str]]:
-    """Places of the columns that hold the stamps, their format, and what is doubtful in it."""
+    """Places of the columns that hold the stamps, their format, and doubts about it."""
     looked = rows[:MOST_LOOKED_AT]
     for forms in [(given,)] if given else [WRITTEN_STAMPS, (UNIX, UNIX_MS), (EXCEL,)]:
         tried = [(places, _fitting(looked, places, forms)) for places in _places(looked)]

@@ -21,10 +21,9 @@ HZ = "Hz"
 class LoggerRecords:
     """Records of files, in order of time and in degrees Celsius.
 
-    ``roles`` are names of columns by what they are: temperatures, reference and responses; ``units`` are those of the
-    responses, "" where unknown, ``convert`` those of temperatures that were in others. ``waiting`` are stamps that are
-    not in all files; ``ignored`` says why columns are not used.
-    """
+    ``roles`` are names of columns by role: temperatures, reference and responses; ``units`` are the units of the
+    responses, "" where unknown; ``convert`` has the units of temperatures that were not in degrees Celsius. ``waiting``
+    are stamps that are not in all files; ``ignored`` says why columns are not used."""
 
     looks: Sequence[FileLook]
     table: pd.DataFrame
@@ -84,7 +83,7 @@ class LoggerRecords:
 
 
 def _roles(looks: Sequence[FileLook], columns: list[str], given: dict[str, Any]) -> dict[str, list[str]]:
-    """Columns by what they are: as said, else as the first and the other of two files, or by unit and name."""
+    """Columns by role: as given, else as the first and the other of two files, or by unit and name."""
     unknown = [name for names in given.values() for name in names or () if name not in columns]
     if unknown:
         raise ValueError(f"there are no columns {unknown}; expected some of {columns}{_others(looks)}")

@@ -153,7 +153,7 @@ def identify_damage(
     seen = observe(fem, T, F, noise)
 
     def beside(chain: Any, theta: Array) -> ShiftComparison:
-        effects = FrequencyEffects.over_records(chain, theta, seen.frequencies, changes)
+        effects = FrequencyEffects.averaged(chain, theta, seen.frequencies, changes)
         return compared(effects, seen.shift, shapes, dofs, shape_noise)
 
     def scale_of(every: ShiftComparison) -> Scale:

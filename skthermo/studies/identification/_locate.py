@@ -369,7 +369,7 @@ class MeasuredShift:
         twin = with_model(self.fem, self.structure.divide(self.fem.model, question.parts))
         changes = StructuralChanges.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
-        effects = FrequencyEffects.over_records(twin, self.theta, mode_is_known, changes)
+        effects = FrequencyEffects.averaged(twin, self.theta, mode_is_known, changes)
         with reported_by_caller(["foreign-shapes"]):
             comparison = compared(effects, self.shift, self.shapes, self.dofs, self.shape_noise)
         observed = comparison.observed(self.prior.model_error)

@@ -341,7 +341,7 @@ def taught(
     if now.is_program:
         return now
     solved = now.simulator.approximate.linearise(np.exp(x), n_jobs, relative=True)
-    return replace(now, surface=ResponseSurface.of(x, *solved))
+    return replace(now, surface=ResponseSurface.fitted(x, *solved))
 
 
 def with_runs(
@@ -360,7 +360,7 @@ def with_runs(
     points = x[random.randint(len(x), size=number)]
     points = points + posterior.prior.deviations * random.standard_normal(points.shape)
     runs.append((points, evaluate(posterior.simulator.model, np.exp(points), n_jobs=n_jobs)))
-    surface = ResponseSurface.of(*(np.concatenate(part) for part in zip(*runs, strict=True)))
+    surface = ResponseSurface.fitted(*(np.concatenate(part) for part in zip(*runs, strict=True)))
     at_nominal = (2 * n_parameters + 1) * (len(runs) == 1)
     return replace(posterior, surface=surface, n_runs=posterior.n_runs + number + at_nominal)
 

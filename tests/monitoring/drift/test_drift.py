@@ -14,9 +14,6 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.fem import AffineModel, add_noise
 from skthermo.monitoring import track_parameters
 from skthermo.monitoring.drift import DriftFollower
-from skthermo.monitoring.drift._explanations import Explanations, ModeTrends
-from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, DayShown, State
-from skthermo.monitoring.drift._observations import observation, shapes_of_time
 from skthermo.surrogate import DataInformedFEM
 
 GROUPS = ["bottom", "top", "diagonal"]
@@ -45,85 +42,6 @@ def history(ageing):
 def healthy():
     campaign = make_truss_campaign(2, random_state=1)
     return campaign, trained(campaign)
-
-
-def small_case(n_days=12, seed=0):
-    """Two levels with slopes, two constants and two disturbances, seen by two modes with gaps."""
-    random = np.random.RandomState(seed)
-    memory, renewal = np.array([0.8, 0.3]), np.array([[0.5, 0.1], [0.1, 0.4]])
-    steps = DailySteps(0.1, np.diag([0.2, 0.05]), np.diag([0.1, 0.3]), memory, renewal)
-    root = random.standard_normal((8, 8))
-    start = State(random.standard_normal(8), root @ root.T / 8)
-    days = []
-    for day in range(n_days):
-        present = [[], [0], [1], [0, 1]][random.randint(4) if day else 3]
-        design = random.standard_normal((2, 8))[present]
-        days.append(DayShown(random.standard_normal(len(present)), design, 0.3 * np.eye(len(present))))
-    return steps, start, days
-
-
-def dense(steps, start, days):
-    """Mean and covariance of the states of all days, given all values, by one Gaussian conditional."""
-    n, n_days = len(start.mean), len(days)
-    transition = np.eye(n)
-    transition[:2, 2:4] = steps.length * np.eye(2)
-    transition[-2:, -2:] = np.diag(steps.memory)
-    added = np.zeros((n, n))
-    added[:2, :2], added[2:4, 2:4], added[-2:, -2:] = steps.walk, steps.turn, steps.renewal
-    powers = [np.linalg.matrix_power(transition, k) for k in range(n_days)]
-    mean = np.concatenate([power @ start.mean for power in powers])
-    covariance = np.zeros((n * n_days, n * n_days))
-    for i in range(n_days):
-        for j in range(n_days):
-            block = powers[i] @ start.covariance @ powers[j].T
-            block = block + sum(powers[i - k] @ added @ powers[j - k].T for k in range(1, min(i, j) + 1))
-            covariance[n * i : n * (i + 1), n * j : n * (j + 1)] = block
-    design = np.zeros((sum(len(day.values) for day in days), n * n_days))
-    noise, row = np.zeros((len(design), len(design))), 0
-    for place, day in enumerate(days):
-        rows = slice(row, row + len(day.values))
-        design[rows, n * place : n * (place + 1)], noise[rows, rows] = day.design, day.noise
-        row = rows.stop
-    values = np.concatenate([day.values for day in days])
-    gain = np.linalg.solve(design @ covariance @ design.T + noise, design @ covariance).T
-    return mean + gain @ (values - design @ mean), covariance - gain @ design @ covariance
-
-
-def test_the_filter_equals_the_dense_conditional():
-    steps, start, days = small_case()
-    mean, covariance = dense(steps, start, days)
-    n = len(start.mean)
-    state = steps.filtered(start, days)
-    assert_allclose(state.mean, mean[-n:], atol=1e-9)
-    assert_allclose(state.covariance, covariance[-n:, -n:], atol=1e-9)
-
-
-def test_memory_and_variances_of_noise_are_recovered():
-    random = np.random.RandomState(0)
-    n_days, memory, fading, fresh = 3000, 0.85, 0.02, 0.01
-    states = np.zeros((n_days, 2))
-    for day in range(1, n_days):
-        states[day] = memory * states[day - 1] + fading * np.sqrt(1 - memory**2) * random.standard_normal(2)
-    values = states + fresh * random.standard_normal((n_days, 2))
-    values[random.uniform(size=values.shape) < 0.2] = np.nan
-    noise = DailyNoise.of(values, np.ones((n_days, 2, 1)), (~np.isnan(values)).astype(float))
-    assert_allclose(noise.memory, memory, atol=0.11)
-    assert_allclose(noise.fading, fading, rtol=0.2)
-    assert_allclose(noise.fresh, fresh, rtol=0.3)
-    assert abs(noise.correlation[0, 1]) < 0.1
-
-
-def test_errors_of_long_means_are_those_of_the_noise():
-    random = np.random.RandomState(0)
-    n_days, n_modes, memory = 2500, 8, 0.9
-    values = np.zeros((n_days, n_modes))
-    for day in range(1, n_days):
-        values[day] = memory * values[day - 1] + np.sqrt(1 - memory**2) * random.standard_normal(n_modes)
-    noise = DailyNoise.of(values, np.ones((n_days, n_modes, 1)), np.ones((n_days, n_modes)))
-    lasting = (noise.fading**2 * (1 + noise.memory) / (1 - noise.memory) + noise.fresh**2) ** 0.5
-    truth = np.sqrt((1 + memory) / (1 - memory))
-    chance, grid = np.sqrt((1 + memory) / (1 - memory) / n_days), 0.3 / np.sqrt(12)
-    assert np.sqrt(np.mean((lasting / truth - 1) ** 2)) < 1.5 * np.hypot(chance, grid)
 
 
 def test_a_known_drift_is_recovered(history):
@@ -215,81 +133,6 @@ def test_filled_temperatures_are_reported_once(healthy):
         assert given[0].filename == __file__
 
 
-def trends_of(change, slopes, error=1e-3, years=4.0):
-    n_modes, n_shapes = len(slopes), 5
-    mean = np.kron(slopes @ np.asarray(change, dtype=float), np.eye(n_shapes)[0])
-    return ModeTrends(mean, error**2 * np.eye(n_modes * n_shapes), slopes, years)
-
-
-def test_groups_with_like_effects_are_named_together():
-    slopes = np.array([[0.3, 0.3, 0.0], [0.1, 0.1001, 0.3], [0.2, 0.2, -0.1], [0.0, 0.0, 0.2]])
-    found = Explanations.of(trends_of([-0.04, 0, 0], slopes), 100.0, np.random.RandomState(0))
-    assert found.p_value < 0.01
-    assert found.instead(found.sets[0][0]) == [0, 1]
-    assert found.confounded == {0: [1], 1: [0]}
-    apart = Explanations.of(trends_of([0, 0, -0.04], slopes), 100.0, np.random.RandomState(0))
-    assert apart.sets[0] == (2,)
-    assert apart.instead(2) == [2]
-
-
-def test_two_groups_that_drift_are_both_found():
-    slopes = np.random.RandomState(0).uniform(0, 0.4, size=(6, 4))
-    found = Explanations.of(trends_of([-0.05, 0, 0.04, 0], slopes), 100.0, np.random.RandomState(0))
-    assert found.sets[0] == (0, 2)
-
-
-def test_p_values_without_drift_are_uniform():
-    random, slopes = np.random.RandomState(0), np.random.RandomState(1).uniform(0, 0.4, size=(4, 2))
-    p_values = []
-    for _ in range(40):
-        trends = trends_of([0, 0], slopes)
-        noisy = ModeTrends(1e-3 * random.standard_normal(len(trends.mean)), trends.covariance, slopes, 4.0)
-        p_values.append(Explanations.of(noisy, 1000.0, random).p_value)
-    assert np.mean(np.array(p_values) < 0.2) < 0.35
-    assert 0.35 < np.mean(p_values) < 0.75
-
-
-def test_the_filter_follows_a_drift(ageing):
-    campaign, fem = ageing
-    T, F = campaign.temperatures, campaign.frequencies
-    follower = DriftFollower.of(fem, T[:365], F[:365], GROUPS)
-    known, daily = follower.start().known, follower.records.means(T[365:], F[365:], F.index[365:])
-    for day in range(len(F) - 365):
-        known = follower.next_day(known, observation(daily, day, follower.noise, follower.slopes))
-    found = follower.estimate(known).loc["bottom"]
-    truth = np.log(1 - 0.02 * 3) - np.log(1 - 0.02 * 0.5)
-    assert abs(found["change"] - truth) < 3 * found["standard_error"]
-    drift, covariance = follower.frequency_drift(known)
-    middle = make_truss_campaign(3, random_state=0).clean_frequencies
-    shift = np.log(campaign.clean_frequencies / middle).to_numpy()
-    assert (np.abs(drift - (shift[-1] - shift[:365].mean(axis=0))) < 3.5 * np.sqrt(np.diag(covariance))).all()
-    rates = slice(len(GROUPS), 2 * len(GROUPS))
-    assert np.array_equal(follower.next_day(known, None).mean[rates], known.mean[rates])
-
-
-@pytest.mark.one_case
-@pytest.mark.parametrize(
-    "drift", [{"bottom": 0.02}, dict.fromkeys(("bottom", "top", "diagonal", "vertical"), 0.01), {}]
-)
-def test_a_monitors_drift_and_the_history_tell_one_story(drift):
-    campaign = make_truss_campaign(3, drift=drift or None, random_state=3)
-    fem, T, F = trained(campaign), campaign.temperatures, campaign.frequencies
-    history = track_parameters(fem, T, F, freq=WEEK, random_state=0)
-    follower = DriftFollower.of(fem, T[:365], F[:365])
-    daily, start = follower.records.means(T[365:], F[365:], F.index[365:]), follower.start()
-    known = start.known
-    for day in range(len(F) - 365):
-        known = follower.next_day(known, observation(daily, day, follower.noise, follower.slopes))
-    report = follower.report(replace(start, known=known, learned=F.index[-1]))
-    expected = ["all groups"] if len(drift) > 1 else list(drift)
-    assert report.index[report["significant"]].tolist() == expected
-    assert (report["p_value"].max() <= 0.01) == history.has_drift == bool(drift)
-    assert history.rates.index[history.rates["drifts"] == "yes"].tolist() == expected
-    for group in expected:
-        together = np.hypot(report.loc[group, "per_year_error"], history.rates.loc[group, "standard_error"])
-        assert abs(report.loc[group, "per_year"] - history.rates.loc[group, "per_year"]) < 3 * together
-
-
 def test_days_are_those_of_the_calendar_where_clocks_change(healthy):
     campaign, fem = healthy
     index = campaign.temperatures.index.tz_localize("Europe/Brussels")
@@ -299,12 +142,6 @@ def test_days_are_those_of_the_calendar_where_clocks_change(healthy):
     for day in range(439, 460):  # over the end of March
         state = follower.advance(state, T[day : day + 1], F[day : day + 1])
         assert state.day == index[day]
-
-
-def test_shapes_of_time_are_those_of_a_random_walk():
-    shapes = shapes_of_time(200, 40)[:, 1:] / (np.pi * (np.arange(1, 40) - 0.5))
-    share = np.arange(200) / 199
-    assert_allclose(shapes @ shapes.T, np.minimum(share[:, np.newaxis], share), atol=0.02)
 
 
 def test_wrong_input_is_refused(healthy):
