@@ -247,7 +247,7 @@ def typical_rows(theta: Array, present: NDArray[np.bool_]) -> tuple[Array, Array
     return np.exp(rows), np.vstack([1 - square.sum(axis=0), (square + mean) / 2, (square - mean) / 2])
 
 
-def healthy_frequencies(fem: Any, theta: Array, *, warn: bool = False) -> Array:
+def healthy_frequencies(fem: Any, theta: Array) -> Array:
     """Frequencies of the undamaged model in the measured domain, without discrepancy, in Hz, (n_rows, n_modes)."""
     return as_floats(fem.aligner_.inverse_transform(fem.simulator_.frequencies(theta, fem.n_jobs)))
 
