@@ -23,7 +23,7 @@ MAY_IMPORT = {
     "preprocessing": set(),
     "metrics": set(),
     "residuals": {"preprocessing"},
-    "detection": {"metrics", "preprocessing", "residuals"},
+    "detection": {"metrics", "preprocessing", "residuals", "surrogate"},  # its default regressor
     "surrogate": {"fem", "metrics", "preprocessing", "residuals"},
     "updating": {"fem"},
     "datasets": {"fem"},

@@ -11,10 +11,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.validation import validate_data
 
 from skthermo._core.arrays import Array
-from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted
+from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._core.frames import row_times
 from skthermo._core.text import listed
 from skthermo._core.warnings import warn_each
@@ -161,7 +160,7 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     Columns are frequencies or residuals. A column whose values are positive, with a standard deviation below a third of
     their mean, is read as a frequency, and is divided by its mean; the methods above get relative frequencies and
     residuals as they are. `fit` sets aside, as if they were missing, frequencies that are farther from the median than
-    half of it, and residuals that are farther than a hundred robust standard deviations.
+    half of it, residuals that are farther than a hundred robust standard deviations, and infinite values.
 
     ``_cause(X, rows)`` says why rows have no index. A detector that learns a distribution has ``_has_likelihood()``
     True and ``_log_densities(F)``, and with them a ``score``. A detector, or a step before it, that looks at earlier
@@ -230,15 +229,15 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         Raises
         ------
         ValueError
-            If a column has no value or is constant, a value is infinite, or there are fewer than two rows; or if the
-            detector cannot learn from the baseline.
+            If a column has no value or is constant, or there are fewer than two rows; or if the detector cannot learn
+            from the baseline.
 
         Warns
         -----
         UserWarning
             If values were set aside, or the baseline has too few independent records for the rate of false alarms.
         """
-        F = validate_data(self, X, dtype=np.float64, order="C", ensure_all_finite="allow-nan", ensure_min_samples=2)
+        F = validate_data(self, X, ensure_min_samples=2, allow_infinite=True)
         times = row_times(X)
         self.findings_: list[SkthermoWarning] = []
         F, self.report_ = read_columns(F, getattr(X, "columns", range(F.shape[1])), self.findings_)
@@ -262,8 +261,7 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     def _relative(self, X: ArrayLike) -> Array:
         """Rows of X as `fit` read them: frequencies divided by their level, residuals as they are."""
         check_is_fitted(self)
-        F = validate_data(self, X, reset=False, dtype=np.float64, order="C", ensure_all_finite="allow-nan")
-        return F / self.report_["level"].to_numpy()
+        return validate_data(self, X, reset=False) / self.report_["level"].to_numpy()
 
     def _index_of(self, X: Any) -> Array:
         return self._index(self._relative(X))
@@ -297,6 +295,7 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
 
 def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:
     """A baseline as detectors learn it, and how each column was read; what was set aside is added to the findings."""
+    infinite, F = np.isinf(F), np.where(np.isinf(F), np.nan, F)
     empty = np.isnan(F).all(axis=0)
     if empty.any():
         raise ValueError(f"column {list(names)[empty.argmax()]!r} has no value in {len(F)} rows; expected some in each")
@@ -304,7 +303,7 @@ def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple
     scatter = 1.4826 * np.nanmedian(np.abs(F - middle), axis=0)  # the standard deviation of normal values
     is_frequency = (middle > 0) & (scatter < middle / 3)
     farthest = np.where(is_frequency, middle / 2, np.where(scatter > 0, 100 * scatter, np.inf))
-    far = np.abs(F - middle) > farthest
+    far = (np.abs(F - middle) > farthest) | infinite
     F = np.where(far, np.nan, F)
     is_frequency &= (np.fmin.reduce(F) > 0) & (np.nanstd(F, axis=0) < np.nanmean(F, axis=0) / 3)
     level = np.where(is_frequency, np.nanmean(F, axis=0), 1.0)

@@ -131,7 +131,8 @@ class MahalanobisDetector(DamageDetector):
             return np.full(len(F), np.inf)
         if self.covariance is not None and not np.isnan(F).any():
             return np.sqrt(learned.mahalanobis(F))
-        return as_if_complete(Gaussian(learned.location_, learned.covariance_).distances(F), F)
+        distances = Gaussian(learned.location_, learned.covariance_).distances(F)
+        return as_if_complete(distances, F) if np.isnan(F).any() else distances
 
     def _fitted(self, F: Array, findings: list[SkthermoWarning] | None = None) -> BaseEstimator | None:
         """Mean and covariance of rows, as one of scikit-learn's covariance estimators.
@@ -192,8 +193,6 @@ def as_if_complete(distances: Array, F: Array) -> Array:
     By the approximation of Wilson and Hilferty: the cube root of a chi-square number is nearly normal.
     """
     n_modes, n_present = F.shape[1], (~np.isnan(F)).sum(axis=1)
-    if (n_present == n_modes).all():
-        return distances
     with np.errstate(divide="ignore", invalid="ignore"):
         here, there = 2 / (9 * n_present), 2 / (9 * n_modes)
         normal = (np.cbrt(distances**2 / n_present) - (1 - here)) / np.sqrt(here)

@@ -191,15 +191,17 @@ def out_of_fold(learn: Callable[[Rows], Callable[[Rows], ArrayLike]], folds: Row
     >>> out_of_fold(lambda train: lambda test: np.full(len(test), y[train].mean()), np.array([0, 0, 1, 1]))
     array([3.5, 3.5, 1.5, 1.5])
     """
+    n_rows, splits = len(folds), folds
     if isinstance(folds, np.ndarray):
-        numbers = np.unique(folds[folds >= 0])
-        splits, n_rows = ((np.flatnonzero(folds != k), np.flatnonzero(folds == k)) for k in numbers), len(folds)
+        splits = []
+        for number in np.unique(folds[folds >= 0]):
+            splits.append((np.flatnonzero(folds != number), np.flatnonzero(folds == number)))
     else:
-        splits, n_rows = folds, 1 + max(int(rows.max(initial=-1)) for pair in folds for rows in pair)
+        n_rows = 1 + max(int(rows.max(initial=-1)) for pair in folds for rows in pair)
     values = np.full(n_rows, np.nan)
-    for number, (train, test) in enumerate(splits):
+    for place, (train, test) in enumerate(splits):
         found = np.asarray(learn(train)(test), dtype=float)
-        if number == 0:
+        if place == 0:
             values = np.full((n_rows, *found.shape[1:]), np.nan)
         values[test] = found
     return values

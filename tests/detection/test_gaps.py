@@ -33,7 +33,7 @@ GAPPY = with_gaps(F)
 def test_a_mode_that_is_never_there_is_named():
     rows = GAPPY.copy()
     rows[:, 1] = np.nan
-    with pytest.raises(ValueError, match="x2 has no value in 400 rows"):
+    with pytest.raises(ValueError, match="column 1 has no value in 400 rows"):
         MahalanobisDetector().fit(rows)
 
 
