@@ -26,7 +26,7 @@ TRANSFORMERS = [
     TemperatureCompensator(make_pipeline(LagFeatures(2), Ridge()), targets=[1, 2]),
 ]
 DETECTORS = [MahalanobisDetector(), OutlierDetector(OneClassSVM())]
-UNRELATED = pytest.mark.filterwarnings("ignore:.*no-thermal-effect")  # of RECORDS
+UNRELATED = pytest.mark.filterwarnings("ignore:.*(no-thermal-effect|not-predicted)")  # of RECORDS
 each_transformer = pytest.mark.parametrize("estimator", TRANSFORMERS, ids=lambda one: type(one).__name__)
 each_estimator = pytest.mark.parametrize("estimator", TRANSFORMERS + DETECTORS, ids=lambda one: type(one).__name__)
 
@@ -178,7 +178,7 @@ def no_tables(frame):
     levels = pd.MultiIndex.from_product([["a"], frame.columns])
     return {
         "infinite": (frame.mask(frame == frame.iloc[5, 1], np.inf), repr(frame.columns[1])),
-        "infinite in an array": (frame.mask(frame == frame.iloc[5, 1], np.inf).to_numpy(), "row 5"),
+        "infinite in an array": (frame.mask(frame == frame.iloc[5, 1], np.inf).to_numpy(), "1"),
         "levels": (frame.set_axis(levels, axis=1), "tuples"),
         "tuples": (frame.set_axis(pd.Index(list(levels), tupleize_cols=False), axis=1), "tuples"),
         "numbers and text": (frame.set_axis([0, *frame.columns[1:]], axis=1), "partly"),
@@ -205,7 +205,7 @@ def test_what_is_no_table_is_refused_in_one_sentence_of_ours(estimator, cause):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             estimator.fit(values)
-        assert any("is inf" in str(one.message) and "[set-aside]" in str(one.message) for one in caught)
+        assert any(word in str(one.message) and "[set-aside]" in str(one.message) for one in caught)
         return
     with pytest.raises(ValueError, match=word) as refused:
         estimator.fit(values)

@@ -15,7 +15,6 @@ from sklearn.utils.metaestimators import available_if
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._core.frames import row_times
-from skthermo._core.text import listed
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
 from skthermo.residuals.numbers import independent_records
@@ -314,9 +313,9 @@ def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple
     if far.any():
         findings.append(
             RecordsWarning(
-                f"values of {listed(table.index[far.any(axis=0)])} are far from all others of their column. "
+                f"values of {', '.join(map(repr, table.index[far.any(axis=0)]))} are far from all others of their column. "
                 "They count as missing (report_ has their number). Put NaN where a value is missing",
-                "values-set-aside",
+                "set-aside",
             )
         )
     return F / level, table
