@@ -3,11 +3,9 @@
 import pickle
 import warnings
 from collections import Counter
-from copy import deepcopy
 
 import pytest
 from sklearn.base import clone
-from sklearn.inspection import partial_dependence, permutation_importance
 from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 
@@ -76,20 +74,3 @@ def test_the_code_ends_the_text_also_of_a_copy():
     warning = FewRecordsWarning("3 records", "few-rows")
     again = pickle.loads(pickle.dumps(warning))
     assert (str(again), again.kind) == (str(warning), "few-rows") == ("3 records [few-rows]", "few-rows")
-
-
-def test_an_inspection_warns_once_for_each_estimator_and_line():
-    year = make_truss_campaign(random_state=0)
-    T, F = year.temperatures, year.frequencies
-    one = DataInformedFEM(make_truss(), random_state=0).fit(T[:120], F[:120])  # a winter, and summer is outside
-    other = deepcopy(one)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        for estimator in (one, other, one):
-            permutation_importance(estimator, T, F, n_repeats=2, random_state=0)
-        partial_dependence(one, T, ["T1"], grid_resolution=3)
-    assert [warning.message.kind for warning in caught] == ["outside-training-weather"] * 3
-    assert len({warning.lineno for warning in caught}) == 2
-    for _ in range(2):
-        with pytest.warns(WeatherWarning):
-            one.predict(T)

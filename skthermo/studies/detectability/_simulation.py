@@ -17,13 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array, as_columns, as_floats, is_real
 from skthermo._core.estimators import _num_samples, last_step, seed_parts
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.memory import remembered
 from skthermo._core.parallel import run_jobs, single_blas_thread
-from skthermo._core.warnings import warnings_of_detector, without_warnings
+from skthermo._core.warnings import collected, warn_each, without_warnings
 from skthermo.detection import DamageDetector
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._rates import EvaluatedRecords, rate_of
@@ -299,8 +298,10 @@ def ask_each(
     asked, found, errors = [name for name in detectors if name not in errors], {}, dict(errors)
     for name in asked:
         try:
-            with warnings_of_detector(name if len(asked) > 1 else None):
+            with collected() as told:
                 found[name] = question(name)
+            named = f"detector {name!r}: " if len(asked) > 1 else ""
+            warn_each(type(one)(named + str(one.args[0]), one.kind) for one in told)
         except Exception as error:
             errors[name] = error
     if not found:
@@ -438,13 +439,13 @@ class Simulation:
         size = max(MOST_ROWS // (len(self.T) * (len(self.scenarios) + 1)), 1)
         repeats = list(zip(numbers, seeds[numbers.start : numbers.stop], strict=True))
         some = (repeats[first : first + size] for first in range(0, len(repeats), size))
-        with without_warnings(), answers_kept():
+        with without_warnings():
             jobs = (delayed(self._some_repeats)(part) for part in some)
             options = {"count": lambda one: one.n_repeats, "unit": "repeats", "n_jobs": n_jobs, "verbose": verbose}
             return run_jobs(jobs, len(numbers), **options)
 
     def _some_repeats(self, repeats: Sequence[Repeat]) -> Evaluation:
-        with without_warnings(), answers_kept(), single_blas_thread():
+        with without_warnings(), single_blas_thread():
             return self.evaluated(repeats, {})
 
     def _measured(self, measured: Mapping[str, Table]) -> Iterator[Records]:
