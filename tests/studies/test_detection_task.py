@@ -16,9 +16,10 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.detection import CompensatedDetector, MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.preprocessing import LagFeatures
 from skthermo.studies import ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
+from tests.studies.studies import windowed
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
 WEATHER, OTHER = LATER.temperatures[:120], LATER.temperatures[120:240]
@@ -30,12 +31,6 @@ SCENARIOS = [Scenario("healthy"), Scenario("a tenth", {"bottom": 0.1}), Scenario
 
 def task_of(fem, scenarios=SCENARIOS, T=WEATHER, **options):
     return detection_task(fem, T, scenarios, **{"n_repeats": 2, "random_state": 3} | options)
-
-
-def windowed(window=None, regression=None, targets=MODES):
-    """A detector of trailing means over a window."""
-    regression = LinearRegression() if regression is None else regression
-    return CompensatedDetector(MahalanobisDetector(), regression, targets=targets, window=window, regimes=None)
 
 
 def with_memory(window, lags=4, targets=MODES):
