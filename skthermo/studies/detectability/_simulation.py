@@ -140,7 +140,7 @@ def fitted_to(detector: BaseEstimator, table: Table) -> BaseEstimator:
 class Candidate:
     """A detector that has learned the healthy structure, and which columns it sees.
 
-    Its ``head``, the steps before its ``last`` one, may be those of other detectors too; what is no pipeline has none.
+    Its ``head`` are the steps before its ``last`` one; what is no pipeline has none.
     A decision depends on ``memory`` records, up to the evaluated one: those of the longest window.
     """
 
@@ -162,14 +162,14 @@ class Candidate:
     ) -> Candidate:
         """A fitted clone; the random state, of which a copy is used, seeds parts without a seed of their own.
 
-        A memory keeps what is fitted, and the steps before the last one are shared by all pipelines that begin alike.
+        A memory keeps what is fitted, and the steps before the last one by themselves: pipelines may begin alike.
         """
         view, healthy = read_baseline(fem, detector, baseline)
         fitted, head, seen = clone(detector), (), healthy
         seed_parts(fitted, deepcopy(random_state))
         is_pipeline = isinstance(fitted, Pipeline) and len(fitted) > 1
         if is_pipeline:
-            before = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
+            before = Pipeline([*fitted.steps[:-1], ("last", "passthrough")], memory=fitted.memory)
             before, seen = remembered(memory, transformed_by, before, healthy)
             head = tuple(step for _, step in before.steps[:-1])
         last = fitted[-1] if is_pipeline else fitted
@@ -337,8 +337,7 @@ class Records:
         return self._known[memory]
 
     def entering(self, candidate: Candidate) -> Table:
-        """What the last step of a detector sees, computed once for all that see the same columns and whose steps before
-        it are the same."""
+        """What the last step of a detector sees."""
         view, known = candidate.view, self._known
         seen = (*view.positions, view.is_frame)
         if seen not in known:

@@ -340,6 +340,7 @@ class DetectabilityStudy(BaseEstimator):
             candidates, errors = ask_each(detectors, lambda name: learned(detectors[name]), {})
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
+                warn_each(self.fem.thermal_.doubts(self.fem.weather(T)))
                 clean = clean_frequencies(self.fem, scenarios, T, most_repeats)
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
