@@ -68,4 +68,4 @@ def update(model, limits, n_starts):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         updater.fit(MEASURED, frequency_std=NOISE * np.array(MEASURED))
-    return updater, [str(w.message) for w in caught if w.message.kind == "modes-cross"]
+    return updater, [str(w.message) for w in caught if w.message.kind == "mode-order"]

@@ -48,6 +48,14 @@ class Logs(RegressorMixin, BaseEstimator):
 class BayesianLogs(Logs):
     """The same with a share of its covariance, and with the weather of a fleet: within ``reach``."""
 
+    def predict(self, X, return_std=False):
+        values = super().predict(X)
+        if not return_std:
+            return values
+        covariances = self.predict_covariance(X)
+        deviations = np.sqrt(np.einsum("ijj->ij", covariances))
+        return values, deviations[:, 0] if self.is_single_ else deviations
+
     def predict_covariance(self, X):
         B = basis(X)
         variances = self.share * np.einsum("ij,jk,ik->i", B, self.covariance_, B)

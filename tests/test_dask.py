@@ -25,7 +25,7 @@ distributed = pytest.importorskip("distributed", reason="Dask is not installed: 
 pytestmark = pytest.mark.filterwarnings(
     "default",  # Dask's own warnings are not tested
     "ignore:.*(outside-bounds|outside-training-weather)",
-    "ignore:.*modes-cross",
+    "ignore:.*mode-order",
 )
 
 TRUSS = make_truss()

@@ -5,23 +5,18 @@ import subprocess
 import sys
 
 PROGRAM = """
-from concurrent.futures import ThreadPoolExecutor
-from threading import Barrier
-
 import joblib
 import numpy as np
 import scipy.linalg  # brings a BLAS of its own
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from skthermo._core.parallel import map_on_blas_threads, single_blas_thread
+from skthermo._core.parallel import map_on_blas_threads, run_jobs, single_blas_thread
 
 def blas_threads():
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
-def limited(barrier=None):
+def limited(_=None):
     with single_blas_thread():
-        if barrier:
-            barrier.wait()
         return blas_threads()
 
 if blas_threads() == {1}:  # all that one core gets unasked
@@ -29,16 +24,11 @@ if blas_threads() == {1}:  # all that one core gets unasked
 assert blas_threads() == {2}
 assert limited() == {1}
 assert blas_threads() == {2}
-for _ in range(3):
-    with ThreadPoolExecutor(2) as pool:
-        assert list(pool.map(limited, [Barrier(2)] * 2)) == [{1}, {1}]
+for backend in ("threading", "loky"):
+    with joblib.parallel_config(backend):
+        assert run_jobs((joblib.delayed(limited)(n) for n in range(20)), 20, unit="jobs", n_jobs=2) == [{1}] * 20
     assert blas_threads() == {2}
-threads = joblib.Parallel(2, backend="threading")
-assert threads(joblib.delayed(limited)(barrier) for barrier in [Barrier(2)] * 2) == [{1}, {1}]
-assert blas_threads() == {2}
 assert list(map_on_blas_threads(lambda _: blas_threads(), range(4))) == [{1}] * 4
-with threadpool_limits(2, "blas"), ThreadPoolExecutor(1) as pool:
-    assert pool.submit(limited).result() == {1}
 assert blas_threads() == {2}
 """
 

@@ -13,7 +13,7 @@ from copy import deepcopy
 import numpy as np
 
 from skthermo.datasets import load_z24
-from skthermo.datasets._z24 import CONSTANTS, PARAMETERS, z24_structure
+from skthermo.datasets._z24 import Z24_CONSTANTS, Z24_PARAMETERS, z24_structure
 from skthermo.fem import Spring, Structure
 from skthermo.updating import ModelUpdater, sensitivity
 
@@ -58,7 +58,7 @@ def mode_kinds(structure, model):
 
 def with_multipliers(theta):
     """All constants, with those that are fitted at multiples of their starts."""
-    constants = deepcopy(CONSTANTS)
+    constants = deepcopy(Z24_CONSTANTS)
     for ((part, name), (start, _)), multiplier in zip(STARTS.items(), theta, strict=True):
         constants[part][name] = start * multiplier
     return constants
@@ -100,7 +100,7 @@ def fit(measured):
 
 def frequencies(constants):
     """The four frequencies of the bridge in Hz."""
-    return z24_structure(constants).assemble(PARAMETERS, n_modes=4).frequencies(np.ones((1, 4)))[0]
+    return z24_structure(constants).assemble(Z24_PARAMETERS, n_modes=4).frequencies(np.ones((1, 4)))[0]
 
 
 def main():
@@ -118,7 +118,7 @@ def main():
     print(f"\nmode                      model  measured  difference   (mean of {n_records} records, Hz)")
     for kind, model, mean in zip(KINDS, frequencies(constants), measured, strict=True):
         print(f"{kind:24s} {model:6.3f}    {mean:6.3f}     {100 * (model / mean - 1):+.2f} %")
-    model = z24_structure(constants).assemble(PARAMETERS, n_modes=4, track=True)
+    model = z24_structure(constants).assemble(Z24_PARAMETERS, n_modes=4, track=True)
     slopes = sensitivity(model)
     singular = np.linalg.svd(slopes, compute_uv=False)
     print("\nd ln f / d ln theta", slopes.round(3), sep="\n")

@@ -21,25 +21,14 @@ Matrix: TypeAlias = Array | scipy.sparse.csc_array
 MatrixLike: TypeAlias = ArrayLike | scipy.sparse.sparray | scipy.sparse.spmatrix
 Bounds: TypeAlias = ArrayLike | Mapping[str, float | tuple[float, float]]
 RandomState: TypeAlias = int | np.random.RandomState | None
-NO_NUMBERS = {
-    "booleans": (bool, np.bool_),
-    "text": (str,),
-    "bytes": (bytes, bytearray, memoryview),
-    "times": (date, time, timedelta, np.datetime64, np.timedelta64),
-    "complex numbers": (complex, np.complexfloating),
-}
-KINDS = {"b": "booleans", "U": "text", "T": "text", "S": "bytes", "M": "times", "m": "times", "V": "records"}
-HALF = "numbers of half precision (float16)"  # three digits
 HUGE = 1e150  # squares of larger numbers are infinite
 NORMAL = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 Reduce: TypeAlias = bool | float | Literal["auto"]
-DEFAULT_TOLERANCE = 1e-5  # relative error of the frequencies of a reduced model
-MOST_NOISE = 0.2  # largest relative noise of frequencies: more is meant in percent
 
 
 def real_array(values: Any, what: str, *, any_size: bool = False) -> Array:
-    """An array of floats; complex numbers, sparse matrices and what is no number or, without ``any_size``, too
-    large to be squared, are errors."""
+    """An array of floats; complex numbers, sparse matrices, other values than numbers and, without ``any_size``,
+    numbers too large to be squared are errors."""
     if values is None:
         raise ValueError(f"{what} is None; expected numbers")
     if scipy.sparse.issparse(values):
@@ -67,7 +56,7 @@ def shape_array(values: Any, what: str, *, any_size: bool = False) -> NDArray:
 
 
 def as_floats(values: Any) -> Array:
-    """An array of floats; values that are masked or missing become NaN, and what is no number is an error."""
+    """An array of floats; values that are masked or missing become NaN, and other values than numbers are errors."""
     values = without_mask(values)
     if scipy.sparse.issparse(values):
         raise ValueError("the input is a sparse matrix; expected a dense array of numbers")
@@ -78,7 +67,7 @@ def as_floats(values: Any) -> Array:
     refuse_no_numbers(values)
     array: Any = values if is_pandas else np.asarray(values)
     if any(dtype.kind == "c" for dtype in (dtypes if is_pandas else [array.dtype])):
-        raise ValueError("the values are complex; expected real numbers")
+        raise ValueError("Complex data not supported: the values are complex; expected real numbers")
     try:
         return array.to_numpy(dtype=float, na_value=np.nan) if is_pandas else array.astype(float, copy=False)
     except TypeError:  # pandas' NA in an object array is not a float
@@ -89,7 +78,7 @@ def as_floats(values: Any) -> Array:
     try:
         return np.where(isna(objects), np.nan, objects).astype(float)
     except TypeError as error:
-        raise ValueError(f"the input is {values!r:.100}; expected numbers ({error})") from error
+        raise TypeError(f"the input is {values!r:.100}; expected numbers ({error})") from error
 
 
 def without_mask(values: Any) -> Any:
@@ -206,15 +195,11 @@ def central_differences(function: Callable[[Array], Array], theta: Array, values
     return np.moveaxis((above - below) / widths, 1, -1)
 
 
-NO_INFORMATION = 1e-12
-"""Eigenvalue of a scaled information matrix, as a share of the largest, below which it counts as zero."""
-
-
-def cramer_rao(information: Array) -> Array:
+def cramer_rao(information: Array, negligible: float = 1e-12) -> Array:
     """Smallest covariance of unbiased estimates: the inverse of a Fisher information matrix, which may be singular.
 
-    Parameters that are not determined have infinite variances and NaN covariances. With NaN in the information, all is
-    NaN.
+    Parameters that are not determined have infinite variances and NaN covariances. An eigenvalue of the scaled matrix
+    below the negligible share of the largest counts as zero. With NaN in the information, all is NaN.
 
     >>> cramer_rao(np.array([[4.0, 0.0], [0.0, 0.0]]))
     array([[0.25,  nan],
@@ -225,9 +210,9 @@ def cramer_rao(information: Array) -> Array:
     scale = np.sqrt(np.diagonal(information))
     scale = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    known = values > NO_INFORMATION * max(values[-1], np.finfo(float).tiny)
+    known = values > negligible * max(values[-1], np.finfo(float).tiny)
     covariance = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
-    unknown = (vectors[:, ~known] ** 2).sum(axis=1) > np.sqrt(NO_INFORMATION)
+    unknown = (vectors[:, ~known] ** 2).sum(axis=1) > np.sqrt(negligible)
     covariance[unknown] = covariance[:, unknown] = np.nan
     covariance[unknown, unknown] = np.inf
     return covariance
@@ -236,11 +221,6 @@ def cramer_rao(information: Array) -> Array:
 def is_real(value: Any) -> bool:
     """Whether a value is a real number; True, False and durations are none."""
     return isinstance(value, Real) and not isinstance(value, bool | np.timedelta64)
-
-
-def is_frame_of_floats(values: Any) -> bool:
-    """Whether a frame of pandas holds floats of 64 bits, and nothing else, which needs no further check of types."""
-    return hasattr(values, "iloc") and values.ndim == 2 and {*values.dtypes} == {np.dtype(float)}
 
 
 def refuse_no_numbers(values: Any, what: str = "the input") -> None:
@@ -259,58 +239,34 @@ def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     for name, part in parts.items():
         kind, example = _no_number(part)
         if kind:
-            where, hint = what if name is None else f"column {name!r}", ""
-            if kind == HALF:
-                hint = " of type float64 or float32"
-            elif kind == "times" and name is not None:
+            where = what if name is None else f"column {name!r}"
+            hint = " of type float64 or float32" if "float16" in kind else ""
+            if kind == "times" and name is not None:
                 hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
             raise ValueError(f"{where} holds {kind}, such as {example!r:.60}; expected numbers{hint}")
 
 
 def refuse_no_array(values: Any, what: str, expected: str = "expected an array or a frame of numbers") -> None:
-    """Raise an error for what has no rows to count: no list, no dense array and nothing that becomes one."""
+    """Raise an error for an argument without rows: no list, no dense array and nothing that becomes one."""
     if scipy.sparse.issparse(values):
         raise TypeError(f"{what} is a sparse matrix; expected a dense array of numbers")
     if isinstance(values, type) or not (isinstance(values, list | tuple) or hasattr(values, "__array__")):
         raise ValueError(f"{what} is {values!r:.100}, of type {type(values).__name__}; {expected}")
 
 
-def refuse_no_table(
-    values: Any, what: str, *, least_rows: int = 1, least_columns: int = 1, or_vector: bool = False
-) -> None:
-    """Raise an error for what is no dense table, (n_samples, n_columns), with enough rows and columns, or has columns
+def refuse_no_table(values: Any, what: str, *, or_vector: bool = False) -> None:
+    """Raise an error for an argument that is no dense table of real numbers, (n_samples, n_columns), or has columns
     whose names are not all text or all numbers; a vector may stand for a table of one column."""
     expected = "expected a table of numbers, (n_samples, n_columns): a frame or an array"
-    if is_frame_of_floats(values):
-        array: Any = values
-    else:
-        refuse_no_array(values, what, expected)
-        refuse_no_numbers(values, what)
-        array = values if hasattr(values, "dtypes") else np.asarray(values)
-        dtypes = getattr(array, "dtypes", [getattr(array, "dtype", None)])
-        if any(getattr(dtype, "kind", "") == "c" for dtype in np.ravel(dtypes)):
-            raise ValueError(f"Complex data not supported: {what} holds complex numbers; expected real ones")
-    shape = array.shape
-    if len(shape) == 1 and or_vector:
-        shape = (*shape, 1)
-    if len(shape) == 1 and hasattr(values, "iloc"):
-        raise ValueError(f"{what} is a Series, {values.name!r}; expected a frame, as {what}.to_frame() gives")
-    if len(shape) < 2:
+    refuse_no_array(values, what, expected)
+    refuse_no_numbers(values, what)
+    shape = values.shape if hasattr(values, "shape") else np.asarray(values).shape
+    if len(shape) != 2 and not (len(shape) == 1 and or_vector):
+        if hasattr(values, "iloc"):
+            raise ValueError(f"{what} is a Series, {values.name!r}; expected a frame, as {what}.to_frame() gives")
         raise ValueError(
-            f"{what} has shape {tuple(shape)}; {expected}. Reshape your data by reshape(-1, 1) if it is one column, by "
-            "reshape(1, -1) if it is one row"
-        )
-    if len(shape) > 2:
-        raise ValueError(f"{what} has {len(shape)} dimensions, shape {tuple(shape)}; {expected}")
-    if shape[1] < least_columns:
-        raise ValueError(
-            f"{what} has {shape[1]} feature(s) (shape={tuple(shape)}) while a minimum of {least_columns} is required; "
-            f"{expected}"
-        )
-    if shape[0] < least_rows:
-        raise ValueError(
-            f"{what} has {shape[0]} sample(s) (shape={tuple(shape)}) while a minimum of {least_rows} is required; "
-            f"{expected}"
+            f"{what} has {len(shape)} dimensions, shape {shape}; {expected}. Reshape your data by reshape(-1, 1) if it "
+            "is one column, by reshape(1, -1) if it is one row"
         )
     names = list(getattr(values, "columns", ()))
     if len(set(names)) < len(names):
@@ -340,15 +296,23 @@ def _no_number(values: Any) -> tuple[str, Any]:
             return "rows of different lengths", values
         return next((found for found in map(_no_number, values) if found[0]), ("", None))
     dtype = getattr(values, "dtype", None)
-    named = {"category": "categories", "float16": HALF}.get(str(dtype), "")
-    kind = named or KINDS.get(getattr(dtype, "kind", ""), "")
+    named = {"category": "categories", "float16": "numbers of half precision (float16)"}  # three digits are too few
+    kinds = {"b": "booleans", "U": "text", "T": "text", "S": "bytes", "M": "times", "m": "times", "V": "records"}
+    kind = named.get(str(dtype)) or kinds.get(getattr(dtype, "kind", ""), "")
     if kind:
         return kind, next(iter(np.ravel(np.asarray(values, dtype=object))), None)
     objects = [values] if dtype is None else []
     if getattr(dtype, "kind", "") == "O":
         objects = np.ravel(np.asarray(values, dtype=object))
     firsts = dict(zip(map(type, objects[::-1]), objects[::-1], strict=True))  # the first value of each type
-    for kind, classes in NO_NUMBERS.items():
+    no_numbers = {
+        "booleans": (bool, np.bool_),
+        "text": (str,),
+        "bytes": (bytes, bytearray, memoryview),
+        "times": (date, time, timedelta, np.datetime64, np.timedelta64),
+        "complex numbers": (complex, np.complexfloating),
+    }
+    for kind, classes in no_numbers.items():
         for cls, example in firsts.items():
             if issubclass(cls, classes):
                 return kind, example
@@ -429,9 +393,9 @@ def check_noise(
     mode_names: Sequence[Any] | None = None,
     *,
     what: str = "noise",
-    most: float = MOST_NOISE,
+    most: float = 0.2,
 ) -> NDArray[np.float64]:
-    """Relative standard deviation of every mode."""
+    """Relative standard deviation of every mode; where all are larger than ``most``, percent may be meant."""
     array = real_array(by_mode(noise, n_modes, mode_names, what), what)
     if array.shape not in ((), (n_modes,)) or not ((array >= 0) & (array < 1)).all():
         raise ValueError(
@@ -460,13 +424,13 @@ def check_flag(flag: Any, what: str) -> bool:
 
 
 def check_jobs(n_jobs: Any) -> None:
-    """Raise an error for what is no number of joblib's jobs."""
+    """Raise an error unless this is a number of joblib's jobs."""
     if n_jobs is not None and (not isinstance(n_jobs, Integral) or isinstance(n_jobs, bool) or n_jobs == 0):
         raise ValueError(f"n_jobs is {n_jobs!r}; expected an integer, such as 2, or -1 for all processors, or None")
 
 
 def check_names(names: Any, what: str, known: Iterable[Any] | None = None) -> list[str]:
-    """Different names as a list, some of those that are known; one text in place of several is an error."""
+    """Different names, all of them known, as a list; one text in place of several is an error."""
     given = names if isinstance(names, str | bytes | type) or not isinstance(names, Iterable) else list(names)
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise ValueError(f"{what} is {names!r:.100}; expected a list of names, such as ['deck']")
@@ -608,7 +572,7 @@ def tolerance(model: Any, reduce: Reduce, n_solves: int = 0) -> float | None:
     """
     if is_auto(reduce):
         pays = hasattr(model, "reduced") and hasattr(model, "reduction_pays") and model.reduction_pays(n_solves)
-        return DEFAULT_TOLERANCE if pays else None
+        return 1e-5 if pays else None
     if not reduce:
         return None
     if not hasattr(model, "reduced"):
@@ -616,7 +580,7 @@ def tolerance(model: Any, reduce: Reduce, n_solves: int = 0) -> float | None:
             f"reduce is {reduce}, but {model!r} has no method 'reduced'; expected a model with one, such as "
             "AffineModel, or reduce=False"
         )
-    return DEFAULT_TOLERANCE if isinstance(reduce, (bool, np.bool_)) else reduce
+    return 1e-5 if isinstance(reduce, (bool, np.bool_)) else reduce
 
 
 def is_auto(value: Any) -> bool:

@@ -36,15 +36,12 @@ from sklearn.utils.validation import _check_feature_names_in, _num_samples, chec
 from skthermo._core.arrays import (
     Array,
     as_columns,
-    is_frame_of_floats,
+    as_floats,
     is_model,
     is_numbered,
     refuse_huge,
-    refuse_no_numbers,
     refuse_no_table,
-    without_mask,
 )
-from skthermo._core.parallel import bars_of, without_bars
 from skthermo._core.warnings import warn_user
 from skthermo.exceptions import WeatherWarning
 
@@ -54,7 +51,7 @@ if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit a
     def _fit_context(*, prefer_skip_nested_validation: bool) -> Callable[[Method], Method]: ...
 
     class TransformerMixin:
-        """Transformers of which frames give frames, and arrays give arrays."""
+        """Transformers that give frames for frames, and arrays for arrays."""
 
         @overload
         def fit_transform(self, X: pd.DataFrame, y: Any = None) -> pd.DataFrame: ...
@@ -74,7 +71,7 @@ except ImportError:
 
 
 class Estimator(BaseEstimator):
-    """Base of estimators that accept NaN in X, and of which clones share FE models."""
+    """Base of estimators that accept NaN in X, and whose clones share FE models."""
 
     def _validate_params(self) -> None:
         if isinstance(getattr(self, "random_state", None), bool):
@@ -143,7 +140,7 @@ class Estimator(BaseEstimator):
         return self
 
     def _validated(self, X: ArrayLike, *, reset: bool, **options: Any) -> NDArray[np.float64]:
-        return validate_data(self, X, reset=reset, dtype=[np.float64, np.float32], **options)
+        return validate_data(self, X, reset=reset, **options)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -159,36 +156,29 @@ class Interval(sklearn.utils._param_validation.Interval):
         return not isinstance(val, bool | np.timedelta64) and super().is_satisfied_by(val)
 
 
-def validate_data(estimator: BaseEstimator, X: Any, *, reset: bool = True, **options: Any) -> Any:
+def validate_data(estimator: BaseEstimator, X: Any, *, reset: bool = True, **options: Any) -> Array:
     """scikit-learn's `validate_data` of a table of numbers, as `check_array` reads it."""
     values = check_array(X, input_name="X", estimator=estimator, **options)
     sklearn.utils.validation.validate_data(estimator, X, reset=reset, skip_check_array=True)
     return values
 
 
-def check_array(values: Any, *, input_name: str = "y", allow_infinite: bool = False, **options: Any) -> Any:
-    """scikit-learn's `check_array` of numbers, of which some may be missing: masked ones become NaN.
+def check_array(values: Any, *, input_name: str = "y", allow_infinite: bool = False, **options: Any) -> Array:
+    """A C-ordered copy of a table of numbers as floats of 64 bits; masked and missing values are NaN.
 
-    What is wrong with a table is said first, in one sentence. With ``allow_infinite``, infinite values stay, because
-    the caller lists them among other errors.
+    scikit-learn's `check_array` takes the options. With ``allow_infinite``, infinite values stay, because the caller
+    lists them among other errors.
     """
-    refuse_no_table(
-        values,
-        input_name,
-        least_rows=options.get("ensure_min_samples", 1),
-        least_columns=options.get("ensure_min_features", 1),
-        or_vector=not options.get("ensure_2d", True),
-    )
-    numbers = values.to_numpy() if is_frame_of_floats(values) else with_nan(values)
-    try:
-        array = sklearn.utils.check_array(numbers, input_name=input_name, ensure_all_finite=False, **options)
-    except TypeError as error:
-        raise TypeError(f"{input_name} holds what is no number; expected numbers ({error})") from error
+    refuse_no_table(values, input_name, or_vector=not options.get("ensure_2d", True))
+    options |= {"dtype": np.float64, "order": "C", "copy": False, "ensure_all_finite": False}
+    array = sklearn.utils.check_array(np.array(as_floats(values), order="C"), input_name=input_name, **options)
     infinite = np.isinf(array)
     if not allow_infinite and infinite.any():
         place = tuple(np.argwhere(infinite)[0])
         index, columns = getattr(values, "index", None), getattr(values, "columns", None)
-        row = f"row {place[0]}" + ("" if index is None or is_numbered(index) else f" ({index[place[0]]})")
+        row = f"row {place[0]}" + (
+            f" ({index[place[0]]})" if hasattr(values, "iloc") and not is_numbered(index) else ""
+        )
         column = "" if len(place) < 2 else f" of column {int(place[1]) if columns is None else columns[place[1]]!r}"
         raise ValueError(
             f"{input_name} is infinite in {infinite.sum()} of {infinite.size} values, the first in {row}{column}; "
@@ -197,22 +187,6 @@ def check_array(values: Any, *, input_name: str = "y", allow_infinite: bool = Fa
     if not allow_infinite:
         refuse_huge(array, input_name)
     return array
-
-
-def with_nan(X: Any) -> Any:
-    """X with NaN for masked values, and for None and pandas' NA in object arrays; otherwise unchanged.
-
-    Times, text, booleans and bytes are errors.
-    """
-    if is_frame_of_floats(X):
-        return X
-    refuse_no_numbers(X)
-    if isinstance(X, pd.DataFrame) and any(dtype.kind == "O" for dtype in X.dtypes):
-        return pd.DataFrame(with_nan(X.to_numpy(dtype=object)), X.index, X.columns)
-    if isinstance(X, np.ndarray) and X.dtype == object:
-        objects = np.asarray(X)
-        return np.where(pd.isna(objects), np.nan, objects)
-    return without_mask(X)
 
 
 def seeded(random_state: Any) -> np.random.RandomState | None:
@@ -279,9 +253,6 @@ class Stages:
         line = f"({self._begun} of {self._number}) {name}" if self._estimator.verbose else None
         with ExitStack() as within:
             within.enter_context(_print_elapsed_time(type(self._estimator).__name__, line))
-            within.enter_context(bars_of(name))
-            if getattr(self._estimator, "_skl_callbacks", ()):  # such as a progress bar
-                within.enter_context(without_bars())
             if self._task is None:
                 yield
                 return
@@ -392,19 +363,16 @@ def inside(estimator: Any) -> BaseEstimator | None:
     return estimator.estimator if isinstance(estimator, MultiOutputRegressor | BaseSearchCV) else None
 
 
-def predict_with_std(regressor: Any, X: Array) -> tuple[Array, Array]:
-    """Means and standard deviations of all outputs."""
+def predict_with_std(regressor: Any, X: Any) -> tuple[Array, Array | None]:
+    """Means of all outputs and, where ``predict`` takes ``return_std``, their standard deviations; else None."""
     if isinstance(regressor, MultiOutputRegressor):
         parts = [predict_with_std(part, X) for part in regressor.estimators_]
-        means, deviations = (np.hstack(columns) for columns in zip(*parts, strict=True))
-        return means, deviations
+        means, deviations = zip(*parts, strict=True)
+        return np.hstack(means), None if any(one is None for one in deviations) else np.hstack(deviations)
     try:
         means, deviations = regressor.predict(X, return_std=True)
-    except TypeError as error:
-        raise ValueError(
-            f"{regressor!r} gives no standard deviations; expected a regressor whose predict takes return_std, such as "
-            "GaussianProcessRegressor or BayesianRidge"
-        ) from error
+    except (TypeError, ValueError):  # of a regressor that knows none, or of a router that hands none on
+        return as_columns(regressor.predict(X)), None
     return as_columns(means), as_columns(deviations)
 
 

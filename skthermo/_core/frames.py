@@ -13,16 +13,12 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from skthermo._core.arrays import Array, as_floats, is_real, real_array, refuse_no_array
 from skthermo._core.estimators import _num_samples
-from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning
 
 Table: TypeAlias = Array | pd.DataFrame
-IMPLAUSIBLE = 20  # robust standard deviations from the median
-MARKERS = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
+MISSING_CODES = (-99.0, -999.0, -9999.0, -99999.0)  # numbers that loggers write for a missing value
 YEAR, DAY = pd.Timedelta(days=365.25), pd.Timedelta(days=1)
 DAY_NS = DAY.value  # nanoseconds
-LONE_CAPITALS = {"D", "W", "H", "T", "S", "L", "U", "N"}  # days, weeks, hours ... nanoseconds
-DATE_AS_TEXT = re.compile(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 
 
 def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = None) -> Any:
@@ -30,6 +26,14 @@ def frame_like(X: Any, values: NDArray, columns: Iterable[Hashable] | None = Non
     if not isinstance(X, pd.DataFrame):
         return values
     return pd.DataFrame(values, index=X.index, columns=X.columns if columns is None else list(columns), copy=False)
+
+
+def named_frame(X: Any, values: Array) -> Any:
+    """Values as a frame with X's columns, and X's index where X is a frame of pandas; unchanged for columns without
+    names."""
+    if isinstance(X, pd.DataFrame) or not hasattr(X, "columns"):
+        return frame_like(X, values)
+    return pd.DataFrame(values, columns=list(X.columns), copy=False)
 
 
 def like_targets(X: Any, values: Array, names: Iterable[Hashable] | None, *, is_vector: bool) -> Any:
@@ -96,19 +100,23 @@ def positions_of(targets: Any, n_columns: int, columns: Iterable[Hashable]) -> N
     return np.array(positions, dtype=np.intp)
 
 
-def warn_of_markers(X: ArrayLike) -> None:
-    """Warn of numbers that probably stand for a missing value, such as -999, in columns of any quantity."""
+def marker_findings(X: ArrayLike) -> list[RecordsWarning]:
+    """A finding where numbers in columns of any quantity probably stand for a missing value, such as -999."""
     values = as_floats(X)
-    marked = np.isin(values, MARKERS)
-    if marked.any():
-        row, column = np.argwhere(marked)[0]
-        warn_user(
-            f"{marked.sum()} of {marked.size} values look like codes for missing values, the first "
-            f"{values[row, column]:g} in row {row} of column {column_names(X, 'x')[column]!r}. They are used as "
-            "measured. Put NaN there",
-            RecordsWarning,
+    marked = np.isin(values, MISSING_CODES)
+    if not marked.any():
+        return []
+    names = column_names(X, "x")
+    found = [
+        f"{values[marked[:, place], place][0]:g} in {names[place]!r}" for place in np.flatnonzero(marked.any(axis=0))
+    ]
+    return [
+        RecordsWarning(
+            f"some values look like codes for missing values: {', '.join(found)}. They are used as measured. Put NaN "
+            "there",
             "placeholders",
         )
+    ]
 
 
 def first_disorder(X: Any) -> int:
@@ -137,7 +145,7 @@ def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
 
 
 def row_weights(sample_weight: Any, X: Any) -> Array | None:
-    """A weight for each row of X, or None; those of a series are matched to the rows of a frame by index."""
+    """A weight for each row of X, or None; weights in a series are matched to the rows of a frame by index."""
     if sample_weight is None:
         return None
     n_rows = _num_samples(X)
@@ -278,7 +286,7 @@ def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
         raise ValueError(
             f"X has an index of durations, the first {index[0]}; expected a DatetimeIndex: add the time of the start"
         )
-    if kind == "string" and DATE_AS_TEXT.match(str(index[0])):
+    if kind == "string" and re.match(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}", str(index[0])):
         raise ValueError(
             f"X has stamps as text, the first {index[0]!r}; expected a DatetimeIndex, as pandas.to_datetime gives"
         )
@@ -296,7 +304,8 @@ def as_stamps(index: pd.Index) -> pd.DatetimeIndex | None:
 def check_duration(value: Any, name: str, *, may_be_zero: bool = True) -> pd.Timedelta:
     """A duration of fixed length in nanoseconds, zero or more, or a positive one."""
     units = re.findall("[A-Za-z]+", value) if isinstance(value, str) else None
-    if any(unit.isupper() and unit not in LONE_CAPITALS for unit in units or ()):
+    fixed = {"D", "W", "H", "T", "S", "L", "U", "N"}  # days, weeks, hours ... nanoseconds; months and years are not
+    if any(unit.isupper() and unit not in fixed for unit in units or ()):
         raise ValueError(
             f"{name} is {value!r}; expected a duration of fixed length with its unit, such as '10min', '1h' or '30D'"
         )

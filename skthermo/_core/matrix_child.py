@@ -1,4 +1,4 @@
-"""Reads files in a process of its own, where a damaged one can do no harm; started by `_damaged`.
+"""Reads files in a process of its own, where a damaged one can do no harm; started by `matrix_files`.
 
 Files come as JSON on standard input; what each holds, or its error, goes to standard output as a pickle.
 """
@@ -14,6 +14,7 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Iterator
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +34,24 @@ from skthermo._core.text_matrices import (
 
 Bytes = bytes | memoryview
 
-HEADER = 128  # bytes of a MATLAB file
-MATRIX, COMPRESSED = 14, 15  # types of its elements
-CELL, STRUCT, CHARACTERS, SPARSE, NUMERIC, OPAQUE = 1, 2, 4, 5, range(6, 16), 17  # classes of its variables
-COMPLEX_FLAG = 0x0800
-SIZE_LINE = re.compile(rb"(?:[ \t\r]*(?:%.*)?\n)*.*(?:\n|\Z)")
-COMMENTS = re.compile(rb"^[ \t]*%.*$", re.MULTILINE)
+MATLAB_HEADER = 128  # bytes
+
+
+class MatlabType(IntEnum):
+    """Types of a file's elements."""
+
+    MATRIX = 14
+    COMPRESSED = 15
+
+
+class MatlabClass(IntEnum):
+    """Classes of a file's variables; those from 6 to 15 are full arrays of numbers."""
+
+    CELL = 1
+    STRUCT = 2
+    CHARACTERS = 4
+    SPARSE = 5
+    OPAQUE = 17
 
 
 def read_matlab(content: bytes) -> dict[str, Any]:
@@ -50,17 +63,17 @@ def read_matlab(content: bytes) -> dict[str, Any]:
             if len(chosen) != 1:
                 raise ValueError(f"{len(names)} members, {names[:20]}; expected exactly one .mat file")
             content = archive.read(chosen[0])
-    order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])
+    order = {b"IM": "<", b"MI": ">"}.get(content[MATLAB_HEADER - 2 : MATLAB_HEADER])
     if order is None or content.startswith(b"MATLAB 7.3"):
         raise ValueError("another format; expected MATLAB v5: a MATLAB v7.3 file can be saved anew with '-v7'")
     variables: dict[str, Any] = {}
     place = "the first variable"
     try:
-        for kind, body in _elements(memoryview(content)[HEADER:], order):
-            if kind == COMPRESSED:
+        for kind, body in _elements(memoryview(content)[MATLAB_HEADER:], order):
+            if kind == MatlabType.COMPRESSED:
                 place = f"variable {_name(zlib.decompressobj().decompress(body, 1024)[8:], order)!r}"
                 ((kind, body),) = _elements(memoryview(zlib.decompress(body)), order)
-            if kind != MATRIX:
+            if kind != MatlabType.MATRIX:
                 raise ValueError(f"an element of type {kind}; expected a variable")
             name = _name(body, order)
             place = f"variable {name!r}"
@@ -84,19 +97,19 @@ def _elements(content: Bytes, order: str) -> Iterator[tuple[int, Bytes]]:
         if start + length > min(end, len(content)):
             raise ValueError(f"an element of {length} bytes where {len(content) - start} are left")
         yield kind, content[start : start + length]
-        position = start + length + (0 if kind == COMPRESSED else -(start + length - position) % 8)
+        position = start + length + (0 if kind == MatlabType.COMPRESSED else -(start + length - position) % 8)
 
 
 def _class_of(body: Bytes, order: str) -> tuple[int, bool]:
     """Class of a variable, and whether it is complex."""
     (flags,) = struct.unpack_from(order + "I", body, 8)
-    return flags & 0xFF, bool(flags & COMPLEX_FLAG)
+    return flags & 0xFF, bool(flags & 0x0800)
 
 
 def _name(body: Bytes, order: str) -> str:
     """Name of a variable: the third part, or the second of an opaque one, which has no dimensions."""
     parts = [part for _, (_, part) in zip(range(3), _elements(body, order), strict=False)]
-    name = bytes(parts[1 if _class_of(body, order)[0] == OPAQUE else 2]).decode("ascii")
+    name = bytes(parts[1 if _class_of(body, order)[0] == MatlabClass.OPAQUE else 2]).decode("ascii")
     if name and not name.isidentifier():
         raise ValueError(f"the name {name!r}")
     return name
@@ -105,13 +118,15 @@ def _name(body: Bytes, order: str) -> str:
 def _variable(body: Bytes, order: str) -> Any:
     """One variable, read by SciPy, which does not notice parts that are too many or a lost flag."""
     kind, is_complex = _class_of(body, order)
-    n_parts, expected = sum(1 for _ in _elements(body, order)), (6 if kind == SPARSE else 4) + is_complex
-    if kind not in (CELL, STRUCT, CHARACTERS, SPARSE, *NUMERIC):
+    is_sparse, is_full = kind == MatlabClass.SPARSE, kind in range(6, 16)
+    n_parts, expected = sum(1 for _ in _elements(body, order)), (6 if is_sparse else 4) + is_complex
+    others = (MatlabClass.CELL, MatlabClass.STRUCT, MatlabClass.CHARACTERS)
+    if not (is_sparse or is_full or kind in others):
         return None
-    if kind in (SPARSE, *NUMERIC) and n_parts != expected:
+    if (is_sparse or is_full) and n_parts != expected:
         raise ValueError(f"{n_parts} parts; expected {expected}")
-    header = b"MATLAB 5.0".ljust(HEADER - 4) + struct.pack(order + "2H", 0x0100, 0x4D49)
-    stream = io.BytesIO(header + struct.pack(order + "2I", MATRIX, len(body)) + body)
+    header = b"MATLAB 5.0".ljust(MATLAB_HEADER - 4) + struct.pack(order + "2H", 0x0100, 0x4D49)
+    stream = io.BytesIO(header + struct.pack(order + "2I", MatlabType.MATRIX, len(body)) + body)
     (value,) = [
         value
         for name, value in scipy.io.loadmat(stream, spmatrix=False).items()
@@ -184,8 +199,8 @@ def read_matrix_market(content: bytes) -> Any:
     n_rows, n_columns, n_entries, layout, field, symmetry = scipy.io.mminfo(io.BytesIO(content))
     if field == "pattern" or (symmetry != "general" and n_rows != n_columns):
         raise ValueError(f"{n_rows} x {n_columns}, {field}, {symmetry}; expected numbers, and a square if symmetric")
-    start = SIZE_LINE.match(content).end()  # type: ignore[union-attr]
-    body = COMMENTS.sub(b"", content[start:])
+    start = re.match(rb"(?:[ \t\r]*(?:%.*)?\n)*.*(?:\n|\Z)", content).end()  # type: ignore[union-attr]
+    body = re.sub(rb"^[ \t]*%.*$", b"", content[start:], flags=re.MULTILINE)
     numbers = numbers_of(body, content.count(b"\n", 0, start))
     width = (3 if layout == "coordinate" else 1) + (field == "complex")
     if layout == "array" and symmetry != "general":

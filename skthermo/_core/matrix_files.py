@@ -20,12 +20,6 @@ import scipy.sparse
 from skthermo._core.arrays import Label, Matrix
 from skthermo._core.text_matrices import OP4_HEADING, Labelled
 
-CHILD = Path(__file__).with_name("matrix_child.py")
-LEAST_MEMORY = 256_000_000
-TIMES_THE_FILE = 10
-EXPECTED = "ten times the size of the file or 256 MB (a sound file can be saved without compression)"
-SECONDS, BYTES_A_SECOND = 60, 1_000_000
-
 
 def read_matlab(file: Path) -> dict[str, Any]:
     """Every variable of a MATLAB v5 file, or of the only one in a zip file.
@@ -48,11 +42,11 @@ def read_half(file: Path) -> Any:
 def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
     """What files hold; each comes with its form, one of the child's ``READERS``."""
     size = sum(file.stat().st_size for file, _ in files)
-    most_memory = max(TIMES_THE_FILE * size, LEAST_MEMORY)
+    most_memory = max(10 * size, 256_000_000)
     job = {"files": [(str(file), form) for file, form in files], "most_memory": most_memory}
     results = []
     with tempfile.TemporaryFile() as output:
-        end = _run(json.dumps(job), output, SECONDS + size / BYTES_A_SECOND)
+        end = _run(json.dumps(job), output, 60 + size / 1_000_000)
         output.seek(0)
         for file, form in files:
             try:
@@ -60,7 +54,10 @@ def read_files(files: Sequence[tuple[Path, str]]) -> list[Any]:
             except (EOFError, pickle.UnpicklingError):
                 result = ValueError(f"reading it {end}")
             if isinstance(result, MemoryError):
-                result = f"it would take more than {most_memory / 1e6:.0f} MB of memory; expected at most {EXPECTED}"
+                result = (
+                    f"it would take more than {most_memory / 1e6:.0f} MB of memory; expected at most ten times the "
+                    "size of the file or 256 MB (a sound file can be saved without compression)"
+                )
             if isinstance(result, ValueError | str):
                 raise ValueError(f"{file}: not readable as {form} ({result})")
             results.append(result)
@@ -78,7 +75,8 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
         return "failed"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
     environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    command, pipe = [sys.executable, "-P", str(CHILD)], subprocess.PIPE
+    child = Path(__file__).with_name("matrix_child.py")
+    command, pipe = [sys.executable, "-P", str(child)], subprocess.PIPE
     try:
         done = subprocess.run(
             command, input=job.encode(), env=environment, timeout=seconds, check=False, stdout=output, stderr=pipe
@@ -88,9 +86,6 @@ def _run(job: str, output: IO[bytes], seconds: float) -> str:
     return f"ended the process with exit code {done.returncode} {done.stderr[-300:].decode(errors='replace')}".strip()
 
 
-BEGINNING = 65536  # bytes by which a form is recognised
-REAL = rb"[+-]?(?:\d+\.\d*|\.\d+|\d+(?=[EeDd]))(?:[EeDd][+-]?\d+)?"
-ENTRIES = rb"(?:\d+[ \t,]+\d+|-?\d+[ \t]*,[ \t]*\d+[ \t,]+-?\d+[ \t]*,[ \t]*\d+)[ \t,]+" + REAL
 FORMS = {
     "MATLAB v5": rb".{124}(?:\x00\x01IM|\x01\x00MI)|\x89HDF",
     ".npz": rb"PK",
@@ -99,19 +94,26 @@ FORMS = {
     "Nastran's DMIG": rb"(?i:(?:.*\n)?DMIG[ *,])",
     "Nastran's OUTPUT4": OP4_HEADING.pattern + rb"\n|[\x18\x30]\0{3}|\0{3}[\x18\x30]",
     "labels of rows": rb"\s*Matrix Eqn|(?:\s*\d+\.\d\s)+\s*(?:\d+(?:\.\d?)?)?\Z",
-    "lines of entries": rb"(?:[ \t]*(?![ \t\d+\-.])[^\n]*\n)*[ \t]*" + ENTRIES + rb"[ \t]*(?:\n|\Z)",
+    "lines of entries": (
+        rb"(?:[ \t]*(?![ \t\d+\-.])[^\n]*\n)*[ \t]*"
+        rb"(?:\d+[ \t,]+\d+|-?\d+[ \t]*,[ \t]*\d+[ \t,]+-?\d+[ \t]*,[ \t]*\d+)[ \t,]+"
+        rb"[+-]?(?:\d+\.\d*|\.\d+|\d+(?=[EeDd]))(?:[EeDd][+-]?\d+)?[ \t]*(?:\n|\Z)"
+    ),
 }
 """How files of each of the child's ``READERS`` begin."""
 
-KINDS = {".sti": "stiffness", ".stif": "stiffness", ".stiff": "stiffness", ".txk": "stiffness"} | dict.fromkeys(
-    (".mas", ".mass", ".txm"), "mass"
-)
+KINDS_BY_SUFFIX = {
+    ".sti": "stiffness",
+    ".stif": "stiffness",
+    ".stiff": "stiffness",
+    ".txk": "stiffness",
+} | dict.fromkeys((".mas", ".mass", ".txm"), "mass")
 SUFFIXES = (
     {".mat": "MATLAB v5", ".npz": ".npz", ".mtx": "lines of entries", ".op4": "Nastran's OUTPUT4"}
     | dict.fromkeys((".pch", ".dmig"), "Nastran's DMIG")
     | dict.fromkeys((".hb", ".rb", ".rsa", ".rua", ".matrix"), "Harwell-Boeing")
     | dict.fromkeys((".dof", ".mapping"), "labels of rows")
-    | dict.fromkeys(KINDS, "lines of entries")
+    | dict.fromkeys(KINDS_BY_SUFFIX, "lines of entries")
 )
 """What a file is expected to be, if it does not begin as any form does."""
 
@@ -119,15 +121,7 @@ FORMATS = (
     "a file of MATLAB v5, NumPy (.npz), Matrix Market, Abaqus (.mtx), CalculiX, SAP2000, Harwell-Boeing (ANSYS) or "
     "Nastran (DMIG, OUTPUT4), or a folder of such files"
 )
-BINARY = {
-    "a binary file of ANSYS": (rb"\x64\0{3}.{4}[\x02\x04]\0{3}", "HBMAT writes its matrices as text"),
-    "an OUTPUT2 file of Nastran": (rb"\x04\0{3}.{4}\x04\0{3}", "DMIGPCH and OUTPUT4 write what can be read"),
-}
-"""How files begin that other packages read, and what writes the same matrices as text."""
-
-ABAQUS = re.compile(r"(?P<name>.+)_(?P<kind>STIF|MASS|DMP[VS]|LOAD)\d*", re.IGNORECASE)
-MASS = " (mass)"  # after the name of an export whose stiffness has that name
-HELD = 1e36  # what Abaqus puts on the diagonal where a degree of freedom is held
+MASS_OF = " (mass)"  # after the name of an export whose stiffness has that name
 
 
 class NamedMatrices(NamedTuple):
@@ -139,7 +133,7 @@ class NamedMatrices(NamedTuple):
 
 def form_of(file: Path) -> str | None:
     """The form of a file's content or, if it begins as none does, of its name; None if both are unknown."""
-    beginning = _beginning(file, BEGINNING)
+    beginning = _beginning(file, 65536)
     text = beginning.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     both = {beginning, text}
     found = (form for form, pattern in FORMS.items() if any(re.match(pattern, one, re.DOTALL) for one in both))
@@ -169,10 +163,14 @@ def read_named_matrices(path: Path, is_used: Callable[[str], bool]) -> NamedMatr
 
 
 def _refuse_binary(files: Sequence[Path]) -> None:
-    """Raise an error for the first binary file that another package reads."""
+    """Raise an error for the first binary file that another package reads, and say what writes its matrices as text."""
+    binary = {
+        "a binary file of ANSYS": (rb"\x64\0{3}.{4}[\x02\x04]\0{3}", "HBMAT writes its matrices as text"),
+        "an OUTPUT2 file of Nastran": (rb"\x04\0{3}.{4}\x04\0{3}", "DMIGPCH and OUTPUT4 write what can be read"),
+    }
     for file in files:
         beginning = _beginning(file, 12) if file.is_file() else b""
-        for what, (pattern, instead) in BINARY.items():
+        for what, (pattern, instead) in binary.items():
             if re.match(pattern, beginning, re.DOTALL):
                 raise ValueError(
                     f"{file} is {what}; expected another file ({instead}), or matrices that you read with another "
@@ -188,7 +186,7 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
     stiff = {name for name, kind in exports.values() if kind == "stiffness"}
     named: dict[str, Path] = {}
     for file, (name, kind) in exports.items():
-        key = name + MASS if kind == "mass" and name in stiff else name
+        key = name + MASS_OF if kind == "mass" and name in stiff else name
         if kind == "other":
             continue
         if key in named and is_used(key):
@@ -216,7 +214,7 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
     for matrix in unsized:  # the last rows of a mass may be zero
         matrix.resize([max(one.shape[0] for one in unsized)] * 2)
     for name, matrix in matrices.items():
-        rows = labels.get(name.removesuffix(MASS), next(iter(labels.values())) if len(labels) == 1 else None)
+        rows = labels.get(name.removesuffix(MASS_OF), next(iter(labels.values())) if len(labels) == 1 else None)
         if rows is not None and scipy.sparse.issparse(matrix) and matrix.shape == (len(rows), len(rows)):
             matrices[name] = Labelled(matrix, rows)
     return _joined(matrices, folder)
@@ -224,9 +222,9 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
 
 def _export_of(file: Path) -> tuple[str, str | None]:
     """Name of an export, and whether a file is its stiffness, its mass or something else, where its name says so."""
-    if found := ABAQUS.fullmatch(file.stem):
+    if found := re.fullmatch(r"(?P<name>.+)_(?P<kind>STIF|MASS|DMP[VS]|LOAD)\d*", file.stem, re.IGNORECASE):
         return found["name"], {"STIF": "stiffness", "MASS": "mass"}.get(found["kind"].upper(), "other")
-    return file.stem, KINDS.get(file.suffix.lower())
+    return file.stem, KINDS_BY_SUFFIX.get(file.suffix.lower())
 
 
 def _parts(name: str, content: dict[str, Any], file: Path) -> dict[str, Any]:
@@ -237,7 +235,7 @@ def _parts(name: str, content: dict[str, Any], file: Path) -> dict[str, Any]:
     by_letter = {letter: [key for key in square if key.lower().startswith(letter)] for letter in "km"}
     if len(by_letter["k"]) != 1 or len(by_letter["m"]) > 1:
         raise ValueError(f"{file} holds {list(content)}; expected one stiffness K... and at most one mass M...")
-    masses = {name + MASS: square[by_letter["m"][0]]} if by_letter["m"] else {}
+    masses = {name + MASS_OF: square[by_letter["m"][0]]} if by_letter["m"] else {}
     return {name: square[by_letter["k"][0]]} | masses
 
 
@@ -277,8 +275,9 @@ def _joined(named: dict[str, Any], path: Path) -> NamedMatrices:
     diagonals = [
         m.diagonal() for m in matrices.values() if m is not None and scipy.sparse.issparse(m) and _is_square(m)
     ]
-    if any((diagonal == HELD).any() for diagonal in diagonals) and len({len(d) for d in diagonals}) == 1:
-        free = np.flatnonzero((np.array(diagonals) != HELD).all(axis=0))
+    held = 1e36  # what Abaqus puts on the diagonal where a degree of freedom is held
+    if any((diagonal == held).any() for diagonal in diagonals) and len({len(d) for d in diagonals}) == 1:
+        free = np.flatnonzero((np.array(diagonals) != held).all(axis=0))
         matrices = {name: m[free][:, free] if _is_square(m) else m for name, m in matrices.items()}  # type: ignore[index]
         dofs = tuple(dofs[i] for i in free) if dofs else ()
     return NamedMatrices(matrices, dofs)

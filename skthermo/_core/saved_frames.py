@@ -9,11 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-PLAIN = (np.dtype(float), np.dtype("int64"), np.dtype(bool))  # types of values that arrays keep
-
 
 class SavesFrames:
-    """Objects of which files hold tables in place of frames; reading a file makes them frames again."""
+    """Objects whose files hold tables in place of frames; reading a file makes them frames again."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: to_saved(value) for name, value in super().__getstate__().items()}
@@ -76,7 +74,7 @@ def to_saved(value: Any) -> Any:
     dtypes = set(value.dtypes) if is_frame else {value.dtype}
     if None in axes:
         return value
-    if len(dtypes) != 1 or dtypes.pop() not in PLAIN:
+    if len(dtypes) != 1 or dtypes.pop() not in (np.dtype(float), np.dtype("int64"), np.dtype(bool)):
         return _of_columns(value, axes) if is_frame else _of_objects(value, axes)
     return SavedTable(value.to_numpy(), axes[0], axes[1] if is_frame else None, None if is_frame else value.name)
 

@@ -12,13 +12,11 @@ import numpy as np
 import pandas as pd
 
 SPACE = "\N{NO-BREAK SPACE}"
-UNKNOWN = "not known"
-TURNING = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # letters that turn the direction of text
 
 
 def percent(share: float, digits: str = ".4g") -> str:
     """A share in percent, with digits as in a format specification."""
-    return f"{100 * float(share):{digits}}{SPACE}%" if np.isfinite(share) else UNKNOWN
+    return f"{100 * float(share):{digits}}{SPACE}%" if np.isfinite(share) else "not known"
 
 
 def share_text(share: float) -> str:
@@ -26,7 +24,7 @@ def share_text(share: float) -> str:
     value = 100 * float(share)
     if 99.5 <= value < 100:
         return percent(share, ".1f") if value < 99.95 else f"over{SPACE}99.9{SPACE}%"
-    return f"{significant(value)}{SPACE}%" if np.isfinite(share) else UNKNOWN
+    return f"{significant(value)}{SPACE}%" if np.isfinite(share) else "not known"
 
 
 def bounds_text(lowest: float, highest: float) -> str:
@@ -37,7 +35,7 @@ def bounds_text(lowest: float, highest: float) -> str:
 def significant(value: float, digits: int = 2) -> str:
     """A number with so many significant digits; those before the point are all kept."""
     if value == 0 or not np.isfinite(value):
-        return "0" if value == 0 else UNKNOWN
+        return "0" if value == 0 else "not known"
     decimals = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
     return f"{value:.{decimals}f}"
 
@@ -45,7 +43,7 @@ def significant(value: float, digits: int = 2) -> str:
 def probability_text(value: float) -> str:
     """A probability as a number."""
     if not np.isfinite(value):
-        return UNKNOWN
+        return "not known"
     return "less than 0.001" if value < 0.001 else f"{value:.2g}"
 
 
@@ -72,9 +70,10 @@ def printable(text: Any) -> str:
     text = str(text)
     if text.isprintable():
         return text
+    turning = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # the direction of text
     spaced = re.sub(r"[\t\n\v\f\r\x85\u2028\u2029]+", " ", text)
     return "".join(
-        letter if unicodedata.category(letter) not in ("Cc", "Cs") and letter not in TURNING else ascii(letter)[1:-1]
+        letter if unicodedata.category(letter) not in ("Cc", "Cs") and letter not in turning else ascii(letter)[1:-1]
         for letter in spaced
     )
 
@@ -107,7 +106,8 @@ def duration_text(wait: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it: times as texts of ISO 8601, durations in seconds, None for what is not finite."""
+    """A value as JSON has it: times as texts of ISO 8601, durations in seconds, None for numbers that are not
+    finite."""
     if isinstance(value, Mapping):
         return {str(name): plain(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
@@ -131,7 +131,7 @@ def period_text(index: pd.Index | None) -> str:
 
 
 class Sentences(ABC):
-    """What a result says: an answer, what is not known, and remarks."""
+    """A result in sentences: an answer, open questions, and remarks."""
 
     @abstractmethod
     def _answer(self) -> Iterator[str]: ...
@@ -143,17 +143,17 @@ class Sentences(ABC):
         yield from ()
 
     def answer(self) -> list[str]:
-        """What was found, and how surely.
+        """The answer, and how certain it is.
 
         Returns
         -------
         list of str
-            Sentences. The first says what is most probable.
+            Sentences. The first has the most probable answer.
         """
         return list(self._answer())
 
     def limits(self) -> list[str]:
-        """What is not known.
+        """Open questions.
 
         Returns
         -------
@@ -163,7 +163,7 @@ class Sentences(ABC):
         return list(self._limits())
 
     def summary(self) -> str:
-        """What was found, and what is not known.
+        """Answer, open questions and remarks.
 
         Returns
         -------

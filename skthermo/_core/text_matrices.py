@@ -14,26 +14,13 @@ Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BYTES_FOR_EACH_ROW = 100  # that checks of a sparse matrix take, its entries apart
-LINES_AT_ONCE = 20_000
-SPACE, TAB, NEWLINE = b" \t\n"
-MOST = 2**31 - 1  # rows, nodes and components are smaller
-HEADING = re.compile(rb"\A(?:[ \t]*(?![ \t\d+\-.]).*(?:\n|\Z))*")
-COMMENTS = re.compile(rb"^[ \t]*[*%#!$].*$", re.MULTILINE)
-TO_FLOATS = bytes.maketrans(b"Dd,", b"EE ")
-BARE_EXPONENT = re.compile(rb"(?<=[\d.])([+-])(?=\d)")
-FORTRAN = re.compile(rb"\((?:\d*P,?)?(\d*)[IEDFG](\d+)(?:\.\d+)?(?:E\d+)?\)")
-MAPPING, NODE_DIRECTION = r"(\d+)\s+(\d+)\s+([A-Z]\w*)", r"()(\d+)\.(\d)"
-FULL = 0.5  # share of entries beside the diagonal with a mirror image, from which on all entries are meant to be given
-
+MOST_INTEGER = 2**31 - 1  # rows, nodes and components are smaller
 OP4_HEADING = re.compile(
     rb"([ \d]{8}|[ \d]{16})([ \d-]{8}|[ \d-]{16})([ \d]{8})([ \d]{8})([A-Z]\w{0,7})"
     rb"[ \0]*(?:(?:1P,)?(\d{1,3})[EDed](\d{1,3})\.\d+)?(?:\|I16)?[ \t]*"
 )
-USUAL_FORMAT = 5, 16  # values in a line and characters of each, if a heading does not say so
 STRING = 65536  # a string's length and row in one number, where there are fewer rows
-REAL = 1, 2  # types of real numbers, in single and double precision; others are complex
-SYMMETRIC = 6  # the form of a matrix of which one half may be given
-FREE_FIELD = re.compile(rb"^DMIG\*? *,", re.MULTILINE)
+REAL_KINDS = 1, 2  # types of real numbers, in single and double precision; others are complex
 
 
 class Labelled(NamedTuple):
@@ -51,10 +38,10 @@ class Text:
             content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         self.content = content
         self.bytes = np.frombuffer(content, dtype=np.uint8)
-        ends = np.flatnonzero(self.bytes == NEWLINE)
+        ends = np.flatnonzero(self.bytes == ord("\n"))
         self.ends = ends if content.endswith(b"\n") or not content else np.append(ends, len(content))
         self.starts = np.append(0, self.ends[:-1] + 1)[: len(self.ends)]
-        control = self.bytes < TAB
+        control = self.bytes < ord("\t")
         if control.any():
             line = int(np.searchsorted(self.ends, np.argmax(control))) + 1
             raise ValueError(f"line {line} holds the byte {self.bytes[np.argmax(control)]}, which no text does")
@@ -64,7 +51,7 @@ class Text:
 
     def words(self) -> Integers:
         """How many words each line has."""
-        blank = np.append(True, self.bytes <= SPACE)
+        blank = np.append(True, self.bytes <= ord(" "))
         begins = np.flatnonzero(blank[:-1] & ~blank[1:])
         return np.diff(np.append(0, np.searchsorted(begins, self.ends)))
 
@@ -83,15 +70,17 @@ def numbers_of(text: bytes, n_before: int = 0) -> Numbers:
         raise
 
 
-def _whole(numbers: Numbers, what: str, least: int = -MOST) -> Integers:
+def _whole(numbers: Numbers, what: str, least: int = -MOST_INTEGER) -> Integers:
     """Whole numbers within the usual range."""
-    wrong = ~((numbers % 1 == 0) & (numbers >= least) & (numbers <= MOST))
+    wrong = ~((numbers % 1 == 0) & (numbers >= least) & (numbers <= MOST_INTEGER))
     if wrong.any():
-        raise ValueError(f"{what} is {numbers[np.argmax(wrong)]:g}; expected whole numbers from {least} to {MOST}")
+        raise ValueError(
+            f"{what} is {numbers[np.argmax(wrong)]:g}; expected whole numbers from {least} to {MOST_INTEGER}"
+        )
     return numbers.astype(np.int64)
 
 
-def _nodes(pairs: Numbers, least: int = -MOST) -> Integers:
+def _nodes(pairs: Numbers, least: int = -MOST_INTEGER) -> Integers:
     """Labels, (n, 2), of nodes from ``least`` on and directions."""
     return np.column_stack([_whole(pairs[:, 0], "a node", least), _whole(pairs[:, 1], "a direction", 0)])
 
@@ -119,7 +108,7 @@ def symmetric(
         ones = np.ones(matrix.nnz, dtype=np.int8)
         pattern = scipy.sparse.csc_array((ones, matrix.indices, matrix.indptr), shape=matrix.shape)
         paired = pattern.multiply(pattern.T).nnz - np.count_nonzero(kept & (rows == columns))
-        if paired >= FULL * (below + above):
+        if paired >= 0.5 * (below + above):
             return matrix
         if paired or in_order:
             raise ValueError(
@@ -149,8 +138,9 @@ def read_entries(content: bytes) -> scipy.sparse.csc_array | Labelled:
     all entries may be there, below a heading whose lines do not begin with a number, and between comments.
     """
     content = Text(content).content
-    heading = HEADING.match(content).group()  # type: ignore[union-attr]
-    body = COMMENTS.sub(b"", b"\n" * heading.count(b"\n") + content[len(heading) :]).translate(TO_FLOATS)
+    heading = re.match(rb"\A(?:[ \t]*(?![ \t\d+\-.]).*(?:\n|\Z))*", content).group()  # type: ignore[union-attr]
+    body = b"\n" * heading.count(b"\n") + content[len(heading) :]
+    body = re.sub(rb"^[ \t]*[*%#!$].*$", b"", body, flags=re.MULTILINE).translate(bytes.maketrans(b"Dd,", b"EE "))
     del content
     text = Text(body)
     words = text.words()
@@ -172,7 +162,7 @@ def read_entries(content: bytes) -> scipy.sparse.csc_array | Labelled:
 
 def _refuse_cut_value(text: Text, words: Integers) -> None:
     """Refuse a text without a last line end whose last value has fewer digits than those before it have."""
-    lines = np.flatnonzero(words)[-LINES_AT_ONCE:]
+    lines = np.flatnonzero(words)[-20_000:]
     if text.content.endswith(b"\n") or len(lines) < 2:
         return
     lengths = np.array([len(text.content[text.starts[i] : text.ends[i]].split()[-1].lstrip(b"+-")) for i in lines])
@@ -184,9 +174,10 @@ def read_dofs(content: bytes) -> list[tuple[int, int | str]]:
     """Labels of a matrix's rows: CalculiX's lines of ``node.direction``, or ANSYS' of equation, node and direction."""
     lines = Text(content).content.decode("latin-1").split("\n")
     is_mapping = "Eqn" in lines[0]
+    pattern = r"(\d+)\s+(\d+)\s+([A-Z]\w*)" if is_mapping else r"()(\d+)\.(\d)"
     dofs: list[tuple[int, int | str]] = []
     for number, line in enumerate(lines[is_mapping:], start=1 + is_mapping):
-        if found := re.fullmatch(MAPPING if is_mapping else NODE_DIRECTION, line.strip()):
+        if found := re.fullmatch(pattern, line.strip()):
             equation, node, direction = found.groups()
             if is_mapping and int(equation) != len(dofs) + 1:
                 raise ValueError(f"line {number} is of equation {equation}; expected {len(dofs) + 1}")
@@ -208,7 +199,10 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
     try:
         counts = [int(word) for word in heads[1].split()]
         kind, sizes = heads[2][:3].decode("ascii").upper(), [int(word) for word in heads[2][3:].split()]
-        formats = [(int(n or 1), int(width)) for n, width in FORTRAN.findall(heads[3].upper().replace(b" ", b""))]
+        found_formats = re.findall(
+            rb"\((?:\d*P,?)?(\d*)[IEDFG](\d+)(?:\.\d+)?(?:E\d+)?\)", heads[3].upper().replace(b" ", b"")
+        )
+        formats = [(int(n or 1), int(width)) for n, width in found_formats]
         n_rows, n_columns, n_entries = sizes[:3]
         (_, pointers_in, rows_in, values_in), forms = counts[:4], formats[:3]
         n_sides = counts[4] if len(counts) > 4 else 0
@@ -271,7 +265,7 @@ def reals(words: list[bytes], line: int) -> list[float]:
     found = []
     for word in words:
         try:
-            changed = BARE_EXPONENT.sub(rb"E\1", word.upper().replace(b"D", b"E").replace(b"_", b"?"))
+            changed = re.sub(rb"(?<=[\d.])([+-])(?=\d)", rb"E\1", word.upper().replace(b"D", b"E").replace(b"_", b"?"))
             found.append(float(changed))
         except ValueError:
             raise ValueError(f"line {line}: {word.decode('latin-1').strip()!r} is not a number") from None
@@ -315,7 +309,7 @@ class Strings:
         used = np.flatnonzero(values)
         string = np.repeat(np.arange(len(lengths)), lengths)[used]
         entries = (rows - 1 - np.cumsum(lengths) + lengths)[string] + used, columns[string] - 1, values[used], n_columns
-        return symmetric(*entries, in_order=True) if form == SYMMETRIC else square(*entries)
+        return symmetric(*entries, in_order=True) if form == 6 else square(*entries)
 
 
 def read_op4(content: bytes) -> dict[str, scipy.sparse.csc_array | None]:
@@ -358,7 +352,7 @@ def _of_lines(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | No
             raise ValueError(f"line {number} is {line[:40].decode('latin-1')!r}; expected the heading of a matrix")
         n_columns, n_rows, form, kind = (int(word) for word in heading.groups()[:4])
         head = Head(n_columns, n_rows, form, kind, heading[5].decode("ascii"))
-        n, width = map(int, heading.group(6, 7)) if heading[6] else USUAL_FORMAT
+        n, width = map(int, heading.group(6, 7)) if heading[6] else (5, 16)
         try:
             yield head.name, _of_text(lines, head, n, width)
         except ValueError as error:
@@ -368,7 +362,7 @@ def _of_lines(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | No
 def _of_text(lines: Lines, head: Head, n: int, width: int) -> scipy.sparse.csc_array | None:
     """The matrix whose columns come next; its values stand n in a line, in fields of a width."""
     strings, values, column = Strings(head), array("d"), 0
-    size_of, is_real = 1 if head.kind % 2 else 2, head.kind in REAL
+    size_of, is_real = 1 if head.kind % 2 else 2, head.kind in REAL_KINDS
     while lines:
         line = lines.take()
         number, words = lines.number, [_whole_word(word, lines.number) for word in line.split()]
@@ -449,12 +443,12 @@ def _of_columns(
             raise ValueError(f"a record of {len(record)} bytes at byte {at}; expected a column")
         column, row, n_words = np.frombuffer(record[: 3 * word], integer).tolist()
         if column == head.n_columns + 1:
-            return strings.matrix(np.frombuffer(values, real).astype(float)) if head.kind in REAL else None
+            return strings.matrix(np.frombuffer(values, real).astype(float)) if head.kind in REAL_KINDS else None
         if column <= before or len(record) != (3 + n_words) * word or is_dense not in (None, row > 0):
             what = f"column {column} from row {row}, of {n_words} words, in {len(record)} bytes"
             raise ValueError(f"after column {before}, {what}")
         before, start, is_dense = column, 3 * word, row > 0
-        while head.kind in REAL and start < len(record):
+        while head.kind in REAL_KINDS and start < len(record):
             stop = len(record)
             if not row or start > 3 * word:
                 numbers = np.frombuffer(record[start : start + start_of_string].ljust(start_of_string, b"\0"), integer)
@@ -470,9 +464,9 @@ def _of_columns(
 
 
 def _whole_word(word: bytes, line: int) -> int:
-    number = int(word) if word.isdigit() and len(word) < 20 else MOST + 1
-    if number > MOST:
-        raise ValueError(f"line {line}: {word.decode('latin-1')!r} is not a whole number up to {MOST}")
+    number = int(word) if word.isdigit() and len(word) < 20 else MOST_INTEGER + 1
+    if number > MOST_INTEGER:
+        raise ValueError(f"line {line}: {word.decode('latin-1')!r} is not a whole number up to {MOST_INTEGER}")
     return number
 
 
@@ -486,10 +480,10 @@ class Entries:
     def matrix(self) -> Labelled | None:
         """The matrix with its labels; None if it is complex or rectangular."""
         form, kind = self.head
-        if form not in (1, SYMMETRIC) or kind not in REAL:
+        if form not in (1, 6) or kind not in REAL_KINDS:
             return None
         rows, columns = (np.array(labels, dtype=np.int64).reshape(-1, 2) for labels in (self.rows, self.columns))
-        return labelled(rows, columns, np.array(self.values), is_symmetric=form == SYMMETRIC)
+        return labelled(rows, columns, np.array(self.values), is_symmetric=form == 6)
 
 
 def read_dmig(content: bytes) -> dict[str, Labelled | None]:
@@ -499,7 +493,12 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
     ``EXTOUT=DMIGPCH`` writes them to the punch file. A half of a symmetric matrix (form 6) or all of it may be there.
     """
     text = Text(content.upper()).content
-    is_free, found, name, column = FREE_FIELD.search(text) is not None, dict[str, Entries](), "", [0, 0]
+    is_free, found, name, column = (
+        re.search(rb"^DMIG\*? *,", text, re.MULTILINE) is not None,
+        dict[str, Entries](),
+        "",
+        [0, 0],
+    )
     for number, line in enumerate(text.split(b"\n"), start=1):
         is_card = line[:1].isalpha()
         if is_card:

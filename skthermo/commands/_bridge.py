@@ -31,7 +31,7 @@ from skthermo.commands._new_records import (
 from skthermo.commands._settings import Settings, read_settings
 from skthermo.exceptions import SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
-from skthermo.preprocessing.loggers.files import CsvFormat, in_zone, read_file
+from skthermo.preprocessing.loggers.logger_files import CsvFormat, in_zone, read_file
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}

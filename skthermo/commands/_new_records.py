@@ -17,7 +17,7 @@ from skthermo._core.text import counted
 from skthermo._core.warnings import warn_user
 from skthermo.commands._settings import Records
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing.loggers.files import BINARY, ENDINGS, CsvFormat, read_file
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, read_file
 from skthermo.preprocessing.loggers.together import in_celsius, joined, once
 
 
@@ -75,7 +75,7 @@ class Taken:
         n_rows = known.get("rows", 0)
         n_done = n_rows if len(table) >= n_rows and _checksum(table[:n_rows]) == known.get("checksum") else 0
         end = file.read_bytes().rstrip(b"\0")[-1:]
-        is_finished = is_as_before or file.suffix.lower() in BINARY or end in (b"\n", b"\r")
+        is_finished = is_as_before or file.suffix.lower() in NO_TEXT_FILES or end in (b"\n", b"\r")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
 
     def _key(self, file: Path) -> str:
@@ -100,7 +100,8 @@ def _checksum(table: pd.DataFrame) -> int:
 
 def files_in(folder: Path) -> list[Path]:
     """Files of records in a folder, by name; hidden and unfinished ones are left out."""
-    return sorted(one for one in folder.glob("*") if one.suffix.lower() in ENDINGS and one.name[0] not in "._~")
+    endings = (".csv", ".txt", ".dat", ".tsv", *NO_TEXT_FILES)
+    return sorted(one for one in folder.glob("*") if one.suffix.lower() in endings and one.name[0] not in "._~")
 
 
 def read_columns(file: Path, form: CsvFormat, records: Records, *, leave_unfinished: bool = False) -> pd.DataFrame:

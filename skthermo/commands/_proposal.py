@@ -19,7 +19,7 @@ import skthermo
 from skthermo._core.files import write_when_complete
 from skthermo._core.frames import usual_step
 from skthermo._core.text import duration_text
-from skthermo._core.warnings import without_warnings
+from skthermo._core.warnings import warn_each, without_warnings
 from skthermo.commands._settings import (
     CLASSES,
     SECTIONS,
@@ -30,9 +30,8 @@ from skthermo.commands._settings import (
     read_settings,
     settings_of,
 )
-from skthermo.detection import DirectionalDetector
 from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
-from skthermo.preprocessing.loggers.files import BINARY, PARQUET, CsvFormat, Look, read_file
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, PARQUET, CsvFormat, FileLook, read_file
 from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
@@ -42,15 +41,8 @@ FEATURES = {
     "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
 }
 DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day can be evaluated together
-SINGLE = ("MahalanobisDetector", {}, "each record for itself")
-DAY = ("WindowedAlarm", {"window": "1D"}, "the records of a day together")
-FALLS = {"class": "DirectionalDetector"}  # of natural frequencies, as damage has it
-SINGLE_FALLS = ("DirectionalDetector", {}, "each record for itself, falls of frequencies with more weight than rises")
-DAY_FALLS = (
-    "WindowedAlarm",
-    {"window": "1D", "detector": FALLS},
-    "the records of a day together, falls of frequencies with more weight than rises",
-)
+DAY = {"window": "1D"}
+ANY_CHANGE, FALLS = "MahalanobisDetector", "DirectionalDetector"  # of other responses, and of natural frequencies
 WIDTH = 110  # of comments
 OTHERS = """
 # An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
@@ -76,7 +68,7 @@ class Candidate:
     """
 
     kind: str
-    chosen: Mapping[str, Any]
+    compensator: Mapping[str, Any]
     text: str
     finds: str
     size: float
@@ -89,7 +81,7 @@ class Candidate:
 class Proposal:
     """What was found in files of records, and the settings that are proposed for them."""
 
-    looks: Sequence[Look]
+    looks: Sequence[FileLook]
     form: CsvFormat
     records: Records
     baseline: pd.DataFrame
@@ -101,9 +93,10 @@ class Proposal:
     @classmethod
     def of(cls, options: argparse.Namespace) -> Proposal:
         """Look at files, and at their records up to the end of the baseline."""
-        read = LoggerRecords.of(
+        read = LoggerRecords.read(
             options.files, options.temperatures, options.responses, options.reference, options.zone, options.stamps
         )
+        warn_each(finding for look in read.looks for finding in look.findings)
         looks, roles, table = read.looks, read.roles, read.table
         form = _form_of_all(looks)
         until = options.until
@@ -129,7 +122,7 @@ class Proposal:
     def account(self) -> Iterator[str]:
         for look in self.looks:
             form, index = look.form, look.records.index
-            is_csv = look.file.suffix.lower() not in BINARY
+            is_csv = look.file.suffix.lower() not in NO_TEXT_FILES
             shape = f"values with {form.separator!r} between and the decimal sign {form.decimal!r}, " if is_csv else ""
             zone = f" in {index.tz}" if index.tz else ", without a time zone"
             yield f"{look.file}: {len(index)} records, {shape}{index.min()} to {index.max()}{zone}"
@@ -153,16 +146,14 @@ class Proposal:
         """
         parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen in self.features]}
         parts["regression"] = class_named(REGRESSION, CLASSES["regression"])()
-        options = {"compensator": {}, "monitor": self.monitor_options}
-
-        are_frequencies = set(self.units.values()) == {HZ}
-        single, day = (SINGLE_FALLS, DAY_FALLS) if are_frequencies else (SINGLE, DAY)
-        tried = []
-        for kind, chosen, text in [single, day] if self.step <= DENSE else [single]:
-            inner = {key: DirectionalDetector() for key, one in chosen.items() if one is FALLS}
+        kind = FALLS if set(self.units.values()) == {HZ} else ANY_CHANGE
+        falls = ", falls of frequencies with more weight than rises" if kind == FALLS else ""
+        ways = [({}, f"each record for itself{falls}"), (DAY, f"the records of a day together{falls}")]
+        parts["detector"], tried = class_named(kind, CLASSES["detector"])(), []
+        for chosen, text in ways if self.step <= DENSE else ways[:1]:
+            options = {"compensator": chosen, "monitor": self.monitor_options}
             try:
-                detector = class_named(kind, CLASSES["detector"])(**{**chosen, **inner})
-                made = Settings(Path(), {}, Files(), self.records, self.form, parts | {"detector": detector}, options)
+                made = Settings(Path(), {}, Files(), self.records, self.form, parts, options)
                 with without_warnings():  # the fit that follows gives them
                     smallest = made.monitor().fit(self.baseline).smallest_changes_
                 size = float(np.exp(np.log(list(smallest.single.values())).mean()))
@@ -215,8 +206,8 @@ class Proposal:
             ("csv", None, asdict(self.form), "How CSV files are written."),
             *(("features", kind, chosen, FEATURES[kind]) for kind, chosen in self.features),
             ("regression", REGRESSION, {}, "Predicts the responses from the inputs: any of scikit-learn's regressors."),
-            ("compensator", None, {}, "Takes out what the weather explains."),
-            ("detector", best.kind, best.chosen, f"Evaluates {best.text}."),
+            ("compensator", None, best.compensator, f"Takes out what the weather explains, of {best.text}."),
+            ("detector", best.kind, {}, "Gives the damage index of what is left."),
             ("monitor", None, self.monitor_options, "The detector in service."),
         ]
         parts = [
@@ -231,10 +222,10 @@ class Proposal:
         return "\n".join(parts) + "\n"
 
 
-def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
+def _form_of_all(looks: Sequence[FileLook]) -> CsvFormat:
     """The form by which all files are read as they were: that of the first text, as workbooks need less of it."""
     looks = [look for look in looks if look.file.suffix.lower() not in PARQUET] or looks[:1]
-    looks.sort(key=lambda look: look.file.suffix.lower() in BINARY)
+    looks.sort(key=lambda look: look.file.suffix.lower() in NO_TEXT_FILES)
     missing = sorted({marker for look in looks for marker in look.form.missing})
     forms = [replace(look.form, missing=missing) for look in looks]
     other = next((n for n, form in enumerate(forms) if form != forms[0] and not _fits(forms[0], looks[n])), None)
@@ -245,7 +236,7 @@ def _form_of_all(looks: Sequence[Look]) -> CsvFormat:
     return forms[0]
 
 
-def _fits(form: CsvFormat, look: Look) -> bool:
+def _fits(form: CsvFormat, look: FileLook) -> bool:
     """Whether a file has the same records by another form."""
     try:
         return read_file(look.file, form, ignore=look.ignored).equals(look.records)

@@ -24,9 +24,9 @@ import pandas as pd
 from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import DirectionalDetector, TemperatureCompensator
+from skthermo.detection import CompensatedDetector, DirectionalDetector
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing.loggers.files import CsvFormat
+from skthermo.preprocessing.loggers.logger_files import CsvFormat
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
 NONE = "none"  # in a file, where a parameter may be None and is not by default
@@ -117,7 +117,7 @@ SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = 
     "files": (lambda: Files, ()),
     "records": (lambda: Records, ()),
     "csv": (lambda: CsvFormat, ()),
-    "compensator": (lambda: TemperatureCompensator, ("estimator", "targets")),
+    "compensator": (lambda: CompensatedDetector, ("detector", "regressor", "targets")),
     "monitor": (lambda: Monitor, ("detector", "targets", "reference", "fem")),
     "fem": (lambda: import_module("skthermo.surrogate").DataInformedFEM, ("inverse", "mapper", "imputer")),
     "page": (
@@ -205,8 +205,8 @@ class Settings:
         steps = [*self.parts["features"], self.parts["regression"]]
         regression = make_pipeline(*steps) if len(steps) > 1 else steps[0]
         targets, reference = list(self.records.responses), list(self.records.reference) or None
-        compensator = TemperatureCompensator(regression, targets=targets, **self.options["compensator"])
-        detector = make_pipeline(compensator, with_directions_of(fem, self.parts["detector"]))
+        last = with_directions_of(fem, self.parts["detector"])
+        detector = CompensatedDetector(last, regression, targets=targets, **self.options["compensator"])
         return Monitor(detector, reference=reference, fem=fem, **self.options["monitor"])
 
     def fem(self, T: pd.DataFrame, F: pd.DataFrame) -> Any:
@@ -229,12 +229,9 @@ class Settings:
 
 def with_directions_of(fem: Any, detector: Any) -> Any:
     """The detector, which takes the directions of damage from a fitted chain where it knows none but "softening"."""
-    inner = getattr(detector, "detector", None)
-    one = inner if isinstance(inner, DirectionalDetector) else detector
-    if fem is None or not isinstance(one, DirectionalDetector) or not isinstance(one.directions, str):
+    if fem is None or not isinstance(detector, DirectionalDetector) or not isinstance(detector.directions, str):
         return detector
-    own = clone(one).set_params(directions=fem)
-    return own if one is detector else clone(detector).set_params(detector=own)
+    return clone(detector).set_params(directions=fem)
 
 
 def _model(path: Path, settings: Path) -> Any:
@@ -384,7 +381,7 @@ class _Reader:
             raise self.error("csv", 0, "time_zone", text) from error
         monitor = found.monitor()
         self._validate("monitor", 0, monitor)
-        self._validate("compensator", 0, monitor.detector[0])
+        self._validate("compensator", 0, monitor.detector)
 
 
 def class_named(name: Any, packages: Sequence[str]) -> type:

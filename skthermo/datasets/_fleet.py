@@ -29,16 +29,6 @@ from skthermo.datasets._fleet_structures import KINDS, Design, Kind
 from skthermo.datasets._results import FleetRecords
 from skthermo.fem import AffineModel
 
-DRAWN = ("who", "design", "error", "laws", "zones", "climate", "thermometers", "noise")
-WEATHER, FREQUENCIES, TEMPERATURES = 100, 101, 102  # streams that depend on the seed of the records, too
-APART, ATTEMPTS = 0.07, 100  # of neighbouring frequencies, so that modes keep their order; tries until they are
-STIFFNESS_ERROR, MASS_ERROR = (0.02, 0.05), 0.01
-MOST = 0.5  # share of records that are missing or wrong
-ZONE_OFFSET = 0.8  # C
-NOISE, NOISE_LIMITS = 0.004, (0.002, 0.01)
-TEMPERATURE_GAPS = 0.2  # share of missing temperatures over that of frequencies
-HOURS_A_DAY = 24
-
 
 @dataclass(frozen=True)
 class FleetBridge:
@@ -114,13 +104,13 @@ class FleetBridge:
         """Relative standard deviation of the noise of each frequency, of shape (n_modes,)."""
         random = self._random("noise")
         of_modes = 0.2 * random.standard_normal(KINDS[self.kind].n_modes)
-        return np.clip(NOISE * np.exp(0.3 * random.standard_normal() + of_modes), *NOISE_LIMITS)
+        return np.clip(0.004 * np.exp(0.3 * random.standard_normal() + of_modes), 0.002, 0.01)
 
     @cached_property
     def model(self) -> AffineModel:
         """The user's FE model: a coarser mesh, stiffnesses 2 to 5 % off, parameters across the thermal zones."""
         random, kind = self._random("error"), KINDS[self.kind]
-        off = random.uniform(*STIFFNESS_ERROR)
+        off = random.uniform(0.02, 0.05)
         wrong = {
             name: value * np.exp(relative_error(name, off) * random.standard_normal())
             for name, value in self._design.items()
@@ -214,24 +204,23 @@ class FleetBridge:
         def key(what: int) -> tuple[int, ...]:
             return (*self.seed, what, own)
 
-        hours = HOURS_A_DAY // samples_per_day
-        weather = self.climate.weather(index[0], index[-1] + pd.Timedelta(hours=hours - 1), key(WEATHER))
+        hours, (for_weather, for_frequencies, for_temperatures) = 24 // samples_per_day, map(key, (100, 101, 102))
+        weather = self.climate.weather(index[0], index[-1] + pd.Timedelta(hours=hours - 1), for_weather)
         years, rows = weather.index.year.unique(), weather.index.get_indexer(index)
 
         def means(hourly: Array) -> Array:
             return hourly[rows[0] : rows[-1] + hours].reshape(len(index), hours).mean(axis=1)
 
-        offsets = ZONE_OFFSET * self._random("zones").standard_normal(len(self.laws))
+        offsets = 0.8 * self._random("zones").standard_normal(len(self.laws))
         theta = {
             zone: np.exp(law.log_multiplier(means(law.temperature(weather)) + offset))
             for (zone, law), offset in zip(self.laws.items(), offsets, strict=True)
         }
         clean = model.frequencies(np.column_stack(list(theta.values())))
-        disturbed = measured(
-            clean, level, gaps, outliers, rows, drawn_by_hour(years, columns_for(len(modes)), key(FREQUENCIES))
-        )
-        reader = drawn_by_hour(years, 2 * len(self.roles), key(TEMPERATURES))
-        read = readings(self._thermometers, weather, means, TEMPERATURE_GAPS * gaps, rows, reader)
+        drawn = drawn_by_hour(years, columns_for(len(modes)), for_frequencies)
+        disturbed = measured(clean, level, gaps, outliers, rows, drawn)
+        reader = drawn_by_hour(years, 2 * len(self.roles), for_temperatures)
+        read = readings(self._thermometers, weather, means, 0.2 * gaps, rows, reader)
         return FleetRecords(
             temperatures=pd.DataFrame(read, index),
             frequencies=pd.DataFrame(disturbed, index, modes),
@@ -247,16 +236,17 @@ class FleetBridge:
     def _design(self) -> Design:
         """Stiffnesses and masses, drawn until the frequencies are so far apart that modes keep their order."""
         random, kind = self._random("design"), KINDS[self.kind]
-        for _ in range(ATTEMPTS):
+        for _ in range(100):
             design = kind.design(self.covariates["span"], self.covariates["material"], random)
             nominal = assemble_truth(kind, design, further_modes=1).frequencies(np.ones((1, len(kind.zones))))[0]
-            if (np.diff(nominal) > APART * nominal[:-1]).all():
+            if (np.diff(nominal) > 0.07 * nominal[:-1]).all():
                 break
         return design
 
     def _random(self, what: str) -> np.random.RandomState:
         """Random numbers for one thing that is drawn, whatever else is drawn."""
-        return stream(*self.seed, DRAWN.index(what))
+        drawn = ("who", "design", "error", "laws", "zones", "climate", "thermometers", "noise")
+        return stream(*self.seed, drawn.index(what))
 
 
 def assemble_truth(kind: Kind, design: Design, further_modes: int = 0) -> AffineModel:
@@ -269,13 +259,13 @@ def relative_error(name: str, of_stiffness: float) -> float:
     """Standard deviation of the logarithm of a quantity of the design in the user's model."""
     if name.startswith(("EI", "EA", "GJ", "k_")):
         return of_stiffness
-    return MASS_ERROR if name.startswith("mass") else 0.0
+    return 0.01 if name.startswith("mass") else 0.0
 
 
 def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.DatetimeIndex:
     """Times of the records."""
     days, samples_per_day = positive_integer(days, "days"), positive_integer(samples_per_day, "samples_per_day")
-    if HOURS_A_DAY % samples_per_day:
+    if 24 % samples_per_day:
         raise ValueError(f"samples_per_day is {samples_per_day}; expected a divisor of 24, such as 1, 4 or 24")
     try:
         first = pd.Timestamp(start)
@@ -283,14 +273,14 @@ def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.D
         raise ValueError(f"start is {start!r}; expected a time such as '2025-01-01' ({error})") from error
     if first is pd.NaT or first.tz is not None or first != first.floor("h"):
         raise ValueError(f"start is {start!r}; expected a full hour without time zone, such as '2025-01-01'")
-    step = pd.Timedelta(hours=HOURS_A_DAY // samples_per_day)
+    step = pd.Timedelta(hours=24 // samples_per_day)
     return pd.date_range(first, periods=days * samples_per_day, freq=step, name="time")
 
 
 def check_share(value: float, what: str) -> float:
     """A share of records."""
-    if not is_real(value) or not 0 <= value <= MOST:
-        raise ValueError(f"{what} is {value!r}; expected a share from 0 to {MOST}, such as 0.05 for 5 %")
+    if not is_real(value) or not 0 <= value <= 0.5:
+        raise ValueError(f"{what} is {value!r}; expected a share from 0 to 0.5, such as 0.05 for 5 %")
     return float(value)
 
 

@@ -13,22 +13,6 @@ from scipy.stats import norm
 from skthermo._core.arrays import Array
 from skthermo.datasets._kw51_campaign import memory
 
-COLDEST_DAY = 20.0
-WARMEST_HOUR = 15.0
-TILT = np.deg2rad(23.44)  # of the Earth's axis
-COLD_SCATTER = 0.25  # how much more the weather varies in winter than on average
-CLOUD_HOURS = 20.0
-REFERENCE = 10.0  # C, where the logarithm of the multiplier of a family's law is about 0
-ELSEWHERE = 14.0  # K, how far the knee of an atypical law is moved
-STYLES = ("T{i}", "TH-{i:02d}", "{role}_{i}", "temperature {i}")
-OFFSET, READING_NOISE = 0.7, (0.1, 0.4)  # C
-INERTIA = {"air": (0.0, 1.0), "deck": (3.0, 8.0)}  # hours
-SUN = {"air": (0.0, 1.5), "deck": (5.0, 10.0)}  # K
-LASTING, LASTING_HOURS = 0.4, 48.0  # share of the noise's variance that lasts, and how long it does
-GAP_HOURS = 18.0
-OUTAGES = 0.3  # share of the gaps in which nothing was measured
-ERROR = (0.03, 0.10)  # of an outlier
-
 
 def stream(*key: int) -> np.random.RandomState:
     """Random numbers that belong to a key of integers, independent of those of any other key."""
@@ -67,15 +51,15 @@ class SiteClimate:
         years = range(first.year - 1, last.year + 1)
         index = pd.date_range(f"{years[0]}-01-01", f"{years[-1] + 1}-01-01", freq="h", inclusive="left", name="time")
         drawn = drawn_by_hour(years, 2, key)
-        anomaly, cloud = persistent(drawn[:, 0], self.memory_hours), persistent(drawn[:, 1], CLOUD_HOURS)
+        anomaly, cloud = persistent(drawn[:, 0], self.memory_hours), persistent(drawn[:, 1], 20.0)
         day, hour = index.day_of_year.to_numpy() - 1 + index.hour.to_numpy() / 24, index.hour.to_numpy()
-        coldness = np.cos(2 * np.pi * (day - COLDEST_DAY) / 365.25)
+        coldness = np.cos(2 * np.pi * (day - 20.0) / 365.25)
         clear = norm.cdf(cloud)
         air = (
             self.mean
             - self.season * coldness
-            + self.scatter * (1 + COLD_SCATTER * coldness) * anomaly
-            + self.swing * (0.5 + clear) * (1 - 0.4 * coldness) * np.cos(2 * np.pi * (hour - WARMEST_HOUR) / 24)
+            + self.scatter * (1 + 0.25 * coldness) * anomaly
+            + self.swing * (0.5 + clear) * (1 - 0.4 * coldness) * np.cos(2 * np.pi * (hour - 15.0) / 24)
         )
         sun = clear * np.maximum(sine_of_elevation(self.latitude, day, hour), 0.0)
         return pd.DataFrame({"air": air, "sun": sun}, index=index)
@@ -90,7 +74,7 @@ def drawn_by_hour(years: Iterable[int], n_columns: int, key: tuple[int, ...]) ->
 
 def sine_of_elevation(latitude: float, day: Array, hour: Array) -> Array:
     """Sine of the sun's angle above the horizon, from latitude, day of the year and solar time."""
-    declination = -TILT * np.cos(2 * np.pi * (day + 10) / 365.25)
+    declination = -np.deg2rad(23.44) * np.cos(2 * np.pi * (day + 10) / 365.25)
     phi, angle = np.deg2rad(latitude), 2 * np.pi * (hour - 12) / 24
     return np.sin(phi) * np.sin(declination) + np.cos(phi) * np.cos(declination) * np.cos(angle)
 
@@ -104,7 +88,7 @@ def persistent(noise: Array, hours: float) -> Array:
 
 @dataclass(frozen=True)
 class Law:
-    """Law of a stiffness over its temperature: an exponential, and a rise that levels off in frost."""
+    """Law of a stiffness over its temperature: an exponential, about 1 at 10 C, and a rise that levels off in frost."""
 
     slope: float  # change above the knee, in 1/K
     gain: float = 0.0  # further rise for each kelvin below the knee, in 1/K
@@ -117,7 +101,7 @@ class Law:
     def log_multiplier(self, temperature: Array) -> Array:
         """Logarithm of the multiplier at temperatures in C."""
         below = self.width * np.logaddexp(0.0, (self.knee - temperature) / self.width)
-        return self.slope * (temperature - REFERENCE) + self.limit * np.tanh(self.gain * below / self.limit)
+        return self.slope * (temperature - 10.0) + self.limit * np.tanh(self.gain * below / self.limit)
 
     def temperature(self, weather: pd.DataFrame) -> Array:
         """Hourly temperature of the part in C, from hourly "air" and "sun"."""
@@ -137,22 +121,20 @@ LAWS = {
     "bearings": Law(slope=-3e-3, gain=1.2e-2, knee=-1.0, width=2.0, limit=0.15, hours=6.0),
     "soil": Law(slope=-0.5e-3, gain=2.5e-2, knee=0.0, width=1.0, limit=0.15, hours=96.0),
 }
-SCATTER = {"steel": 0.10, "concrete": 0.15, "composite": 0.15, "pavement": 0.25, "bearings": 0.30, "soil": 0.30}
-KNEE_SCATTER = 0.5  # K
-INERTIA_SCATTER = 0.2
+LAW_SCATTER = {"steel": 0.10, "concrete": 0.15, "composite": 0.15, "pavement": 0.25, "bearings": 0.30, "soil": 0.30}
 ATYPICAL_LAWS = ("reversed", "doubled", "knee elsewhere")
 
 
 def draw_law(material: str, atypical_law: str | None, random: np.random.RandomState) -> Law:
     """The law of one part of a bridge: its family's with its own coefficients."""
-    family, scatter = LAWS[material], SCATTER[material]
+    family, scatter = LAWS[material], LAW_SCATTER[material]
     law = replace(
         family,
         slope=family.slope * np.exp(scatter * random.standard_normal()),
         gain=family.gain * np.exp(scatter * random.standard_normal()),
-        knee=family.knee + KNEE_SCATTER * random.standard_normal(),
-        hours=family.hours * np.exp(INERTIA_SCATTER * random.standard_normal()),
-        sun=family.sun * np.exp(INERTIA_SCATTER * random.standard_normal()),
+        knee=family.knee + 0.5 * random.standard_normal(),
+        hours=family.hours * np.exp(0.2 * random.standard_normal()),
+        sun=family.sun * np.exp(0.2 * random.standard_normal()),
     )
     return law if atypical_law is None else estranged(law, atypical_law)
 
@@ -163,7 +145,7 @@ def estranged(law: Law, how: str) -> Law:
         return replace(law, slope=-law.slope, gain=-law.gain)
     if how == "doubled":
         return replace(law, slope=2 * law.slope, gain=2 * law.gain, limit=2 * law.limit)
-    return replace(law, slope=law.slope / 4, gain=law.gain + abs(law.slope), knee=law.knee + ELSEWHERE)
+    return replace(law, slope=law.slope / 4, gain=law.gain + abs(law.slope), knee=law.knee + 14.0)
 
 
 @dataclass(frozen=True)
@@ -184,16 +166,18 @@ class Thermometer:
 
 def draw_thermometers(random: np.random.RandomState) -> list[Thermometer]:
     """One to three thermometers in the air and as many in the deck, under the names that this owner gives them."""
-    style = STYLES[random.randint(len(STYLES))]
+    styles = ("T{i}", "TH-{i:02d}", "{role}_{i}", "temperature {i}")
+    inertias, suns = {"air": (0.0, 1.0), "deck": (3.0, 8.0)}, {"air": (0.0, 1.5), "deck": (5.0, 10.0)}
+    style = styles[random.randint(len(styles))]
     roles = ["air"] * random.randint(1, 4) + ["deck"] * random.randint(1, 4)
     return [
         Thermometer(
             name=style.format(i=i, role=role),
             role=role,
-            offset=random.normal(0, OFFSET),
-            noise=random.uniform(*READING_NOISE),
-            hours=random.uniform(*INERTIA[role]),
-            sun=random.uniform(*SUN[role]),
+            offset=random.normal(0, 0.7),
+            noise=random.uniform(0.1, 0.4),
+            hours=random.uniform(*inertias[role]),
+            sun=random.uniform(*suns[role]),
         )
         for i, role in enumerate(roles, start=1)
     ]
@@ -206,14 +190,14 @@ def measured(clean: Array, level: Array, gaps: float, outliers: float, rows: NDA
     """
     n_modes = clean.shape[1]
     white, lasting, missing, is_wrong, error = np.split(drawn[:, : 5 * n_modes], 5, axis=1)
-    lasting, missing = persistent(lasting, LASTING_HOURS)[rows], persistent(missing, GAP_HOURS)[rows]
-    outage = persistent(drawn[:, -1:], GAP_HOURS)[rows]
-    noise = np.sqrt(1 - LASTING) * white[rows] + np.sqrt(LASTING) * lasting
+    lasting, missing = persistent(lasting, 48.0)[rows], persistent(missing, 18.0)[rows]
+    outage, share_of_outages = persistent(drawn[:, -1:], 18.0)[rows], 0.3  # of the gaps
+    noise = np.sqrt(1 - 0.4) * white[rows] + np.sqrt(0.4) * lasting
     values = clean * (1 + level * noise)
-    size = ERROR[0] + (ERROR[1] - ERROR[0]) * np.abs(np.tanh(error[rows]))
+    size = 0.03 + (0.10 - 0.03) * np.abs(np.tanh(error[rows]))
     values = np.where(is_wrong[rows] < ndtri(outliers), values * (1 + np.sign(error[rows]) * size), values)
-    share = gaps * (1 - OUTAGES) / (1 - gaps * OUTAGES)  # of what is measured at all
-    is_missing = (missing < ndtri(share)) | (outage < ndtri(gaps * OUTAGES))
+    share = gaps * (1 - share_of_outages) / (1 - gaps * share_of_outages)  # of what is measured at all
+    is_missing = (missing < ndtri(share)) | (outage < ndtri(gaps * share_of_outages))
     return np.where(is_missing, np.nan, values)
 
 
@@ -235,7 +219,7 @@ def readings(
     ``drawn`` is hourly noise with two columns for each thermometer.
     """
     noise, missing = np.split(drawn, 2, axis=1)
-    is_missing = persistent(missing, GAP_HOURS)[rows] < ndtri(gaps)
+    is_missing = persistent(missing, 18.0)[rows] < ndtri(gaps)
     return {
         thermometer.name: np.where(
             is_missing[:, i], np.nan, means(thermometer.temperature(weather)) + thermometer.noise * noise[rows, i]

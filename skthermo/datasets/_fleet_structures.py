@@ -11,9 +11,7 @@ from skthermo.fem import Bar, Beam, Element, PointMass, Spring, Structure
 
 Design = dict[str, float]
 YOUNG = {"steel": 210e9, "composite": 210e9, "concrete": 35e9}
-POISSON_SHEAR = 0.4  # G / E
 SLENDER = 1e-6  # m2 or m4: of what a member does not carry
-PLANE = ("x", "y", "rz")  # fixed where a line of beams bends and twists but does not move sideways
 
 
 @dataclass(frozen=True)
@@ -111,9 +109,9 @@ def line_of_beams(
     line: Sequence[Hashable], part: str, design: Design, bending: float, torsion: float, mass: float, area: float = 1.0
 ) -> dict[Hashable, Beam]:
     """Beams from node to node, with the given E I, G J and mass by length."""
-    young = design["E"]
-    section = {"E": young, "G": POISSON_SHEAR * young, "A": area, "I_yy": bending / young, "I_zz": SLENDER}
-    section |= {"J": torsion / (POISSON_SHEAR * young), "density": mass / area}
+    young, shear = design["E"], 0.4 * design["E"]
+    section = {"E": young, "G": shear, "A": area, "I_yy": bending / young, "I_zz": SLENDER}
+    section |= {"J": torsion / shear, "density": mass / area}
     section["I_p"] = design.get("polar", 0.0) * area / mass if mass else 0.0
     return {(part, *ends): Beam(*ends, **section) for ends in pairwise(line)}
 
@@ -140,7 +138,7 @@ def girder(design: Design, fine: bool) -> Structure:
     return Structure(
         {x: (x, 0.0, 0.0) for x in line},
         members,
-        dict.fromkeys(line, PLANE),
+        dict.fromkeys(line, ("x", "y", "rz")),  # it bends and twists, but does not move sideways
         groups
         | {
             "deck": groups["girder"] + groups["pavement"],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -19,20 +18,7 @@ from skthermo.datasets._results import KW51Campaign
 from skthermo.datasets._truss import Stamp, stiffness_factors
 from skthermo.fem import AffineModel, Element, PointMass, ReducedModel, Spring, Structure, add_noise
 
-START = pd.Timestamp("2018-10-01")
-N_HOURS = 11328
-REFERENCE = 10.0  # C, near the mean before the retrofit
-MEAN, SEASON, COLDEST_DAY = 13.2, 7.75, 18.0  # C, C, day of the year
-ANOMALY, ANOMALY_SEASON, ANOMALY_HOURS, LIMIT = 3.5, 0.9, 30.0, 2.5
-SCATTER, SCALES, FIRST_WINTER = 4.2, (0.7, 1.3), slice(1236, 5424)  # C; from the first temperature to the retrofit
-SWING_WINTER, SWING_SUMMER, CLOUDED, CLOUD_HOURS = 1.0, 5.0, 0.4, 18.0
-WARMEST_HOUR = 16.0
-SUN_SWING, SUN_LEAD = 1.4, 2.0
-SLAB_HOURS = 24.0
-COLD_SPELL, COLD_SPELL_SCATTER, COLD_SPELL_HOURS = -2.9, 0.3, 60.0
-FROST_BELOW, FROST_HOURS = 1.5, 24.0
-MOISTURE_HOURS = 36.0
-TRUTH = {
+KW51_TRUTH = {
     "E_gir": "deck_beams",
     "E_pla": "plate",
     "E_arc": "arch",
@@ -45,7 +31,7 @@ TRUTH = {
     "M_b": ("mass", "ballast"),
 }
 """Parameters of the healthy bridge, as `Structure.assemble` binds them."""
-BOX: dict[str, float | tuple[float, float]] = {
+WEATHER_BOX: dict[str, float | tuple[float, float]] = {
     **dict.fromkeys(("E_gir", "E_pla", "E_arc", "E_br", "E_pip"), 0.02),
     "E_con": 0.035,
     "E_b": (0.9, 1.7),
@@ -54,31 +40,8 @@ BOX: dict[str, float | tuple[float, float]] = {
     "M_b": 0.015,
 }
 """What weather does to them stays within these bounds."""
-STEEL, CONNECTIONS, BALLAST, COMPOSITE, BEARINGS = 3.6e-4, 8e-4, 1.5e-3, 1.5e-3, 0.012  # softer by 1/K
-FROZEN_BALLAST, FROZEN_COMPOSITE, FROST_DEPTH = 0.5, 1.0, 2.0  # stiffer by (ratios), K
-MOISTURE = 0.0018  # standard deviation of the ballast's mass
-SLIDING, ROCKING = 1e7, 3e7  # N/m and N m/rad at each bearing
 STIFFENED = {"arch_connections": 0.906, "deck_connections": 0.430}
-ADDED = {"arch": 353.0, "deck": 837.0}  # kg at each joint of brace and connection
-PROGRESS = pd.DataFrame(
-    {"mass": [0.0, 0.0, 0.5, 0.5, 0.5, 1.0], "stiffness": [0.0, 0.0, 0.0, 0.5, 0.5, 1.0]},
-    index=pd.to_datetime(["2019-05-15", "2019-06-06", "2019-06-20", "2019-06-28", "2019-09-06", "2019-09-16"]),
-)
-TOLERANCE = 1e-4  # errors were found to be below 1e-5 at simulated states
-LASTING = 500  # hours
-NO_MASS = 1e-9  # multipliers are positive
-ROWS = 200  # whose shapes are in memory together
-NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
-COVERAGE = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965])
-WIND = np.array([0.55, 0.55, 0.0, 0.55, 0.0, 0.0])
-OUTAGE = 0.02
-BLOCK_HOURS = 4.0
-FIRST_TEMPERATURE = pd.Timestamp("2018-11-21 12:00")
-TEMPERATURE_GAPS = 0.0122
-DAMPING = np.array([0.009, 0.007, 0.008, 0.006, 0.005, 0.004])
-DAMPING_BY_KELVIN, DAMPING_SCATTER = 0.006, 0.25
-SHAPE_NOISE = 0.01
-YEAR = 8766.0  # hours
+ADDED_MASSES = {"arch": 353.0, "deck": 837.0}  # kg at each joint of brace and connection
 
 
 def draw_weather(n_hours: int, random: np.random.RandomState) -> pd.DataFrame:
@@ -87,29 +50,30 @@ def draw_weather(n_hours: int, random: np.random.RandomState) -> pd.DataFrame:
     "steel" is the temperature below the deck, "sun" that of the members above it, "slab" that of the plate and the
     ballast. A longer record begins with the same hours as a shorter one.
     """
-    index = pd.date_range(START, periods=max(n_hours, N_HOURS), freq="h", name="time")
+    index = pd.date_range("2018-10-01", periods=max(n_hours, 11328), freq="h", name="time")
     *streams, for_spell = map(np.random.RandomState, random.randint(2**31 - 1, size=4))
-    memories = (ANOMALY_HOURS, CLOUD_HOURS, MOISTURE_HOURS)
     anomaly, cloud, moisture = (
-        smooth_noise(len(index), 1, hours, stream)[:, 0] for hours, stream in zip(memories, streams, strict=True)
+        smooth_noise(len(index), 1, hours, stream)[:, 0]
+        for hours, stream in zip((30.0, 18.0, 36.0), streams, strict=True)
     )
     day = index.day_of_year.to_numpy() - 1 + index.hour.to_numpy() / 24
-    season = -np.cos(2 * np.pi * (day - COLDEST_DAY) / 365.25)
-    steady = MEAN + SEASON * season
-    anomaly = (ANOMALY + ANOMALY_SEASON * season) * LIMIT * np.tanh(anomaly / LIMIT)
-    steady += anomaly * scale_for_scatter(steady[FIRST_WINTER], anomaly[FIRST_WINTER])
-    clear = CLOUDED + 2 * (1 - CLOUDED) * norm.cdf(cloud)
-    swing = clear * (SWING_WINTER + (SWING_SUMMER - SWING_WINTER) * (1 + season) / 2)
+    season = -np.cos(2 * np.pi * (day - 18.0) / 365.25)
+    steady = 13.2 + 7.75 * season
+    anomaly = (3.5 + 0.9 * season) * 2.5 * np.tanh(anomaly / 2.5)  # at most 2.5 standard deviations
+    first_winter = slice(1236, 5424)  # from the first temperature to the retrofit
+    steady += anomaly * scale_for_scatter(steady[first_winter], anomaly[first_winter])
+    clear = 0.4 + 1.2 * norm.cdf(cloud)
+    swing = clear * (1.0 + 4.0 * (1 + season) / 2)  # from 1 C in winter to 5 C in summer
     hour = index.hour.to_numpy()
     steel = steady + swing * cycle(hour)
     spell = cold_spell(index, steel, for_spell)
     steel += spell
-    sun = steady + spell + SUN_SWING * swing * cycle(hour + SUN_LEAD)
+    sun = steady + spell + 1.4 * swing * cycle(hour + 2.0)
     weather = {
         "steel": steel,
         "sun": sun,
-        "slab": memory(steel, SLAB_HOURS),
-        "frost": memory(np.maximum(FROST_BELOW - steel, 0.0), FROST_HOURS),
+        "slab": memory(steel, 24.0),
+        "frost": memory(np.maximum(1.5 - steel, 0.0), 24.0),
         "moisture": moisture,
     }
     return pd.DataFrame(weather, index=index).iloc[:n_hours]
@@ -117,24 +81,24 @@ def draw_weather(n_hours: int, random: np.random.RandomState) -> pd.DataFrame:
 
 def cycle(hour: Array) -> Array:
     """Daily cycle of mean 0, which is higher in the afternoon (1.25) than low at night (-0.75)."""
-    angle = 2 * np.pi * (hour - WARMEST_HOUR) / 24
+    angle = 2 * np.pi * (hour - 16.0) / 24
     return np.cos(angle) + np.cos(2 * angle) / 4
 
 
-def scale_for_scatter(season: Array, anomaly: Array) -> float:
-    """What to multiply anomalies with so that season and anomalies together scatter by ``SCATTER``, within limits."""
+def scale_for_scatter(season: Array, anomaly: Array, scatter: float = 4.2) -> float:
+    """What to multiply anomalies with so that season and anomalies together scatter by 4.2 C, within limits."""
     (a, b), (_, c) = np.cov(season, anomaly)
-    scale = (np.sqrt(max(b**2 + c * (SCATTER**2 - a), 0.0)) - b) / c
-    return float(np.clip(scale, *SCALES))
+    scale = (np.sqrt(max(b**2 + c * (scatter**2 - a), 0.0)) - b) / c
+    return float(np.clip(scale, 0.7, 1.3))
 
 
 def cold_spell(index: pd.DatetimeIndex, steel: Array, random: np.random.RandomState) -> Array:
     """What brings the coldest hour of the first January to about -3 C, fading over days before and after it."""
-    january = np.flatnonzero((index.month == 1) & (index.year == START.year + 1))
+    january = np.flatnonzero((index.month == 1) & (index.year == index[0].year + 1))
     coldest = january[steel[january].argmin()]
-    wanted = COLD_SPELL + COLD_SPELL_SCATTER * random.standard_normal()
+    wanted = -2.9 + 0.3 * random.standard_normal()
     hours = np.arange(len(index)) - coldest
-    return (wanted - steel[coldest]) * np.exp(-((hours / COLD_SPELL_HOURS) ** 2))
+    return (wanted - steel[coldest]) * np.exp(-((hours / 60.0) ** 2))
 
 
 def smooth_noise(n_hours: int, n_columns: int, hours: float, random: np.random.RandomState) -> Array:
@@ -157,21 +121,22 @@ def memory(values: Array, hours: float) -> Array:
 
 
 def thermal_multipliers(weather: pd.DataFrame) -> pd.DataFrame:
-    """Multipliers of the parameters ``TRUTH`` in every hour."""
-    warm = weather[["steel", "sun", "slab"]] - REFERENCE
-    frozen = 1 - np.exp(-weather["frost"] / FROST_DEPTH)
+    """Multipliers of the parameters ``KW51_TRUTH`` in every hour."""
+    warm = weather[["steel", "sun", "slab"]] - 10.0  # near the mean before the retrofit
+    frozen = 1 - np.exp(-weather["frost"] / 2.0)
+    steel, connections, deck = 3.6e-4, 8e-4, 1.5e-3  # softer by 1/K
     return pd.DataFrame(
         {
-            "E_gir": 1 - STEEL * warm["steel"],
-            "E_pla": 1 - STEEL * warm["slab"],
-            "E_arc": 1 - STEEL * warm["sun"],
-            "E_br": 1 - STEEL * warm["sun"],
-            "E_con": 1 - CONNECTIONS * warm["sun"],
-            "E_pip": 1 - STEEL * warm["sun"],
-            "E_b": (1 - BALLAST * warm["slab"]) * (1 + FROZEN_BALLAST * frozen),
-            "I_33g": (1 - COMPOSITE * warm["slab"]) * (1 + FROZEN_COMPOSITE * frozen),
-            "K_bea": np.exp(-BEARINGS * warm["steel"]),
-            "M_b": 1 + MOISTURE * weather["moisture"],
+            "E_gir": 1 - steel * warm["steel"],
+            "E_pla": 1 - steel * warm["slab"],
+            "E_arc": 1 - steel * warm["sun"],
+            "E_br": 1 - steel * warm["sun"],
+            "E_con": 1 - connections * warm["sun"],
+            "E_pip": 1 - steel * warm["sun"],
+            "E_b": (1 - deck * warm["slab"]) * (1 + 0.5 * frozen),
+            "I_33g": (1 - deck * warm["slab"]) * (1 + 1.0 * frozen),
+            "K_bea": np.exp(-0.012 * warm["steel"]),
+            "M_b": 1 + 0.0018 * weather["moisture"],
         }
     )
 
@@ -181,11 +146,9 @@ def truth_structure(added: Mapping[Hashable, Element] | None = None) -> Structur
     bridge, added = kw51_structure(), added or {}
     ends, lines = (0, N_BAYS), (0, N_PANELS)
     bearings: dict[Hashable, Element] = {
-        ("bearing", end, "x"): Spring(("deck", end, N_PANELS), "x", SLIDING) for end in ends
+        ("bearing", end, "x"): Spring(("deck", end, N_PANELS), "x", 1e7) for end in ends
     }
-    bearings |= {
-        ("bearing", end, line, "ry"): Spring(("deck", end, line), "ry", ROCKING) for end in ends for line in lines
-    }
+    bearings |= {("bearing", end, line, "ry"): Spring(("deck", end, line), "ry", 3e7) for end in ends for line in lines}
     groups = bridge.groups
     groups["deck_beams"] = groups["girders"] | groups["transverse_beams"] | groups["stiffeners"]
     groups["bearings"] = frozenset(bearings)
@@ -197,36 +160,36 @@ def truth_structure(added: Mapping[Hashable, Element] | None = None) -> Structur
     )
 
 
-@lru_cache(maxsize=1)
 def truth_model() -> AffineModel:
-    """The healthy bridge, updated, with the parameters ``TRUTH``."""
-    return updated_model(truth_structure(), TRUTH, 6)
+    """The healthy bridge, updated, with the parameters ``KW51_TRUTH``."""
+    return updated_model(truth_structure(), KW51_TRUTH, 6)
 
 
 def joint_masses() -> dict[Hashable, PointMass]:
     """A point mass at every joint."""
     joints = [node for node in kw51_structure().nodes if node[0] == "joint"]
-    return {("mass", node): PointMass(node, ADDED[node[-1]]) for node in joints}
+    return {("mass", node): PointMass(node, ADDED_MASSES[node[-1]]) for node in joints}
 
 
 def retrofit_mass() -> Array:
     """The same, in kg at each degree of freedom."""
     return np.array(
-        [ADDED[node[-1]] if node[0] == "joint" and d in "xyz" else 0.0 for node, d in kw51_structure().dofs]
+        [ADDED_MASSES[node[-1]] if node[0] == "joint" and d in "xyz" else 0.0 for node, d in kw51_structure().dofs]
     )
 
 
 def progress_of(index: pd.DatetimeIndex, retrofit: bool) -> pd.DataFrame:
     """Shares of the retrofit's mass and stiffness that are there in each hour."""
     if not retrofit:
-        return pd.DataFrame(0.0, index, PROGRESS.columns)
-    knots = (PROGRESS.index - index[0]) / pd.Timedelta(hours=1)
-    hours = np.arange(len(index))
-    return pd.DataFrame({name: np.interp(hours, knots, shares) for name, shares in PROGRESS.items()}, index)
+        return pd.DataFrame(0.0, index, ["mass", "stiffness"])
+    days = ["2019-05-15", "2019-06-06", "2019-06-20", "2019-06-28", "2019-09-06", "2019-09-16"]
+    shares = {"mass": [0.0, 0.0, 0.5, 0.5, 0.5, 1.0], "stiffness": [0.0, 0.0, 0.0, 0.5, 0.5, 1.0]}
+    knots, hours = (pd.to_datetime(days) - index[0]) / pd.Timedelta(hours=1), np.arange(len(index))
+    return pd.DataFrame({name: np.interp(hours, knots, share) for name, share in shares.items()}, index)
 
 
 def simulate(
-    theta: pd.DataFrame, mass: pd.Series, factors: pd.DataFrame, dofs: NDArray[np.intp] | None
+    truth: AffineModel, theta: pd.DataFrame, mass: pd.Series, factors: pd.DataFrame, dofs: NDArray[np.intp] | None
 ) -> tuple[Array, Array | None]:
     """Frequencies (n, 6) in Hz and, at ``dofs``, mode shapes (n, 6, n_dofs).
 
@@ -237,7 +200,7 @@ def simulate(
     changes = np.column_stack([mass, factors])
     states, state, counts = np.unique(changes, axis=0, return_inverse=True, return_counts=True)
     state = state.ravel()
-    lasting = (counts >= LASTING) | (states == [0.0, *np.ones(factors.shape[1])]).all(axis=1)
+    lasting = (counts >= 500) | (states == [0.0, *np.ones(factors.shape[1])]).all(axis=1)
     frequencies = np.empty((len(theta), 6))
     shapes = None if dofs is None else np.empty((len(theta), 6, len(dofs)))
     for number in [*np.flatnonzero(lasting), -1]:
@@ -250,7 +213,7 @@ def simulate(
         else:
             share, *fixed = states[number]
             changed = zip(factors.columns, fixed, strict=True)
-            model = fixed_truth(float(share), tuple((group, factor) for group, factor in changed if factor != 1))
+            model = fixed_truth(truth, share, {group: factor for group, factor in changed if factor != 1})
         if shapes is None or dofs is None:
             frequencies[rows] = model.frequencies(values)
         else:
@@ -258,44 +221,46 @@ def simulate(
     return frequencies, shapes
 
 
-@lru_cache(maxsize=6)
-def fixed_truth(mass: float, factors: tuple[tuple[str, float], ...]) -> ReducedModel:
+def reduced_truth(model: AffineModel, further: Mapping[str, tuple[float, float]] | None = None) -> ReducedModel:
+    """The model for what weather does to the parameters, and for bounds of further ones, with errors below 1e-5."""
+    return model.reduced(WEATHER_BOX | (further or {}), tol=1e-4, random_state=0)
+
+
+def fixed_truth(truth: AffineModel, mass: float, factors: Mapping[str, float]) -> ReducedModel:
     """The bridge with a share of the retrofit's mass and with groups whose stiffness is multiplied."""
-    model = truth_model().damaged({group: 1 - factor for group, factor in factors})
-    if mass > 0:
-        model = model.with_added(mass=mass * retrofit_mass())
-    return model.reduced(BOX, tol=TOLERANCE, random_state=0)
+    model = truth.damaged({group: 1 - factor for group, factor in factors.items()})
+    return reduced_truth(model.with_added(mass=mass * retrofit_mass()) if mass > 0 else model)
 
 
-@lru_cache(maxsize=4)
-def varying_truth(has_mass: bool, bounds: tuple[tuple[str, float, float], ...]) -> ReducedModel:
+def varying_truth(has_mass: bool, bounds: Mapping[str, tuple[float, float]], least: float) -> ReducedModel:
     """The bridge with these as further parameters, within bounds."""
     structure = truth_structure(joint_masses() if has_mass else None)
-    parameters = TRUTH | ({"added": ("mass", "added")} if has_mass else {})
-    model = updated_model(structure, parameters, 6).with_damage_parameters([group for group, _, _ in bounds])
-    box = BOX | ({"added": (NO_MASS, 1.0)} if has_mass else {})
-    box |= {f"1 - {group}": (lowest, highest) for group, lowest, highest in bounds}
-    return model.reduced(box, tol=TOLERANCE, random_state=0)
+    parameters = KW51_TRUTH | ({"added": ("mass", "added")} if has_mass else {})
+    model = updated_model(structure, parameters, 6).with_damage_parameters(list(bounds))
+    further = {"added": (least, 1.0)} if has_mass else {}
+    return reduced_truth(model, further | {f"1 - {group}": ends for group, ends in bounds.items()})
 
 
 def _varying(theta: Array, changes: Array, groups: tuple[str, ...]) -> tuple[ReducedModel, Array]:
     """The model whose parameters are the changes, too, and its theta."""
-    mass, factors = np.maximum(changes[:, :1], NO_MASS), changes[:, 1:]
-    has_mass = bool((mass > NO_MASS).any())
+    least = 1e-9  # multipliers are positive
+    mass, factors = np.maximum(changes[:, :1], least), changes[:, 1:]
+    has_mass = bool((mass > least).any())
     lowest, highest = _floor(factors.min(axis=0)), -_floor(-factors.max(axis=0))
-    bounds = tuple(zip(groups, lowest.tolist(), highest.tolist(), strict=True))
-    return varying_truth(has_mass, bounds), np.hstack([theta, mass, factors] if has_mass else [theta, factors])
+    bounds = dict(zip(groups, zip(lowest.tolist(), highest.tolist(), strict=True), strict=True))
+    model = varying_truth(has_mass, bounds, least)
+    return model, np.hstack([theta, mass, factors] if has_mass else [theta, factors])
 
 
 def _floor(values: Array) -> Array:
-    """Rounded down to three digits, so that like campaigns share a reduced model."""
+    """Rounded down to three digits."""
     return np.floor(1000 * values - 1e-6) / 1000
 
 
 def _modes_at(model: ReducedModel, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array]:
     frequencies, shapes = np.empty((len(theta), 6)), np.empty((len(theta), 6, len(dofs)))
-    for start in range(0, len(theta), ROWS):
-        rows = slice(start, start + ROWS)
+    for start in range(0, len(theta), 200):  # rows whose shapes are in memory together
+        rows = slice(start, start + 200)
         frequencies[rows], everywhere = model.modes(theta[rows])
         shapes[rows] = everywhere[:, dofs].transpose(0, 2, 1)
     return frequencies, shapes
@@ -303,37 +268,40 @@ def _modes_at(model: ReducedModel, theta: Array, dofs: NDArray[np.intp]) -> tupl
 
 def missing_temperatures(index: pd.DatetimeIndex, random: np.random.RandomState) -> NDArray[np.bool_]:
     """Hours without temperature: until the sensor was installed, and a few blocks later."""
-    block = smooth_noise(len(index), 1, 2 * BLOCK_HOURS, random)[:, 0] < ndtri(TEMPERATURE_GAPS)
-    return block | (index < FIRST_TEMPERATURE)
+    block = smooth_noise(len(index), 1, 8.0, random)[:, 0] < ndtri(0.0122)
+    return block | (index < pd.Timestamp("2018-11-21 12:00"))
 
 
 def missing_modes(n_hours: int, random: np.random.RandomState) -> NDArray[np.bool_]:
     """Hours (n_hours, 6) in which a mode was not identified: in blocks, lateral modes of the arches together."""
-    wind, outage, *own = smooth_noise(n_hours, 2 + len(COVERAGE), BLOCK_HOURS, random).T
-    excitation = np.sqrt(WIND) * wind[:, np.newaxis] + np.sqrt(1 - WIND) * np.array(own).T
-    return (excitation < ndtri(1 - COVERAGE / (1 - OUTAGE))) | (outage < ndtri(OUTAGE))[:, np.newaxis]
+    coverage, by_wind = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965]), np.array([0.55, 0.55, 0.0, 0.55, 0.0, 0.0])
+    outages = 0.02  # share of the hours
+    wind, outage, *own = smooth_noise(n_hours, 2 + len(coverage), 4.0, random).T
+    excitation = np.sqrt(by_wind) * wind[:, np.newaxis] + np.sqrt(1 - by_wind) * np.array(own).T
+    return (excitation < ndtri(1 - coverage / (1 - outages))) | (outage < ndtri(outages))[:, np.newaxis]
 
 
 def draw_damping(steel: Array, random: np.random.RandomState) -> Array:
     """Damping ratios (n_hours, 6), lower when it is warm, with the scatter of an identification."""
-    mean = DAMPING * (1 - DAMPING_BY_KELVIN * (steel[:, np.newaxis] - REFERENCE))
-    scatter = DAMPING_SCATTER * random.standard_normal(mean.shape)
-    return mean * np.exp(scatter - DAMPING_SCATTER**2 / 2)
+    at_ten_degrees, deviation = np.array([0.009, 0.007, 0.008, 0.006, 0.005, 0.004]), 0.25
+    mean = at_ten_degrees * (1 - 0.006 * (steel[:, np.newaxis] - 10.0))
+    scatter = deviation * random.standard_normal(mean.shape)
+    return mean * np.exp(scatter - deviation**2 / 2)
 
 
 def measured_shapes(clean: Array, random: np.random.RandomState) -> NDArray[np.complex128]:
     """Shapes (n, 6, n_sensors) of unit length and random phase, with complex noise."""
     noise = random.standard_normal((2, *clean.shape)) / np.sqrt(2)
     phase = np.exp(2j * np.pi * random.uniform(size=(*clean.shape[:2], 1)))
-    level = SHAPE_NOISE * np.sqrt((clean**2).mean(axis=2, keepdims=True))
+    level = 0.01 * np.sqrt((clean**2).mean(axis=2, keepdims=True))
     noisy = (clean + level * (noise[0] + 1j * noise[1])) * phase
     return noisy / np.linalg.norm(noisy, axis=2, keepdims=True)
 
 
 def make_kw51_campaign(
     *,
-    n_hours: int = N_HOURS,
-    noise: ArrayLike = NOISE,
+    n_hours: int = 11328,
+    noise: ArrayLike = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015),
     correlation: float = 0.0,
     gaps: bool = True,
     retrofit: bool = True,
@@ -438,13 +406,13 @@ def make_kw51_campaign(
     seeds = as_random_state(random_state).randint(2**31 - 1, size=6)
     for_weather, for_noise, for_damping, for_sensor, for_gaps, for_shapes = map(np.random.RandomState, seeds)
 
-    sensors = kw51_sensors()
+    sensors, truth = kw51_sensors(), truth_model()
     weather = draw_weather(n_hours, for_weather)
     index, theta = weather.index, thermal_multipliers(weather)
     progress = progress_of(index, retrofit)
     strengthened = {group: share * progress["stiffness"] for group, share in STIFFENED.items()}
-    factors = stiffness_factors(index, YEAR, truth_model().groups, drift, damage, damage_from, strengthened)
-    clean, clean_shapes = simulate(theta, progress["mass"], factors, list(sensors.values()) if shapes else None)
+    factors = stiffness_factors(index, 8766.0, truth.groups, drift, damage, damage_from, strengthened)  # hours a year
+    clean, clean_shapes = simulate(truth, theta, progress["mass"], factors, list(sensors.values()) if shapes else None)
 
     frequencies = add_noise(clean, deviations, correlation=correlation, random_state=for_noise)
     damping = draw_damping(weather["steel"].to_numpy(), for_damping)
@@ -463,7 +431,7 @@ def make_kw51_campaign(
         state=state_of(index) if retrofit else pd.Series("before", index, name="state"),
         clean_frequencies=pd.DataFrame(clean, index, modes),
         theta=theta,
-        model=truth_model(),
+        model=truth,
         retrofit={"damage": {group: -share for group, share in STIFFENED.items()}, "mass": retrofit_mass()},
     )
     if clean_shapes is not None:

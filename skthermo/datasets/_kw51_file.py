@@ -14,22 +14,13 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, check_path
 from skthermo._core.matrix_files import read_matlab
-from skthermo._core.warnings import warn_user
+from skthermo._core.warnings import warn_each
 from skthermo.datasets._results import KW51Monitoring
-from skthermo.exceptions import RecordsWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 
-MOST_LABELS = 1000
-UNIX_EPOCH = 719529  # as a MATLAB date number
-DATES = (730486, 767011)  # 2000-01-01 and 2100-01-01
-FREQUENCIES, DAMPING_RATIOS, CELSIUS = (0.1, 100.0), (-1.0, 1.0), (-60.0, 80.0)  # what they may be
-STAND_FOR_MISSING = (-99, -999, -9999, -99999, 9999, 99999, 999999)
-
+CELSIUS = (-60.0, 80.0)  # what temperatures may be
 PUBLISHED_MD5 = "5cdb446519d1150228fab51b3a002239"
-MOST_MODES = 1000
-TEMPERATURES = ("tBD31A", "tVL")
-FIELDS = ["sdn", "f", "xi", "m", "labels_m", "env", "labels_env"]
-RETROFIT_BEGINS = pd.Timestamp("2019-05-15 00:00")
-AFTER_RETROFIT = pd.Timestamp("2019-09-27 01:00")
+NO_VALUES = (-99, -999, -9999, -99999, 9999, 99999, 999999)  # codes for missing values
 
 
 def load_kw51(path: str | PathLike) -> KW51Monitoring:
@@ -101,55 +92,57 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
     file = check_path(path)
     if not file.is_file():
         raise FileNotFoundError(f"{file} is not a file; expected trackedmodes.zip or trackedmodes.mat")
-    data = _data(read_matlab(file), file)
+    data, findings = _data(read_matlab(file), file)
     stored = file.read_bytes()
-    if stored[126:128] in (b"IM", b"MI"):
-        return KW51Monitoring(**data, is_published=None)
-    md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
-    if md5 != PUBLISHED_MD5:
-        warn_user(
+    is_published = None  # of the unpacked file there is no checksum
+    if stored[126:128] not in (b"IM", b"MI"):
+        md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
+        is_published = md5 == PUBLISHED_MD5
+    if is_published is False:
+        text = (
             f"{file} has the MD5 checksum {md5}, the published trackedmodes.zip has {PUBLISHED_MD5}. Its content may "
-            "differ from what was published. Download it again, unless you changed it",
-            RecordsWarning,
-            "other-kw51-file",
+            "differ from what was published. Download it again, unless you changed it"
         )
-    return KW51Monitoring(**data, is_published=md5 == PUBLISHED_MD5)
+        findings.append(RecordsWarning(text, "other-kw51-file"))
+    warn_each(findings)
+    return KW51Monitoring(**data, is_published=is_published)
 
 
-def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
-    """Tables and shapes from the struct `modes`, whose fields must agree."""
-    modes = content.get("modes")
+def _data(content: dict[str, object], file: Path) -> tuple[dict[str, Any], list[SkthermoWarning]]:
+    """Tables and shapes from the struct `modes`, whose fields must agree, and findings about its numbers."""
+    modes, fields = content.get("modes"), ["sdn", "f", "xi", "m", "labels_m", "env", "labels_env"]
     if not isinstance(modes, dict):
         found = "'modes' is no single struct" if "modes" in content else f"the variables are {sorted(content)[:50]}"
-        raise ValueError(f"{file}: {found}; expected a struct 'modes' with the fields {FIELDS}")
-    missing = [name for name in FIELDS if name not in modes]
+        raise ValueError(f"{file}: {found}; expected a struct 'modes' with the fields {fields}")
+    missing = [name for name in fields if name not in modes]
     if missing:
         raise ValueError(f"{file}: no field {missing} in 'modes'; found {sorted(modes)[:50]}")
     sdn, f, xi, env = (_numbers_of(modes[name], f"{file}: field {name!r}") for name in ("sdn", "f", "xi", "env"))
     m = _numbers_of(modes["m"], f"{file}: field 'm'", complex_too=True)
     sensors, channels = (_labels_of(modes[name], f"{file}: field {name!r}") for name in ("labels_m", "labels_env"))
-    if f.ndim != 2 or not f.size or f.shape[1] > MOST_MODES:
-        raise ValueError(f"{file}: field 'f' has shape {f.shape}; expected records times at most {MOST_MODES} modes")
+    if f.ndim != 2 or not f.size or f.shape[1] > 1000:
+        raise ValueError(f"{file}: field 'f' has shape {f.shape}; expected records times at most 1000 modes")
     n_records, n_modes = f.shape
     _check_shape(sdn.T if len(sdn) == 1 else sdn, (n_records, 1), f"{file}: field 'sdn'")
     _check_shape(xi, f.shape, f"{file}: field 'xi'")
     _check_shape(env, (n_records, len(channels)), f"{file}: field 'env'")
     _check_shape(m, (n_records, n_modes, len(sensors)), f"{file}: field 'm'")
     f_names, xi_names = ([f"{name}{number}" for number in range(1, n_modes + 1)] for name in ("f", "xi"))
-    _check_possible(f, f_names, [FREQUENCIES] * n_modes, f"{file}: field 'f'")
-    _check_possible(xi, xi_names, [DAMPING_RATIOS] * n_modes, f"{file}: field 'xi'")
-    doubtful = np.isin(env, STAND_FOR_MISSING) & ~np.isin(channels, TEMPERATURES)
-    limits = [CELSIUS if channel in TEMPERATURES else None for channel in channels]
+    _check_possible(f, f_names, [(0.1, 100.0)] * n_modes, f"{file}: field 'f'")
+    _check_possible(xi, xi_names, [(-1.0, 1.0)] * n_modes, f"{file}: field 'xi'")
+    thermometers = ("tBD31A", "tVL")
+    doubtful = np.isin(env, NO_VALUES) & ~np.isin(channels, thermometers)
+    limits = [CELSIUS if channel in thermometers else None for channel in channels]
     _check_possible(np.where(doubtful, np.nan, env), channels, limits, f"{file}: field 'env'")
+    findings: list[SkthermoWarning] = []
     if doubtful.any():
         row, column = np.argwhere(doubtful)[0]
-        warn_user(
+        text = (
             f"{file}: field 'env' has {doubtful.sum()} values that look like codes for missing values, the first in "
             f"row {row}, column {channels[column]!r}: {env[row, column]:g}. They are used as measured. Compare the "
-            "file with the published one, or put NaN there",
-            RecordsWarning,
-            "placeholders",
+            "file with the published one, or put NaN there"
         )
+        findings.append(RecordsWarning(text, "placeholders"))
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):
         for part in (shapes.real, shapes.imag):
@@ -157,7 +150,7 @@ def _data(content: dict[str, object], file: Path) -> dict[str, Any]:
     time = _time_of(sdn.ravel(), f"{file}: field 'sdn'")
     tables = {"temperatures": (env, channels), "frequencies": (f, f_names), "damping": (xi, xi_names)}
     frames = {name: pd.DataFrame(values, index=time, columns=columns) for name, (values, columns) in tables.items()}
-    return frames | {"shapes": shapes, "sensors": sensors, "state": state_of(time)}
+    return frames | {"shapes": shapes, "sensors": sensors, "state": state_of(time)}, findings
 
 
 def _numbers_of(value: object, what: str, *, complex_too: bool = False) -> NDArray:
@@ -172,9 +165,9 @@ def _labels_of(value: object, what: str) -> list[str]:
     """Texts of a cell array, nested or not, or of the rows of a matrix of characters."""
     labels = [text.strip() for text in _texts(value, what)]
     are_names = all(label and label.isprintable() for label in labels)
-    if not are_names or len(set(labels)) != len(labels) or not 0 < len(labels) <= MOST_LABELS:
+    if not are_names or len(set(labels)) != len(labels) or not 0 < len(labels) <= 1000:
         found = [label[:50] for label in labels[:50]]
-        raise ValueError(f"{what} has {len(labels)} names, {found}; expected 1 to {MOST_LABELS} that differ")
+        raise ValueError(f"{what} has {len(labels)} names, {found}; expected 1 to 1000 that differ")
     return labels
 
 
@@ -199,7 +192,7 @@ def _check_shape(values: NDArray, shape: tuple[int, ...], what: str) -> None:
 
 def _check_possible(values: Array, columns: list[str], limits: list[tuple[float, float] | None], what: str) -> None:
     """Raise an error for the first value that cannot be measured, such as -999; a column may have limits."""
-    wrong = np.isinf(values) | np.isin(values, STAND_FOR_MISSING)
+    wrong = np.isinf(values) | np.isin(values, NO_VALUES)
     for column, limit in enumerate(limits):
         if limit:
             wrong[:, column] |= (values[:, column] < limit[0]) | (values[:, column] > limit[1])
@@ -214,14 +207,14 @@ def _check_possible(values: Array, columns: list[str], limits: list[tuple[float,
 
 def _time_of(numbers: Array, what: str) -> pd.DatetimeIndex:
     """MATLAB date numbers as time stamps to the second; each may stand there once."""
-    wrong = ~((numbers >= DATES[0]) & (numbers < DATES[1]))
+    wrong = ~((numbers >= 730486) & (numbers < 767011))
     if wrong.any():
         row = np.flatnonzero(wrong)[0]
         raise ValueError(
-            f"{what}, row {row} is {numbers[row]}; expected a MATLAB date number from {DATES[0]} (year 2000) to "
-            f"{DATES[1]} (2100)"
+            f"{what}, row {row} is {numbers[row]}; expected a MATLAB date number from 730486 (year 2000) to "
+            "767011 (2100)"
         )
-    seconds = np.rint((numbers - UNIX_EPOCH) * 86400).astype("datetime64[s]")
+    seconds = np.rint((numbers - 719529) * 86400).astype("datetime64[s]")
     time = pd.DatetimeIndex(seconds.astype("datetime64[ns]"), name="time")
     if time.has_duplicates:
         row = np.flatnonzero(time.duplicated())[0]
@@ -231,5 +224,6 @@ def _time_of(numbers: Array, what: str) -> pd.DatetimeIndex:
 
 def state_of(time: pd.DatetimeIndex) -> pd.Series:
     """ "before", "during" or "after" the retrofit."""
-    state = np.select([time < RETROFIT_BEGINS, time < AFTER_RETROFIT], ["before", "during"], "after")
+    begins, ended = pd.Timestamp("2019-05-15 00:00"), pd.Timestamp("2019-09-27 01:00")
+    state = np.select([time < begins, time < ended], ["before", "during"], "after")
     return pd.Series(state.tolist(), index=time, name="state")

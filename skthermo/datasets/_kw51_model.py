@@ -71,39 +71,10 @@ def times(number: float, section: Section) -> Section:
 
 Node = tuple[object, ...]
 
-# Stated by Appendix A and Table A.1 of the paper.
-SPAN, WIDTH = 115.0, 12.4
-STEEL_E, BALLAST_E = 210e9, 550e6
-PLATE_T, BALLAST_T = 0.015, 0.6
-ARCH = box(1.3, 0.86, 0.05)
-BRACE = box(0.35, 0.35, 0.016)
-CONNECTION = rectangle(0.31, 0.045)
-T_BEAM = tee(1.235, 0.6, 0.08)
-STIFFENER = channel(0.25, 0.25, 0.008)
-PIPE = pipe(0.75, 0.04)
-
-# Assumed, in the order of the table in make_kw51.
-N_BAYS = 32
-RISE = 18.0
-FEET, REACH = range(2, N_BAYS, 4), 2
-CONNECTION_LENGTH = 1.6
-PIPES = (0.25, 0.385, 0.615, 0.75)
-N_PANELS = 4
-END_STIFFNESS = 1.4
-STIFFENER_SPACING = 0.5
-NU = 0.3
-STEEL_DENSITY, BALLAST_DENSITY = 7850.0, 1500.0
-SUPPORTS = {(0, 0): "xyz", (0, N_PANELS): "yz", (N_BAYS, 0): "xyz", (N_BAYS, N_PANELS): "yz"}
-
-STEEL = {"E": STEEL_E, "G": STEEL_E / (2 + 2 * NU), "density": STEEL_DENSITY, "I_p": 0.0, "lumped": True}
-STATIONS, LINES, SIDES = range(N_BAYS + 1), range(N_PANELS + 1), (0, N_PANELS)
-ARCH_STATIONS = sorted({*STATIONS, *(N_BAYS * x for x in PIPES)})
-
-SIDE_LINES = {"A": 0, "C": N_PANELS}
-DECK_SENSORS = ("aBD11Az", "aBD17Ay", "aBD17Az", "aBD17Cz", "aBD23Ay", "aBD23Az")
-ARCH_SENSORS = {"aAR0910": 10, "aAR1516": 16, "aAR2122": 22}  # stations of the arch
-THERMAL = ("E_bot", "E_arc", "E_br", "E_con", "E_pip")
-PARAMETERS = {
+N_BAYS, N_PANELS = 32, 4  # of the mesh along and across the deck
+PIPE_PLACES = (0.25, 0.385, 0.615, 0.75)  # shares of the span
+KW51_STEEL = {"E": 210e9, "G": 210e9 / 2.6, "density": 7850.0, "I_p": 0.0, "lumped": True}
+KW51_PARAMETERS = {
     "E_bot": "bottom",
     "E_arc": "arch",
     "E_br": "braces",
@@ -126,7 +97,7 @@ PARAMETERS = {
     "A_tb": ("A", "transverse_beams", "stiffness"),
     "I_22s": ("I_zz", "stiffeners"),
 }
-UPDATED = {
+KW51_UPDATED = {
     "E_bot": 1.3,
     "E_arc": 0.9,
     "E_br": 0.9,
@@ -163,27 +134,32 @@ def kw51_structure() -> Structure:
     >>> len(structure.dofs), len(structure.groups["braces"])
     (1760, 32)
     """
-    hangers = [hanger(foot, head, line) for line in SIDES for foot in FEET for head in heads(foot)]
+    sides = (0, N_PANELS)
+    stations = sorted({*range(N_BAYS + 1), *(N_BAYS * x for x in PIPE_PLACES)})  # of an arch
+    feet = range(2, N_BAYS, 4)
+    hangers = [hanger(foot, head, line) for line in sides for foot in feet for head in heads(foot)]
+    connection = rectangle(0.31, 0.045)
     parts = {
-        "girders": beams("girder", (along_deck(line) for line in SIDES), T_BEAM),
+        "girders": beams("girder", (along_deck(line) for line in sides), t_beam()),
         "transverse_beams": transverse_beams(),
         "stiffeners": stiffeners(),
-        "plate": membranes("plate", E=STEEL_E, t=PLATE_T, density=STEEL_DENSITY),
-        "ballast": membranes("ballast", E=BALLAST_E, t=BALLAST_T, density=BALLAST_DENSITY),
-        "arch": beams("arch", ([on_arch(s, line) for s in ARCH_STATIONS] for line in SIDES), ARCH),
-        "deck_connections": beams("deck connection", (nodes[:2] for nodes in hangers), CONNECTION),
-        "braces": beams("brace", (nodes[1:3] for nodes in hangers), BRACE),
-        "arch_connections": beams("arch connection", (nodes[2:] for nodes in hangers), CONNECTION),
-        "pipes": beams("pipe", ([on_arch(N_BAYS * x, line) for line in SIDES] for x in PIPES), PIPE),
+        "plate": membranes("plate", E=210e9, t=0.015, density=7850.0),
+        "ballast": membranes("ballast", E=550e6, t=0.6, density=1500.0),
+        "arch": beams("arch", ([on_arch(s, line) for s in stations] for line in sides), box(1.3, 0.86, 0.05)),
+        "deck_connections": beams("deck connection", (nodes[:2] for nodes in hangers), connection),
+        "braces": beams("brace", (nodes[1:3] for nodes in hangers), box(0.35, 0.35, 0.016)),
+        "arch_connections": beams("arch connection", (nodes[2:] for nodes in hangers), connection),
+        "pipes": beams("pipe", ([on_arch(N_BAYS * x, line) for line in sides] for x in PIPE_PLACES), pipe(0.75, 0.04)),
     }
     groups = {part: list(members) for part, members in parts.items()}
     groups["bottom"] = [m for part in ("girders", "transverse_beams", "stiffeners", "plate") for m in groups[part]]
     groups["connections"] = groups["deck_connections"] + groups["arch_connections"]
     members = {name: element for part in parts.values() for name, element in part.items()}
+    supports = {(0, 0): "xyz", (0, N_PANELS): "yz", (N_BAYS, 0): "xyz", (N_BAYS, N_PANELS): "yz"}
     return Structure(
         nodes={node: place(node) for element in members.values() for node in element.nodes},
         members=members,
-        supports={("deck", *corner): fixed for corner, fixed in SUPPORTS.items()},
+        supports={("deck", *corner): fixed for corner, fixed in supports.items()},
         groups=groups,
     )
 
@@ -195,10 +171,10 @@ def place(node: Node) -> np.ndarray:
         start, other = place(("deck", foot, line)), place(on_arch(head, line))
         if end == "arch":
             start, other = other, start
-        return start + CONNECTION_LENGTH * (other - start) / np.linalg.norm(other - start)
+        return start + 1.6 * (other - start) / np.linalg.norm(other - start)
     part, station, line = node
     x = station / N_BAYS
-    return np.array([SPAN * x, WIDTH * (line / N_PANELS - 0.5), 4 * RISE * x * (1 - x) if part == "arch" else 0.0])
+    return np.array([115.0 * x, 12.4 * (line / N_PANELS - 0.5), 4 * 18.0 * x * (1 - x) if part == "arch" else 0.0])
 
 
 def on_arch(station: float, line: int) -> Node:
@@ -208,12 +184,12 @@ def on_arch(station: float, line: int) -> Node:
 
 def along_deck(line: int) -> list[Node]:
     """Nodes of one line of the deck."""
-    return [("deck", station, line) for station in STATIONS]
+    return [("deck", station, line) for station in range(N_BAYS + 1)]
 
 
 def heads(foot: int) -> tuple[int, int]:
     """Stations of the arch that a V-pair of braces reaches, at least one bay away from the supports."""
-    return max(foot - REACH, 1), min(foot + REACH, N_BAYS - 1)
+    return max(foot - 2, 1), min(foot + 2, N_BAYS - 1)
 
 
 def hanger(foot: int, head: int, line: int) -> list[Node]:
@@ -224,7 +200,7 @@ def hanger(foot: int, head: int, line: int) -> list[Node]:
 
 def beams(part: str, chains: Iterable[Sequence[Node]], section: Section, stiffness: float = 1.0) -> dict[Node, Beam]:
     """Steel beams along chains of nodes; ``stiffness`` multiplies the modulus."""
-    material = STEEL | {modulus: stiffness * STEEL[modulus] for modulus in ("E", "G")}
+    material = KW51_STEEL | {modulus: stiffness * KW51_STEEL[modulus] for modulus in ("E", "G")}
     return {
         (part, start, end): Beam(start, end, **material, **section)
         for chain in chains
@@ -234,18 +210,22 @@ def beams(part: str, chains: Iterable[Sequence[Node]], section: Section, stiffne
 
 def transverse_beams() -> dict[Node, Beam]:
     """Across the deck at every station; those at the ends are stiffer."""
-    lines = [[("deck", station, line) for line in LINES] for station in STATIONS]
+    lines = [[("deck", station, line) for line in range(N_PANELS + 1)] for station in range(N_BAYS + 1)]
     first, *inner, last = lines
-    ends = beams("transverse beam", [first, last], T_BEAM, END_STIFFNESS)
-    return beams("transverse beam", inner, T_BEAM) | ends
+    return beams("transverse beam", inner, t_beam()) | beams("transverse beam", [first, last], t_beam(), 1.4)
+
+
+def t_beam() -> Section:
+    """Of girders and transverse beams."""
+    return tee(1.235, 0.6, 0.08)
 
 
 def stiffeners() -> dict[Node, Beam]:
     """All stiffeners, lumped at the lines of the mesh in proportion to the tributary width of each."""
     gathered = {}
-    for line in LINES:
-        width = WIDTH / N_PANELS / (2 if line in SIDES else 1)
-        gathered |= beams("stiffener", [along_deck(line)], times(width / STIFFENER_SPACING, STIFFENER))
+    for line in range(N_PANELS + 1):
+        width = 12.4 / N_PANELS / (2 if line in (0, N_PANELS) else 1)
+        gathered |= beams("stiffener", [along_deck(line)], times(width / 0.5, channel(0.25, 0.25, 0.008)))
     return gathered
 
 
@@ -255,11 +235,11 @@ def membranes(part: str, **properties: float) -> dict[Node, Membrane]:
         (part, s, n): Membrane(
             (("deck", s, n), ("deck", s + 1, n), ("deck", s + 1, n + 1), ("deck", s, n + 1)),
             **properties,
-            nu=NU,
+            nu=0.3,
             lumped=True,
         )
-        for s in STATIONS[:-1]
-        for n in LINES[:-1]
+        for s in range(N_BAYS)
+        for n in range(N_PANELS)
     }
 
 
@@ -321,24 +301,24 @@ def make_kw51(
            [0.459, 1.07 ]])
     """
     if parameters is None:
-        names = THERMAL
+        names = ("E_bot", "E_arc", "E_br", "E_con", "E_pip")
     elif isinstance(parameters, str):
-        names = tuple(PARAMETERS) if parameters == "all" else (parameters,)
+        names = tuple(KW51_PARAMETERS) if parameters == "all" else (parameters,)
     else:
         names = tuple(parameters) if isinstance(parameters, Collection) else ()
-    if not names or len(set(names)) < len(names) or not set(names) <= set(PARAMETERS):
-        raise ValueError(f"parameters is {parameters!r}; expected 'all' or some, each once, of {list(PARAMETERS)}")
+    if not names or len(set(names)) < len(names) or not set(names) <= set(KW51_PARAMETERS):
+        raise ValueError(f"parameters is {parameters!r}; expected 'all' or some, each once, of {list(KW51_PARAMETERS)}")
     n_modes = positive_integer(n_modes, "n_modes")
     if not check_flag(updated, "updated"):
-        return kw51_structure().assemble({name: PARAMETERS[name] for name in names}, n_modes=n_modes, track=True)
-    return updated_model(kw51_structure(), {name: PARAMETERS[name] for name in names}, n_modes)
+        return kw51_structure().assemble({name: KW51_PARAMETERS[name] for name in names}, n_modes=n_modes, track=True)
+    return updated_model(kw51_structure(), {name: KW51_PARAMETERS[name] for name in names}, n_modes)
 
 
 def updated_model(structure: Structure, parameters: Mapping[str, Any], n_modes: int) -> AffineModel:
     """The model of a structure that has KW51's members, as updated, with parameters bound as `Structure.assemble`."""
-    bound = parameters | {name: PARAMETERS[name] for name in UPDATED}
+    bound = parameters | {name: KW51_PARAMETERS[name] for name in KW51_UPDATED}
     model = structure.assemble(bound, n_modes=n_modes, track=True)
-    theta = [UPDATED.get(name, 1.0) for name in model.parameter_names]
+    theta = [KW51_UPDATED.get(name, 1.0) for name in model.parameter_names]
     return model.rescaled(theta).with_parameters(list(parameters))
 
 
@@ -367,8 +347,10 @@ def kw51_sensors() -> dict[str, int]:
     >>> kw51_structure().dofs[kw51_sensors()["aBD17Az"]]
     (('deck', 16, 0), 'z')
     """
-    places = {label: (("deck", int(label[3:5]) - 1, SIDE_LINES[label[5]]), label[6]) for label in DECK_SENSORS}
-    for pair, station in ARCH_SENSORS.items():
-        places |= {f"{pair}{side}y": (("arch", station, line), "y") for side, line in SIDE_LINES.items()}
+    lines = {"A": 0, "C": N_PANELS}
+    on_deck = ("aBD11Az", "aBD17Ay", "aBD17Az", "aBD17Cz", "aBD23Ay", "aBD23Az")
+    places = {label: (("deck", int(label[3:5]) - 1, lines[label[5]]), label[6]) for label in on_deck}
+    for pair, station in {"aAR0910": 10, "aAR1516": 16, "aAR2122": 22}.items():
+        places |= {f"{pair}{side}y": (("arch", station, line), "y") for side, line in lines.items()}
     dofs = {dof: i for i, dof in enumerate(kw51_structure().dofs)}
     return {label: dofs[place] for label, place in places.items()}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping
 from datetime import datetime
-from functools import lru_cache
 from importlib.resources import files
 
 import numpy as np
@@ -16,13 +15,8 @@ from skthermo._core.arrays import as_random_state, is_real, positive_integer, re
 from skthermo.datasets._results import TrussCampaign
 from skthermo.fem import AffineModel, Bar, Structure, add_noise
 
-PARAMETERS = ("bottom", "top", "diagonal", "vertical")
-ZONES = ("T1", "T2", "T3")
-SEASON = np.array([[15, 15], [15, 20], [17, 25]])  # mean and amplitude in C, eqs. (11)-(13)
-DAILY = np.array([20, 16, 20])
-SCATTER = np.array([3, 2, 8])
-PHASE = np.array([0, 0, np.pi / 6])
-KELVIN = 150.0  # no structure gets this hot in degrees Celsius
+TRUSS_GROUPS = ("bottom", "top", "diagonal", "vertical")
+TRUSS_ZONES = ("T1", "T2", "T3")
 Stamp = str | datetime | None
 
 
@@ -57,7 +51,7 @@ def make_truss(n_modes: int = 6) -> AffineModel:
     array([[ 7.485, 27.5  , 37.842, 62.614, 67.17 , 95.412]])
     """
     n_modes = positive_integer(n_modes, "n_modes")
-    return truss_structure().assemble(PARAMETERS, groups=PARAMETERS, n_modes=n_modes)
+    return truss_structure().assemble(TRUSS_GROUPS, groups=TRUSS_GROUPS, n_modes=n_modes)
 
 
 def truss_structure() -> Structure:
@@ -86,10 +80,9 @@ def truss_structure() -> Structure:
     )
 
 
-@lru_cache(maxsize=1)
-def truth_model() -> AffineModel:
-    """The truss whose parameters are Young's moduli in the thermal zones; models are never changed."""
-    return truss_structure().assemble(ZONES, groups=PARAMETERS)
+def truss_of_zones() -> AffineModel:
+    """The truss whose parameters are Young's moduli in the thermal zones."""
+    return truss_structure().assemble(TRUSS_ZONES, groups=TRUSS_GROUPS)
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
@@ -121,7 +114,7 @@ def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
     celsius = real_array(temperature, "temperature")
     if np.isinf(celsius).any():
         raise ValueError("temperature holds infinite values; expected degrees Celsius, or NaN")
-    if celsius.size and (celsius > KELVIN).all():
+    if celsius.size and (celsius > 150.0).all():
         raise ValueError(f"temperature is {celsius.min():g} or more, kelvin? expected degrees Celsius")
     return 1 - (celsius - 20) / 200 * np.exp(-0.01 * celsius)
 
@@ -210,20 +203,22 @@ def make_truss_campaign(
         "2025-01-01", periods=n_years * samples_per_year, freq=pd.Timedelta(days=1) / samples_per_day, name="time"
     )
     record = np.arange(1, len(index) + 1)[:, np.newaxis]
+    mean, season, day = np.array([15, 15, 17]), np.array([15, 20, 25]), np.array([20, 16, 20])  # eqs. (11)-(13), in C
+    scatter, phase = np.array([3, 2, 8]), np.array([0, 0, np.pi / 6])
     temperatures = pd.DataFrame(
-        SEASON[:, 0]
-        + SEASON[:, 1] * np.sin(2 * np.pi * record / samples_per_year + PHASE)
-        + DAILY * np.sin(2 * np.pi * record / samples_per_day + PHASE)
-        + SCATTER * random.standard_normal((len(index), len(ZONES))),
+        mean
+        + season * np.sin(2 * np.pi * record / samples_per_year + phase)
+        + day * np.sin(2 * np.pi * record / samples_per_day + phase)
+        + scatter * random.standard_normal((len(index), 3)),
         index=index,
-        columns=ZONES,
+        columns=TRUSS_ZONES,
     )
-    model = truth_model()
+    model = truss_of_zones()
     theta = steel_modulus(temperatures)
     if drift is None and damage_from is None:
         clean = model.damaged({} if damage is None else damage).frequencies(theta)
     else:
-        factors = stiffness_factors(index, samples_per_year, PARAMETERS, drift, damage, damage_from)
+        factors = stiffness_factors(index, samples_per_year, TRUSS_GROUPS, drift, damage, damage_from)
         clean = model.with_damage_parameters(list(factors)).frequencies(np.hstack([theta, factors]))
     noisy = add_noise(clean, noise, correlation=correlation, random_state=random)
     modes = [f"f{i + 1}" for i in range(model.n_modes)]
@@ -231,7 +226,7 @@ def make_truss_campaign(
         temperatures=temperatures,
         frequencies=pd.DataFrame(noisy, index=index, columns=modes),
         clean_frequencies=pd.DataFrame(clean, index=index, columns=modes),
-        theta=pd.DataFrame(theta, index=index, columns=ZONES),
+        theta=pd.DataFrame(theta, index=index, columns=TRUSS_ZONES),
         model=model,
     )
 

@@ -18,30 +18,21 @@ from skthermo._core.matrix_files import read_matlab
 from skthermo.datasets._results import Z24Monitoring
 from skthermo.fem import AffineModel, Beam, Spring, Structure
 
-EPOCH = pd.Timestamp("1997-11-11")
-MODES = ["f1", "f2", "f3", "f4"]
-SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
-STATES = ("undamaged", "damaged")
-UNKNOWN = "unknown"
-LARGEST_TABLE = 12_800_000  # bytes of text, which take 20 times as much memory; the published one has 0.3 million
-POSSIBLE = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
+Z24_MODES = ["f1", "f2", "f3", "f4"]
+Z24_SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
 Place = tuple[float, float, float]
-SPANS = (14.0, 30.0, 14.0)
-PIER_HEIGHT = 5.5
-CONCRETE = {"E": 37.5e9, "G": 16e9}
-CONSTANTS: dict[str, dict[str, float]] = {
-    "girder": {**CONCRETE, "density": 2700.0, "A": 4.4, "I_yy": 0.609, "I_zz": 17.0, "J": 1.27},
-    "pier": {**CONCRETE, "density": 2500.0, "A": 2.4, "I_yy": 0.072, "I_zz": 3.2, "J": 0.26},
+Z24_CONSTANTS: dict[str, dict[str, float]] = {
+    "girder": {"E": 37.5e9, "G": 16e9, "density": 2700.0, "A": 4.4, "I_yy": 0.609, "I_zz": 17.0, "J": 1.27},
+    "pier": {"E": 37.5e9, "G": 16e9, "density": 2500.0, "A": 2.4, "I_yy": 0.072, "I_zz": 3.2, "J": 0.26},
     "soil": {"x": 1.5e9, "y": 2e9, "z": 3e9, "rx": 9.95e9, "ry": 5e9, "rz": 5e9},
     "abutment": {"x": 3e9, "y": 3e9, "z": 5.39e8, "rx": 3e9},
 }
-PARAMETERS: dict[str, str | tuple[str, str]] = {
+Z24_PARAMETERS: dict[str, str | tuple[str, str]] = {
     "girder_bending": ("E", "girder"),
     "piers_soil": "piers_soil",
     "girder_torsion": ("G", "girder"),
     "abutments": "abutments",
 }
-DAMAGE_GROUPS = PARAMETERS | {"piers": "piers", "soil": "soil"}
 
 
 def load_z24(path: str | PathLike) -> Z24Monitoring:
@@ -99,32 +90,33 @@ def load_z24(path: str | PathLike) -> Z24Monitoring:
     with open(file, "rb") as stream:
         is_matlab = file.suffix.lower() == ".mat" or stream.read(6) == b"MATLAB"
     table, state = _read_matlab(file) if is_matlab else _read_csv(file)
+    possible = {"record": (0, 20_000), "frequency": (0.1, 100.0), "temperature": (-60.0, 80.0)}
     for name in table:
-        kind = "record" if name == "record" else "frequency" if name in MODES else "temperature"
-        _check_values(table[name].to_numpy(), *POSSIBLE[kind], f"{file}: field {name!r}")
+        kind = "record" if name == "record" else "frequency" if name in Z24_MODES else "temperature"
+        _check_values(table[name].to_numpy(), *possible[kind], f"{file}: field {name!r}")
     record = table["record"].to_numpy()
     if np.isnan(record).any() or (record % 1 != 0).any():
         row = np.flatnonzero(np.isnan(record) | (record % 1 != 0))[0]
         raise ValueError(f"{file}: field 'record', row {row} is {record[row]}; expected a whole number of hours")
-    index = pd.DatetimeIndex(EPOCH + pd.to_timedelta(record, unit="h"), name="time")
+    index = pd.DatetimeIndex(pd.Timestamp("1997-11-11") + pd.to_timedelta(record, unit="h"), name="time")
     if index.has_duplicates:
         row = np.flatnonzero(index.duplicated())[0]
         raise ValueError(f"{file}: field 'record', row {row} repeats {record[row]:.0f}; expected each hour once")
     table = table.set_index(index)
     return Z24Monitoring(
-        temperatures=table[SENSORS], frequencies=table[MODES], state=pd.Series(state, index=index, name="state")
+        temperatures=table[Z24_SENSORS], frequencies=table[Z24_MODES], state=pd.Series(state, index=index, name="state")
     )
 
 
 def _read_csv(file: Path) -> tuple[pd.DataFrame, list[str]]:
-    if (size := file.stat().st_size) > LARGEST_TABLE:
-        raise ValueError(f"{file}: {size / 1e6:.0f} MB; expected at most {LARGEST_TABLE / 1e6:.0f} MB")
+    if (size := file.stat().st_size) > 12_800_000:  # text takes 20 times as much memory; the published one has 0.3 MB
+        raise ValueError(f"{file}: {size / 1e6:.0f} MB; expected at most 13 MB")
     try:
         with open(file, newline="", encoding="utf-8-sig") as stream:
             header, *rows = list(csv.reader(stream)) or [[]]
     except (ValueError, csv.Error) as error:
         raise ValueError(f"{file}: not a readable CSV file ({error})") from error
-    wanted = ["record", *MODES, *SENSORS, "state"]
+    wanted = ["record", *Z24_MODES, *Z24_SENSORS, "state"]
     missing = [name for name in wanted if header.count(name) != 1]
     if missing:
         raise ValueError(f"{file}: the header has the fields {header[:20]}; expected {missing} once each")
@@ -135,8 +127,8 @@ def _read_csv(file: Path) -> tuple[pd.DataFrame, list[str]]:
             raise ValueError(f"{file}: row {number} has {len(row)} fields; expected {len(header)}: is it cut off?")
     columns = dict(zip(header, zip(*rows, strict=True), strict=True))
     for number, state in enumerate(columns["state"]):
-        if state not in STATES:
-            raise ValueError(f"{file}: field 'state', row {number} is {state!r}; expected one of {STATES}")
+        if state not in ("undamaged", "damaged"):
+            raise ValueError(f"{file}: field 'state', row {number} is {state!r}; expected 'undamaged' or 'damaged'")
     numeric = {name: _numbers(columns[name], f"{file}: field {name!r}") for name in wanted[:-1]}
     return pd.DataFrame(numeric), list(columns["state"])
 
@@ -155,22 +147,22 @@ def _numbers(texts: tuple[str, ...], what: str) -> NDArray[np.float64]:
 def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
     content = read_matlab(file)
     data = _matlab_field(content, "data", file)
-    if data.ndim != 2 or data.shape[1] != len(MODES) or not len(data):
-        raise ValueError(f"{file}: field 'data' has shape {data.shape}; expected (n, {len(MODES)})")
+    if data.ndim != 2 or data.shape[1] != len(Z24_MODES) or not len(data):
+        raise ValueError(f"{file}: field 'data' has shape {data.shape}; expected (n, {len(Z24_MODES)})")
     columns: dict[str, NDArray] = {"record": _matlab_hours(content, len(data), file)}
-    columns |= dict(zip(MODES, data.T, strict=True))
-    for sensor in SENSORS:
+    columns |= dict(zip(Z24_MODES, data.T, strict=True))
+    for sensor in Z24_SENSORS:
         values = _matlab_field(content, f"Z24_{sensor}", file)
         if values.size != len(data):
             raise ValueError(f"{file}: field 'Z24_{sensor}' has shape {values.shape}; expected ({len(data)}, 1)")
         columns[sensor] = values.ravel()
     if "nc" not in content:
-        return pd.DataFrame(columns), [UNKNOWN] * len(data)
+        return pd.DataFrame(columns), ["unknown"] * len(data)
     n_undamaged = _matlab_field(content, "nc", file)
     if n_undamaged.size != 1 or not 0 <= n_undamaged.item() <= len(data) or n_undamaged.item() % 1:
         raise ValueError(f"{file}: field 'nc' is {n_undamaged.tolist()}; expected a number of rows up to {len(data)}")
     count = int(n_undamaged.item())
-    return pd.DataFrame(columns), [STATES[0]] * count + [STATES[1]] * (len(data) - count)
+    return pd.DataFrame(columns), ["undamaged"] * count + ["damaged"] * (len(data) - count)
 
 
 def _matlab_hours(content: dict[str, object], n_records: int, file: Path) -> NDArray[np.float64]:
@@ -244,17 +236,18 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     array([[ 3.9,  4.8, 10. , 10.6]])
     """
     n_modes = positive_integer(n_modes, "n_modes")
-    return z24_structure().assemble(PARAMETERS, groups=DAMAGE_GROUPS, n_modes=n_modes, track=track)
+    groups = Z24_PARAMETERS | {"piers": "piers", "soil": "soil"}
+    return z24_structure().assemble(Z24_PARAMETERS, groups=groups, n_modes=n_modes, track=track)
 
 
 def z24_structure(
-    constants: Mapping[str, Mapping[str, float]] = CONSTANTS, *, element_length: float = 1.0
+    constants: Mapping[str, Mapping[str, float]] = Z24_CONSTANTS, *, element_length: float = 1.0
 ) -> Structure:
     """Girder, piers, soil and abutments; nodes are named by their coordinates."""
-    axes = [0.0, *np.cumsum(SPANS).tolist()]
+    axes = [0.0, *np.cumsum((14.0, 30.0, 14.0)).tolist()]
     spans = [divided(start, end, element_length) for start, end in pairwise(axes)]
     girder: list[Place] = [(x, 0.0, 0.0) for x in dict.fromkeys(x for span in spans for x in span)]
-    heights = divided(-PIER_HEIGHT, 0.0, element_length)
+    heights = divided(-5.5, 0.0, element_length)
     piers: list[list[Place]] = [[(x, 0.0, z) for z in heights] for x in axes[1:-1]]
     parts = {
         "girder": [Beam(*ends, **constants["girder"]) for ends in pairwise(girder)],

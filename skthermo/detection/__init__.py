@@ -5,19 +5,17 @@ It uses ``residuals`` and ``preprocessing``; detectors take an FE model or a cha
 """
 
 from skthermo.detection._base import DamageDetector
+from skthermo.detection._compensated import CompensatedDetector
 from skthermo.detection._compensator import TemperatureCompensator
 from skthermo.detection._directional import DirectionalDetector
-from skthermo.detection._fused import FusedDetector
 from skthermo.detection._mahalanobis import MahalanobisDetector
 from skthermo.detection._outlier import OutlierDetector
-from skthermo.detection._windowed_alarm import WindowedAlarm
 
 __all__ = [
+    "CompensatedDetector",
     "DamageDetector",
     "DirectionalDetector",
-    "FusedDetector",
     "MahalanobisDetector",
     "OutlierDetector",
     "TemperatureCompensator",
-    "WindowedAlarm",
 ]

@@ -1,9 +1,8 @@
-"""The part that all damage detectors share: threshold, scores and alarms, and where their columns come from."""
+"""The part that all damage detectors share: how columns are read, threshold, scores and alarms."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from numbers import Real
 from typing import Any, Self, overload
 
@@ -13,20 +12,124 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
-from skthermo._core.arrays import Array, as_floats
+from skthermo._core.arrays import Array, median, robust_deviation
 from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted
-from skthermo._core.frames import Table, frame_like, row_times
-from skthermo._core.origins import origin_of
-from skthermo._core.warnings import explain_rows, explained_rows, warn_each, warn_user
-from skthermo.exceptions import FewRecordsWarning, UnevaluatedRowsWarning
-from skthermo.preprocessing import set_aside
-
-OF_ORDER = {"repeated-stamps", "unsorted-stamps"}  # which only what looks at earlier records depends on
-FEWEST_INDEPENDENT = 50  # baseline records, from which one baseline's rate of false alarms is close to the mean
-FAR_ABOVE = 2.5  # times as far from the median of a baseline's own indices as their quantile is
+from skthermo._core.frames import column_names, row_times
+from skthermo._core.text import listed
+from skthermo._core.warnings import warn_each
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
+from skthermo.residuals.numbers import independent_records
 
 
-class DamageDetector(OutlierMixin, Estimator, ABC):
+class DamageIndexMixin(OutlierMixin):
+    """Alarms of a detector that has a threshold, from the damage index that ``_index_of(X)`` gives each record."""
+
+    offset_: float
+
+    @abstractmethod
+    def _index_of(self, X: Any) -> Array:
+        """Damage index of records; higher is more damaged, NaN where there is none."""
+
+    def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
+        """Hook: why some rows have no damage index."""
+        return "no column has a value there, or an input of a step before is missing"
+
+    @overload
+    def damage_index(self, X: pd.DataFrame) -> pd.Series: ...
+    @overload
+    def damage_index(self, X: ArrayLike) -> NDArray[np.float64]: ...
+    def damage_index(self, X: ArrayLike) -> NDArray[np.float64] | pd.Series:
+        """Damage index of every record: higher is more damaged.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            In the columns and units of `fit`.
+
+        Returns
+        -------
+        ndarray or Series of shape (n_samples,)
+            Dimensionless; NaN where nothing can be evaluated. A frame gives a series on its index.
+
+        Warns
+        -----
+        UserWarning
+            If no record at all can be evaluated.
+        """
+        index = self._index_of(X)
+        unknown = np.isnan(index)
+        warn_each(self._not_evaluated(X, unknown) if unknown.all() else ())
+        return pd.Series(index, X.index, name="damage_index") if isinstance(X, pd.DataFrame) else index
+
+    def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Negative damage index: higher is healthier.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            In the columns and units of `fit`.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            NaN where there is no damage index.
+        """
+        return -np.asarray(self.damage_index(X))
+
+    def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Threshold minus damage index: negative is an alarm.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            In the columns and units of `fit`.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            NaN where there is no damage index.
+        """
+        return self.score_samples(X) - self.offset_
+
+    def predict(self, X: ArrayLike) -> NDArray[np.int64]:
+        """Whether each record raises an alarm: +1 healthy, -1 alarm, 0 not evaluated.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_modes)
+            In the columns and units of `fit`.
+
+        Returns
+        -------
+        ndarray of shape (n_samples,)
+            -1 where the damage index exceeds the threshold, +1 where it does not, and 0 where there is none.
+
+        Warns
+        -----
+        UserWarning
+            If some rows cannot be evaluated, with the first of them and the cause.
+        """
+        check_is_fitted(self)
+        decision = -self._index_of(X) - self.offset_
+        unknown = np.isnan(decision)
+        warn_each(self._not_evaluated(X, unknown))
+        return np.where(unknown, 0, np.where(decision < 0, -1, 1))
+
+    def _not_evaluated(self, X: Any, rows: NDArray[np.bool_]) -> list[SkthermoWarning]:
+        if not rows.any():
+            return []
+        first = int(rows.argmax())
+        stamp = f" ({X.index[first]})" if isinstance(X, pd.DataFrame) else ""
+        return [
+            UnevaluatedRowsWarning(
+                f"{rows.sum()} of {len(rows)} rows are not evaluated (predict gives 0), the first row {first}{stamp}: "
+                f"{self._cause(X, rows)}",
+                "not-evaluated",
+            )
+        ]
+
+
+class DamageDetector(DamageIndexMixin, Estimator, ABC):
     """Base of detectors that learn a healthy baseline and give every record a damage index.
 
     It reads tables, gives alarms and keeps to scikit-learn's rules. A detector of one's own has three methods:
@@ -44,13 +147,24 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Damage index of the baseline, as ``_learn`` returns it.
     threshold_, offset_ : float
         A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
+    n_independent_ : float
+        Number of independent records that the indices of the baseline are worth.
+    report_ : DataFrame
+        A row for each column: as what it was read (``read_as``, "frequency" or "residual"), what it was divided by
+        (``level``), and in how many rows a value was set aside (``n_set_aside``).
+    findings_ : list of SkthermoWarning
+        What `fit` has warned of.
 
     Notes
     -----
-    A detector, or a step before it, that looks at earlier records says how far by ``lookback_``: a number of rows, or a
-    time, as `WindowedAlarm` and `~skthermo.preprocessing.LagFeatures` have it. `~skthermo.monitoring.Monitor` keeps
-    that many records; those of steps in a row add up. ``_cause(X, rows)`` says why rows have no index. A detector that
-    learns a distribution has ``_has_likelihood()`` True and ``_log_densities(F)``, and with them a ``score``.
+    Columns are frequencies or residuals. A column whose values are positive, with a standard deviation below a third of
+    their mean, is read as a frequency, and is divided by its mean; the methods above get relative frequencies and
+    residuals as they are. `fit` sets aside, as if they were missing, frequencies that are farther from the median than
+    half of it, and residuals that are farther than a hundred robust standard deviations.
+
+    ``_cause(X, rows)`` says why rows have no index. A detector that learns a distribution has ``_has_likelihood()``
+    True and ``_log_densities(F)``, and with them a ``score``. A detector, or a step before it, that looks at earlier
+    records says how far by ``lookback_``: a number of rows, or a time.
 
     Examples
     --------
@@ -72,40 +186,24 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
     """
 
     _parameter_constraints: dict = {"contamination": [Interval(Real, 0, 0.5, closed="right")]}
-    _seen_at: Callable[[float], str] | None = None
-    """Hook: text that says which shift has a threshold as its damage index; with it, `fit` checks its threshold."""
 
     def __init__(self, contamination: float = 0.02):
         self.contamination = contamination
 
-    def _measurements(self, F: Table) -> Array:
-        """Hook: a baseline without values that cannot be, with warnings; what is meaningless is refused."""
-        found = set_aside(frequencies=F, unit=f"(the input of {type(self).__name__})", needs_all=True)
-        warn_each(found.others.warnings(exclude=OF_ORDER))
-        return as_floats(found.frequencies)
-
-    def _records(self, X: Any, F: Array, is_baseline: bool = False) -> Any:
-        """Hook: preprocess validated rows, also those of a baseline before `_learn` sees them."""
-        return F
-
     @abstractmethod
-    def _learn(self, F: Any, times: Array) -> Array:
-        """Fit on records at some times; return calibration scores."""
+    def _learn(self, F: Array, times: Array) -> Array:
+        """Fit on a baseline at some times; return the damage index that sets the threshold."""
 
     @abstractmethod
     def _limit(self, index: Array) -> float:
         """The threshold, from the baseline's damage index."""
 
     @abstractmethod
-    def _index(self, F: Any) -> Array:
+    def _index(self, F: Array) -> Array:
         """Damage index of rows; higher is more damaged, NaN where there is none."""
 
-    def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
-        """Why some rows have no damage index."""
-        return "no column has a value there, or what the steps before need for it is missing"
-
     def _has_likelihood(self) -> bool:
-        """Whether the detector has learned a distribution: `_log_densities` gives the logarithm of that of each row."""
+        """Hook: whether the detector has learned a distribution."""
         return False
 
     def _log_densities(self, F: Array) -> Array:
@@ -131,116 +229,32 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Raises
         ------
         ValueError
-            If the baseline has gross errors, all of which are listed, such as numbers that stand for a missing value,
-            infinite values, columns that are constant or missing, or fewer than two rows with a value; or the detector
-            cannot learn from it.
+            If a column has no value or is constant, a value is infinite, or there are fewer than two rows; or if the
+            detector cannot learn from the baseline.
 
         Warns
         -----
         UserWarning
-            If there are implausible values far from the others, equal columns, or columns with few different values;
-            if there are too few records for the rate of false alarms that is asked for; if the threshold is far above
-            the indices that the fitted detector gives the baseline, with the shift that it still sees.
+            If values were set aside, or the baseline has too few independent records for the rate of false alarms.
         """
-        F = self._validated(X, reset=True, order="C", ensure_min_samples=2, allow_infinite=True)
-        records = self._records(X, self._measurements(frame_like(X, F)), is_baseline=True)
-        self.baseline_index_ = self._learn(records, row_times(X))
+        F = self._validated(X, reset=True, order="C", ensure_min_samples=2)
+        self.findings_: list[SkthermoWarning] = []
+        F, self.report_ = read_columns(F, column_names(X, "x"), self.findings_)
+        self.baseline_index_ = self._learn(F, row_times(X))
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
-        if self._seen_at is not None:
-            self._warn_of_blindness(self._index(records))
+        self.n_independent_ = independent_records(self.baseline_index_[np.argsort(row_times(X), kind="stable")])
+        self.findings_ += few_records(self.n_independent_, len(F), self.contamination)
+        warn_each(self.findings_)
         return self
 
-    @overload
-    def damage_index(self, X: pd.DataFrame) -> pd.Series: ...
-    @overload
-    def damage_index(self, X: ArrayLike) -> NDArray[np.float64]: ...
-    def damage_index(self, X: ArrayLike) -> NDArray[np.float64] | pd.Series:
-        """Damage index of every record: higher is more damaged.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray or Series of shape (n_samples,)
-            Dimensionless; NaN where nothing can be evaluated. A frame gives a series on its index.
-
-        Warns
-        -----
-        UserWarning
-            If no record at all can be evaluated.
-        """
+    def _relative(self, X: ArrayLike) -> Array:
+        """Rows of X as `fit` read them: frequencies divided by their level, residuals as they are."""
         check_is_fitted(self)
-        F = self._validated(X, reset=False, order="C")
-        index = self._index(self._records(X, F))
-        explained = explained_rows(X) | explained_rows(index)
-        unexplained = np.isnan(index) & ~explained
-        if np.isnan(index).all() and unexplained.any():
-            self._warn_of_not_evaluated(X, unexplained)
-        if isinstance(X, pd.DataFrame):
-            return explain_rows(pd.Series(index, index=X.index, name="damage_index"), explained)
-        return explain_rows(index, explained)
+        return self._validated(X, reset=False, order="C") / self.report_["level"].to_numpy()
 
-    def score_samples(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Negative damage index: higher is healthier.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray of shape (n_samples,)
-            NaN where there is no damage index.
-        """
-        index = self.damage_index(X)
-        return explain_rows(-np.asarray(index), explained_rows(index))
-
-    def decision_function(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Threshold minus damage index: negative is an alarm.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray of shape (n_samples,)
-            NaN where there is no damage index.
-        """
-        scores = self.score_samples(X)
-        return explain_rows(scores - self.offset_, explained_rows(scores))
-
-    def predict(self, X: ArrayLike) -> NDArray[np.int64]:
-        """Whether each record raises an alarm: +1 healthy, -1 alarm, 0 not evaluated.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz.
-
-        Returns
-        -------
-        ndarray of shape (n_samples,)
-            -1 where the damage index exceeds the threshold, +1 where it does not, and 0 where there is none.
-
-        Warns
-        -----
-        UserWarning
-            If some rows cannot be evaluated: how many, the first of them, and what they lack. Rows of which a
-            `TemperatureCompensator` before has said so are not counted again.
-        """
-        decision = self.decision_function(X)
-        unknown = np.isnan(decision)
-        unexplained = unknown & ~explained_rows(decision)
-        if unexplained.any() and not unknown.all():  # where all are, `damage_index` has said so
-            self._warn_of_not_evaluated(X, unexplained)
-        return np.where(unknown, 0, np.where(decision < 0, -1, 1))
+    def _index_of(self, X: Any) -> Array:
+        return self._index(self._relative(X))
 
     @available_if(lambda detector: detector._has_likelihood())
     def score(self, X: ArrayLike, y: None = None) -> float:
@@ -252,102 +266,98 @@ class DamageDetector(OutlierMixin, Estimator, ABC):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
-            Frequencies in Hz, or residuals, of the healthy structure.
+            Of the healthy structure, in the columns and units of `fit`.
         y : None
             Ignored.
 
         Returns
         -------
         float
-            Natural logarithm of a density per unit of X, averaged over the values that are there: higher is better.
-            Behind a `TemperatureCompensator`, the density is per Hz of the measured frequencies, whatever ``whiten``
-            is, so that all its settings can be compared. NaN if no row has a value; a warning counts the rows scored if
-            they are fewer than half.
+            Natural logarithm of a density of relative frequencies or of residuals, averaged over the values that are
+            there: higher is better. NaN if no row has a value; a warning says so if fewer than half of them have.
         """
-        check_is_fitted(self)
-        F = self._validated(X, reset=False, order="C")
-        origin = origin_of(X)
-        densities = self._log_densities(F) + (0.0 if origin is None else origin.log_volumes())
-        return mean_log_density(densities, ~np.isnan(F) & ~np.isnan(densities)[:, np.newaxis])
+        F = self._relative(X)
+        densities = self._log_densities(F)
+        score, findings = mean_log_density(densities, ~np.isnan(F) & ~np.isnan(densities)[:, np.newaxis])
+        warn_each(findings)
+        return score
 
-    def _warn_of_blindness(self, own: Array) -> None:
-        """Warn if the threshold is far above the indices that the detector gives its own baseline."""
-        own = own[~np.isnan(own)]
-        if not own.size:
-            return
-        middle, suggested = np.quantile(own, [0.5, 1 - self.contamination])
-        if self.threshold_ - middle > FAR_ABOVE * (suggested - middle):
-            warn_user(
-                f"the threshold is {self.threshold_:.3g}. It is more than {FAR_ABOVE:g} times as far from the median "
-                f"of the baseline's own indices as {suggested:.3g}, which {self.contamination:.2g} of them exceed. The "
-                "baseline has few records, records that depend on each other, or outliers"
-                f"{self._seen_at(self.threshold_)}. Give a longer baseline, or one without outliers; "
-                "threshold='quantile' takes the lower value, with more false alarms",
-                FewRecordsWarning,
-                "high-threshold",
-            )
 
-    def _warn_of_not_evaluated(self, X: Any, rows: NDArray[np.bool_]) -> None:
-        first = int(rows.argmax())
-        stamp = f" ({X.index[first]})" if isinstance(X, pd.DataFrame) else ""
-        warn_user(
-            f"{rows.sum()} of {len(rows)} rows are not evaluated (predict gives 0), the first row {first}{stamp}: "
-            f"{self._cause(X, rows)}",
-            UnevaluatedRowsWarning,
-            "not-evaluated",
+def read_columns(F: Array, names: list[Any], findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:
+    """A baseline as detectors learn it, and how each column was read; what was set aside is added to the findings."""
+    empty = np.isnan(F).all(axis=0)
+    if empty.any():
+        raise ValueError(
+            f"{listed(np.array(names)[empty])} has no value in {len(F)} rows; expected values in each column"
         )
+    middle, scatter = median(F), robust_deviation(F)
+    is_frequency = (middle > 0) & (scatter < middle / 3)
+    farthest = np.where(is_frequency, middle / 2, np.where(scatter > 0, 100 * scatter, np.inf))
+    far = np.abs(F - middle) > farthest
+    F = np.where(far, np.nan, F)
+    is_frequency &= (np.fmin.reduce(F) > 0) & (np.nanstd(F, axis=0) < np.nanmean(F, axis=0) / 3)
+    level = np.where(is_frequency, np.nanmean(F, axis=0), 1.0)
+    table = pd.DataFrame(
+        {"read_as": np.where(is_frequency, "frequency", "residual"), "level": level, "n_set_aside": far.sum(axis=0)},
+        index=names,
+    )
+    if far.any():
+        findings.append(
+            RecordsWarning(
+                f"values of {listed(table.index[table['n_set_aside'] > 0])} are far from all others of their column. "
+                "They count as missing (report_ has their number). Put NaN where a value is missing",
+                "values-set-aside",
+            )
+        )
+    return F / level, table
 
 
-def conformal_threshold(
-    index: Array, contamination: float, share: float = 1.0, what: str = "records", n_independent: float | None = None
-) -> float:
-    """The ceil((n + 1)(1 - contamination))-th smallest index, which a new one exceeds with that probability at most.
+def few_records(n_independent: float, n_records: int, contamination: float) -> list[SkthermoWarning]:
+    """A finding if a baseline has fewer independent records than the rate of false alarms needs.
 
-    Each index comes from a detector that was not fitted on its record; NaN is left out. ``share`` is the number of
-    independent records for each record by which the rank is chosen, where they depend on their neighbours in time;
-    ``n_independent`` the number of which warnings speak (by default that of the rank).
+    Twice the estimate counts, since a dozen parts tell the number within a factor of two.
+    """
+    if min(2 * n_independent, n_records) >= 1 / contamination - 1:
+        return []
+    return [
+        FewRecordsWarning(
+            f"the baseline has too few independent records (n_independent_) for a false-alarm rate of "
+            f"{contamination:.2g}: expected {np.ceil(1 / contamination - 1):.0f} or more. Later records may raise "
+            "several times as many alarms. Give a longer baseline, or a higher contamination",
+            "few-baseline-records",
+        )
+    ]
+
+
+def conformal_threshold(index: Array, contamination: float) -> float:
+    """The ceil((n + 1)(1 - contamination))-th smallest of n indices, which a new one exceeds with that probability.
+
+    Each index comes from a detector that has not learned its record; NaN is left out.
     """
     ordered = np.sort(index[~np.isnan(index)])
-    n_independent = share * len(ordered) if n_independent is None else n_independent
-    rank = int(np.ceil((len(ordered) + 1 / share) * (1 - contamination) - 1e-9))
-    threshold = float(ordered[min(rank, len(ordered)) - 1])
+    rank = int(np.ceil((len(ordered) + 1) * (1 - contamination) - 1e-9))
+    threshold = float(ordered[min(rank, len(ordered)) - 1]) if len(ordered) else np.inf
     if threshold == np.inf:
         raise ValueError(
-            f"{len(ordered)} baseline rows are too few for their number of modes: some single row decides alone "
-            "about a direction; expected more rows"
-        )
-    if rank > len(ordered):
-        warn_user(
-            f"{np.floor(n_independent):.0f} independent baseline {what} are too few for a false-alarm rate of "
-            f"{contamination:.2g} (expected {np.ceil(1 / contamination - 1):.0f} or more). The threshold is the "
-            f"largest index, which later {what} exceed at a rate of about {1 / (n_independent + 1):.2g}. Give a longer "
-            "baseline, or a higher contamination",
-            FewRecordsWarning,
-            "few-baseline-records",
-        )
-    elif n_independent < min(FEWEST_INDEPENDENT, share * len(ordered)):
-        warn_user(
-            f"the {len(ordered)} baseline {what} depend on each other in time and count as {n_independent:.0f} "
-            f"independent ones (expected {FEWEST_INDEPENDENT} or more). On average over such baselines, false alarms "
-            f"are {contamination:.2g} of the records; after this one, they may be several times as many. Give a longer "
-            "baseline, or a regression whose residuals depend less on each other",
-            FewRecordsWarning,
-            "few-baseline-records",
+            f"{len(ordered)} baseline rows are too few for their number of modes: without a fifth of them, the others "
+            "do not determine the covariance; expected more rows"
         )
     return threshold
 
 
-def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> float:
-    """Mean over the values that are there, from the logarithm of the density of each row; NaN without any value.
+def interleaved_folds(times: Array) -> NDArray[np.intp]:
+    """The fold of each row: fifty blocks of time dealt in turn to five folds, or up to twenty folds of few rows."""
+    n_rows, ranks = len(times), np.argsort(np.argsort(times, kind="stable"))
+    return ranks // max(n_rows // 50, 1) % (5 if n_rows > 100 else min(n_rows, 20))
 
-    A warning says so where most rows have none.
-    """
+
+def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> tuple[float, list[SkthermoWarning]]:
+    """Mean over the values that are there of the density of rows, and a finding where most rows have none."""
     known = present.any(axis=1)
+    findings: list[SkthermoWarning] = []
     if 2 * known.sum() < len(known):
-        warn_user(
-            f"the score is of {known.sum()} of {len(known)} rows: the others have no value. Compare scores of the same "
-            "rows only",
-            UnevaluatedRowsWarning,
-            "rows-not-scored",
+        text = (
+            "more than half of the rows have no score: a value is missing there. Compare scores of the same rows only"
         )
-    return float(densities[known].sum() / present.sum()) if known.any() else float("nan")
+        findings.append(UnevaluatedRowsWarning(text, "rows-not-scored"))
+    return float(densities[known].sum() / present.sum()) if known.any() else float("nan"), findings

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from numbers import Real
 from typing import Any, Literal
 
@@ -12,33 +11,13 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._core.arrays import Array, as_floats, check_probability, is_model, means_of_known, patterns, real_array
-from skthermo._core.effects import damage_directions, usual_frequencies
+from skthermo._core.arrays import Array, as_floats, check_probability, patterns, real_array
 from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
-from skthermo._core.origins import Changes, origin_of
-from skthermo.detection._mahalanobis import ROWS_AT_ONCE, MahalanobisDetector, PatternScale, as_if_complete
+from skthermo.detection._base import interleaved_folds
+from skthermo.detection._mahalanobis import MahalanobisDetector, as_if_complete
+from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.cones import project_on_cones
-from skthermo.residuals.gaussian import precisions, whitenings
-
-UNCORRELATED = 1e-8  # correlation below which all columns of a baseline are components, not frequencies
-FAR_OFF = 2.0  # factor between means of columns and a model's frequencies, beyond which they are no frequencies
-ALIKE = 0.95  # cosine of the effects of two groups from which they cannot be distinguished
-N_DRAWS = 2000  # normal records, by which rates of detection are estimated
-N_DRAWS_OF_PATTERN = 400  # by which the mean squared length of projections is
-TAIL, FEWEST_IN_TAIL = 0.1, 20  # share of the baseline that shows how rare large indices are, and least number of it
-BEYOND = 5.0  # standard deviations above the threshold at which every record is found
-STEPS = np.linspace(0.0, 1.0, 21)  # shares of the largest amount that are tried
-
-
-@dataclass(frozen=True)
-class Records:
-    """Rows of values, and what relative changes of the frequencies make of them."""
-
-    values: Array
-    changes: Changes
-
-    def of(self, rows: Any) -> Records:
-        return Records(self.values[rows], self.changes.of(rows))
+from skthermo.residuals.gaussian import precisions
 
 
 class DirectionalDetector(MahalanobisDetector):
@@ -46,8 +25,7 @@ class DirectionalDetector(MahalanobisDetector):
 
     The one-sided likelihood-ratio test against the cone of all non-negative combinations of the directions [Kud63]_,
     [Per69]_. The damage index is the length of the projection of a whitened record on that cone, in standard
-    deviations, or an *unsquared* Mahalanobis distance (omnibus), expressed as the length that is exceeded so much more
-    often that the distance gives its share of the false alarms.
+    deviations, or the *unsquared* Mahalanobis distance (omnibus) times ``omnibus_scale_``, whichever is larger.
 
     Parameters
     ----------
@@ -62,13 +40,12 @@ class DirectionalDetector(MahalanobisDetector):
     contamination : float, default=0.02
         Share of healthy records above the threshold.
     omnibus : float, default=0.2
-        Share of the false alarms that goes to the Mahalanobis distance, for what lies outside the cone, such as a
-        gain of stiffness: from 0 (none of it) to 1 (nothing else).
+        Share of the false alarms that goes to the Mahalanobis distance, for changes outside the cone, such as a gain of
+        stiffness: from 0 (none of it) to 1 (nothing else).
     covariance : covariance estimator, optional
         As in `MahalanobisDetector`.
     threshold : {"conformal", "quantile"}, default="conformal"
-        As in `MahalanobisDetector`. With the conformal one, the index of the cone grows
-        for each baseline record by the factor by which its distance from the others exceeds that from all.
+        As in `MahalanobisDetector`.
 
     Attributes
     ----------
@@ -79,39 +56,38 @@ class DirectionalDetector(MahalanobisDetector):
         alarm by one may be by the other.
     sensitivities_ : Series of shape (n_directions,)
         By how many standard deviations one unit of each direction moves a record that has all modes.
+    omnibus_scale_ : float
+        Factor of the Mahalanobis distance beside the length in the cone: with it, both tests share the false alarms as
+        ``omnibus`` says.
     covariance_ : estimator
         Fitted: mean (``location_``) and covariance of the baseline.
-    tests_ : object
-        How the cone's index and the Mahalanobis distance are joined.
-    pattern_scale_, cone_scale_ : object
-        Factors for patterns of missing modes, of the Mahalanobis distance and of the cone's index.
-    levels_ : ndarray of shape (n_columns,)
-        Mean frequencies, or ones; only where no step before says what it has made of frequencies.
-    typical_changes_ : ndarray of shape (n_columns, n_modes)
-        What relative changes of the frequencies make of the columns, on average over the baseline.
     baseline_index_ : ndarray of shape (n_samples,)
-        Damage index of the baseline; with the conformal threshold, by other records.
+        Damage index of the baseline; with the conformal threshold, each record's index from those of other folds.
     n_independent_ : float
-        How many independent records the baseline counts as.
+        Number of independent records that the indices of the baseline are worth.
     threshold_, offset_ : float
         A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
+    report_ : DataFrame
+        As what each column was read, and in how many rows a value was set aside, as `DamageDetector` has it.
+    findings_ : list of SkthermoWarning
+        What `fit` has warned of.
     n_features_in_, feature_names_in_ : int, ndarray of str
         Number of modes and, where `fit` saw a frame with such, their names.
 
     See Also
     --------
     MahalanobisDetector : Finds changes in any direction alike.
+    CompensatedDetector : Removes the effect of temperature before.
 
     Notes
     -----
-    Records are frequencies, all of them positive, or residuals of a `TemperatureCompensator` directly before, which
-    says what it makes of a relative change: residuals in Hz or whitened, also by weather. Other steps in between do not
-    say so. Behind them, "softening" holds for columns that grow with their frequency, such as logarithms, but amounts
-    are not shares of frequencies; columns that are components (exactly uncorrelated) are refused. Other directions are
-    refused where values are not positive, and those of a model also where the columns are far from its frequencies.
+    Records are frequencies, or relative residuals ln f - ln f expected, as `TemperatureCompensator` gives them. Columns
+    that cannot be either, because they scatter by more than a third or are exactly uncorrelated, as standardised
+    columns or principal components are, are refused.
 
     The test is one-sided: a change outside the cone is left to the omnibus. A cone that spans nearly everything gains
-    nothing. :doc:`/guide/detectors_theory` has the joint calibration and records with missing modes.
+    nothing. A record with missing modes gets its length in the cone of the modes that it has, times the square root of
+    the ratio of the numbers of modes.
 
     Examples
     --------
@@ -167,48 +143,51 @@ class DirectionalDetector(MahalanobisDetector):
         own = self.get_params(deep=False)
         return type(self)(**own | {"covariance": clone(self.covariance, safe=False)})  # a fitted chain is shared
 
-    def _records(self, X: Any, F: Array, is_baseline: bool = False) -> Records:
-        origin = origin_of(X)
-        if is_baseline:
-            vars(self).pop("levels_", None)  # of an earlier fit
-            if origin is None:
-                self.levels_ = self._levels(F)
-        if origin is not None:
-            return Records(F, origin.changes())
-        matrix = np.diag(self.levels_) if hasattr(self, "levels_") else self.typical_changes_
-        return Records(F, Changes.of_all(matrix, len(F)))
-
-    def _learn(self, records: Records, times: Array) -> Array:
-        names = getattr(self, "feature_names_in_", None)
-        n_modes = records.changes.matrices.shape[2]
-        self.directions_ = read_directions(self.directions, names, n_modes)
-        omnibus = super()._learn(records.values, times)
-        self.typical_changes_ = records.changes.typical()
+    def _learn(self, F: Array, times: Array) -> Array:
+        refuse_no_residuals(F, (self.report_["read_as"] == "residual").to_numpy())
+        self.directions_ = read_directions(self.directions, getattr(self, "feature_names_in_", None), F.shape[1])
+        self.covariance_ = self._fitted(F, self.findings_)
         white = self._white_effects()
         self.sensitivities_ = pd.Series(np.linalg.norm(white, axis=0), self.directions_.index)
-        self.indistinguishable_ = _alike(white, self.directions_.index)
-        present = ~np.isnan(records.values)
-        cone = self._projected(records)[2]
-        if self.threshold == "conformal":  # new records are farther in the cone by the factor by which they are at all
-            own = super()._index(records.values)
-            cone = cone * np.divide(omnibus, own, out=np.ones_like(own), where=own > 0)
-        self.cone_scale_ = PatternScale.of(np.maximum(cone, np.finfo(float).tiny), present, self.contamination)
-        cone = cone * self.cone_scale_(present)
-        self.tests_ = JoinedTests.of(cone, omnibus, self.omnibus)
-        return self.tests_(cone, omnibus)
+        self.indistinguishable_ = alike(white, self.directions_.index)
+        if self.threshold == "conformal":
+            folds = interleaved_folds(times)
+            indices = out_of_fold(lambda train: lambda test: self._both_from(F[train], F[test]), folds)
+        else:
+            indices = self._both(self.covariance_, F)
+        self.omnibus_scale_ = self._scale_of_omnibus(*indices.T)
+        return self._joined(*indices.T)
 
-    def _index(self, records: Records) -> Array:
-        return np.concatenate([self._joined(part) for part in _parts(records)])
+    def _index(self, F: Array) -> Array:
+        return self._joined(*self._both(self.covariance_, F).T)
 
-    def _joined(self, records: Records) -> Array:
-        omnibus, present = super()._index(records.values), ~np.isnan(records.values)
-        cone = self._projected(records)[2]
-        return self.tests_(cone if present.all() else cone * self.cone_scale_(present), omnibus)
+    def _joined(self, omnibus: Array, cone: Array) -> Array:
+        if self.omnibus in (0, 1):
+            return omnibus if self.omnibus else cone
+        return np.maximum(cone, self.omnibus_scale_ * omnibus)
 
-    def _seen_at(self, threshold: float) -> str:
-        smallest = self._detectability(threshold).smallest(0.5)
-        sizes = ", ".join(f"{name} {loss:.2g}" for name, loss in smallest.items())
-        return f". Half of the records raise an alarm at these losses: {sizes}"
+    def _scale_of_omnibus(self, omnibus: Array, cone: Array) -> float:
+        """Ratio of the thresholds that each index would have by itself, with its share of the false alarms."""
+        if self.omnibus in (0, 1):
+            return 1.0
+        rates = (1 - self.omnibus) * self.contamination, self.omnibus * self.contamination
+        return rare_level(cone, rates[0]) / rare_level(omnibus, rates[1])
+
+    def _both(self, learned: BaseEstimator, F: Array) -> Array:
+        """Mahalanobis distance and length in the cone of each row, as if no mode were missing, (n_rows, 2)."""
+        lengths = project(learned, self.directions_.to_numpy(), F)[1]
+        present = ~np.isnan(F)
+        lengths[~present.any(axis=1)] = np.nan
+        lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))
+        return np.column_stack([as_if_complete(self._distances(learned, F), F), lengths])
+
+    def _both_from(self, others: Array, F: Array) -> Array:
+        """The same by other rows; infinite if these do not determine the covariance."""
+        try:
+            learned = self._fitted(others, [])
+        except ValueError:
+            return np.full((len(F), 2), np.inf)
+        return self._both(learned, F)
 
     def severities(self, X: ArrayLike) -> pd.DataFrame:
         """Losses by which the test explains each record.
@@ -227,11 +206,9 @@ class DirectionalDetector(MahalanobisDetector):
             ``indistinguishable_`` share what either could explain.
         """
         check_is_fitted(self)
-        F = self._validated(X, reset=False, order="C")
-        amounts = [self._projected(part)[0] for part in _parts(self._records(X, F))]
+        amounts = project(self.covariance_, self.directions_.to_numpy(), self._relative(X))[0]
         index = X.index if isinstance(X, pd.DataFrame) else None
-        limited = np.minimum(np.concatenate(amounts), largest_amount(self.directions))
-        return pd.DataFrame(limited, index, self.directions_.index)
+        return pd.DataFrame(np.minimum(amounts, self._largest), index, self.directions_.index)
 
     def explained(self, X: ArrayLike) -> Array:
         """Share of the departure of each record from the baseline that the directions explain.
@@ -244,13 +221,16 @@ class DirectionalDetector(MahalanobisDetector):
         Returns
         -------
         ndarray of shape (n_samples,)
-            Of the squared Mahalanobis distance, from 0 to 1; small where something else has changed than a loss of
-            stiffness of the groups, such as a bearing or a mass. NaN where a record has no mode.
+            Of the squared Mahalanobis distance, from 0 to 1; small where another change than a loss of stiffness of the
+            groups has happened, such as of a bearing or a mass. NaN where a record has no mode.
         """
-        check_is_fitted(self)
-        F = self._validated(X, reset=False, order="C")
-        lengths = np.concatenate([self._projected(part)[1] for part in _parts(self._records(X, F))])
-        return explained_share(lengths, self._normal.distances(F))
+        F = self._relative(X)
+        lengths, distances = (
+            project(self.covariance_, self.directions_.to_numpy(), F)[1],
+            self._distances(self.covariance_, F),
+        )
+        shares = np.full(len(F), np.nan)
+        return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
 
     def pod(self, severities: ArrayLike) -> pd.DataFrame:
         """Probability of detection of single records, by drawing normal ones from the learned covariance.
@@ -272,7 +252,13 @@ class DirectionalDetector(MahalanobisDetector):
             If a severity is negative, or a loss larger than 1.
         """
         check_is_fitted(self)
-        return self._detectability(self.threshold_).pod(severities)
+        amounts = np.ravel(real_array(severities, "severities"))
+        if not ((amounts >= 0) & (amounts <= self._largest)).all():
+            expected = "losses from 0 to 1" if self._largest == 1 else "amounts that are not negative"
+            raise ValueError(f"severities is {severities!r:.200}; expected {expected}")
+        white = self._white_effects()
+        rates = {name: self._rates(white, n, amounts) for n, name in enumerate(self.directions_.index)}
+        return pd.DataFrame(rates, pd.Index(amounts, name="severity"))
 
     def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
         """Smallest amount of each direction alone that is found in a share of the records.
@@ -289,79 +275,49 @@ class DirectionalDetector(MahalanobisDetector):
             in the unit of the given directions.
         """
         check_is_fitted(self)
-        return self._detectability(self.threshold_).smallest(check_probability(level, "level"))
+        level, white = check_probability(level, "level"), self._white_effects()
+        found = []
+        for direction, length in enumerate(np.linalg.norm(white, axis=0)):
+            # five standard deviations above the threshold, every record is found
+            highest = min((self.threshold_ + 5) / max(length, np.finfo(float).tiny), self._largest)
+            found.append(smallest_amount(lambda sizes, k=direction: self._rates(white, k, sizes), highest, level))
+        return pd.Series(found, pd.Index(self.directions_.index, name="direction"), dtype=float)
 
-    def _detectability(self, threshold: float) -> Detectability:
-        names = list(self.directions_.index)
-        return Detectability(self.tests_, self._white_effects(), names, threshold, largest_amount(self.directions))
+    def _rates(self, white: Array, direction: int, amounts: Array, n_draws: int = 2000) -> Array:
+        """Shares of normal records with each amount of a direction above the threshold."""
+        draws = np.random.RandomState(0).standard_normal((n_draws, len(white)))
+        moved = (draws + np.outer(amounts, white[:, direction])[:, np.newaxis]).reshape(-1, len(white))
+        cone = project_on_cones((white.T @ white)[np.newaxis], moved @ white, np.zeros(len(moved), dtype=np.intp))[1]
+        above = self._joined(np.linalg.norm(moved, axis=1), cone) > self.threshold_
+        return above.reshape(len(amounts), -1).mean(axis=1)
 
     def _white_effects(self) -> Array:
-        """What a unit of each direction makes of whitened columns, (n_columns, n_directions)."""
-        normal = self._normal
-        root = whitenings(normal.covariance[np.newaxis], np.ones((1, len(normal.mean)), dtype=bool))[0][0]
-        return root @ self.typical_changes_ @ self.directions_.to_numpy().T
+        """Changes of whitened records by a unit of each direction, (n_modes, n_directions)."""
+        return np.linalg.solve(np.linalg.cholesky(self.covariance_.covariance_), self.directions_.to_numpy().T)
 
-    def _levels(self, F: Array) -> Array:
-        """What a relative change of each frequency makes of its column, in records of which no step says it."""
-        if (F[~np.isnan(F)] > 0).all():
-            levels = means_of_known(F)
-            if _is_fem(self.directions):
-                self._check_frequencies(levels)
-            return levels
-        softens = isinstance(self.directions, str)
-        complete = F[~np.isnan(F).any(axis=1)]
-        spread = complete.std(axis=0) if len(complete) > F.shape[1] else np.zeros(F.shape[1])
-        if F.shape[1] > 1 and (spread > 0).all():
-            correlation = np.corrcoef(complete.T) - np.eye(F.shape[1])
-            softens &= not (np.abs(correlation) < UNCORRELATED).all()
-        if not softens:
-            raise ValueError(
-                "the records are neither frequencies (some are not positive) nor residuals of a TemperatureCompensator "
-                "directly before, so that it is not known by how much a relative change of a frequency moves each "
-                "column; expected frequencies in Hz, or a pipeline without a memory of its own, in which the detector "
-                "follows the compensator"
-            )
-        return np.ones(F.shape[1])
+    @property
+    def _largest(self) -> float:
+        """Largest amount of a direction: a whole loss; without limit where directions have a unit of their own."""
+        return np.inf if isinstance(self.directions, pd.DataFrame) or np.ndim(self.directions) else 1.0
 
-    def _check_frequencies(self, levels: Array) -> None:
-        """Refuse columns that are no frequencies of the model that gives the directions, but something else of them."""
-        expected = usual_frequencies(self.directions)
-        if len(expected) == len(levels) and np.nanmedian(np.abs(np.log(levels / expected))) > np.log(FAR_OFF):
-            raise ValueError(
-                f"the means of the columns are {np.round(levels, 3).tolist()}, the frequencies of the model "
-                f"{np.round(expected, 3).tolist()} Hz; expected frequencies in Hz, most within a factor of {FAR_OFF:g} "
-                "of the model's, or a pipeline without a memory of its own, in which the detector follows the "
-                "compensator"
-            )
 
-    def _projected(self, records: Records) -> tuple[Array, Array, Array]:
-        """Amounts of the directions, length of the projection on their cone, and that as if no mode were missing."""
-        normal = self._normal
-        scale = np.sqrt(np.diag(normal.covariance))
-        present = ~np.isnan(records.values)
-        masks, pattern = patterns(present)
-        correlation = normal.covariance / np.outer(scale, scale)
-        weights = precisions(correlation, masks)
-        matrices = records.changes.matrices / scale[:, np.newaxis]
-        effects = matrices @ self.directions_.to_numpy().T
-        cases, case = np.unique(records.changes.which * len(masks) + pattern, return_inverse=True)
-        of_case, mask_of_case = effects[cases // len(masks)], cases % len(masks)
-        weighted = weights[mask_of_case] @ of_case
-        standard = np.nan_to_num(records.values - normal.mean) / scale
-        along = standard @ weighted[0] if len(cases) == 1 else np.einsum("ij,ijk->ik", standard, weighted[case])
-        amounts, lengths = project_on_cones(of_case.swapaxes(1, 2) @ weighted, along, case)
-        amounts[~present.any(axis=1)] = np.nan
-        if present.all():
-            return amounts, lengths, lengths
-        effects = self.typical_changes_ / scale[:, np.newaxis] @ self.directions_.to_numpy().T
-        whole, *sizes = mean_squares(
-            whitenings(correlation, np.vstack([np.ones(len(scale), bool), masks]))[0] @ effects
-        )
-        size = np.array(sizes)
-        nothing = size <= 0
-        mapped = as_if_complete(lengths, np.where(nothing, whole, size)[pattern], whole)
-        mapped = np.where(nothing[pattern], 0.0, np.nan_to_num(mapped))
-        return amounts, lengths, np.where(present.any(axis=1), mapped, np.nan)
+def project(learned: BaseEstimator, directions: Array, F: Array, n_rows: int = 20_000) -> tuple[Array, Array]:
+    """Amounts of the directions that explain each row best, and the length of its projection on their cone.
+
+    So many rows are solved at once, which bounds memory.
+    """
+    scale = np.sqrt(np.diag(learned.covariance_))
+    correlation, effects = learned.covariance_ / np.outer(scale, scale), directions.T / scale[:, np.newaxis]
+    amounts, lengths = np.empty((len(F), len(directions))), np.empty(len(F))
+    for start in range(0, len(F), n_rows):
+        rows = slice(start, start + n_rows)
+        masks, pattern = patterns(~np.isnan(F[rows]))
+        weighted = precisions(correlation, masks) @ effects
+        standard = np.nan_to_num(F[rows] - learned.location_) / scale
+        along = np.einsum("ij,ijk->ik", standard, weighted[pattern]) if len(masks) > 1 else standard @ weighted[0]
+        amounts[rows], lengths[rows] = project_on_cones(effects.T @ weighted, along, pattern)
+    amounts[np.isnan(F).all(axis=1)] = np.nan
+    return amounts, lengths
 
 
 def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
@@ -374,8 +330,10 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
                 "relative changes (n_directions, n_modes)"
             )
         return pd.DataFrame(-np.eye(n_modes), modes, modes)
-    if _is_fem(directions):
-        directions = damage_directions(directions)
+    if hasattr(directions, "damage_directions"):
+        directions = directions.damage_directions()
+    elif hasattr(directions, "damaged"):
+        directions = directions_by_differences(directions)
     is_frame = isinstance(directions, pd.DataFrame)
     if is_frame and names is not None and all(isinstance(one, str) for one in [*directions.columns, *modes]):
         if set(directions.columns) != set(modes):
@@ -396,132 +354,63 @@ def read_directions(directions: Any, names: Any, n_modes: int) -> pd.DataFrame:
     return pd.DataFrame(values, own, modes)
 
 
-def _alike(white: Array, names: pd.Index) -> list[tuple[str, str]]:
+def directions_by_differences(model: Any, step: float = 1e-3) -> pd.DataFrame:
+    """Relative change of each frequency of a model for a loss of stiffness of each group, by central differences."""
+    nominal = np.ones((1, len(model.parameter_names)))
+
+    def logarithms(damage: dict[str, float]) -> Array:
+        return np.log(as_floats(model.damaged(damage).frequencies(nominal)))[0]
+
+    slopes = {name: (logarithms({name: step}) - logarithms({name: -step})) / (2 * step) for name in model.groups}
+    return pd.DataFrame.from_dict(slopes, orient="index")
+
+
+def refuse_no_residuals(F: Array, are_residuals: NDArray[np.bool_]) -> None:
+    """Refuse columns, read as residuals, that cannot be relative: standardised ones, or principal components."""
+    if not are_residuals.any():
+        return
+    deviations = np.nanstd(F[:, are_residuals], axis=0)
+    complete = F[~np.isnan(F).any(axis=1)]
+    are_components = False
+    if F.shape[1] > 1 and len(complete) > F.shape[1] and (complete.std(axis=0) > 0).all():
+        correlation = np.corrcoef(complete.T) - np.eye(F.shape[1])
+        are_components = bool((np.abs(correlation) < 1e-8).all())
+    if (deviations > 1 / 3).any() or are_components:
+        raise ValueError(
+            f"columns are neither frequencies nor relative residuals: they have standard deviations up to "
+            f"{deviations.max():.3g}{' and are exactly uncorrelated' if are_components else ''}, so that nobody knows "
+            "how a relative change of a frequency moves them; expected frequencies in Hz, or residuals ln f - ln f "
+            "expected, as TemperatureCompensator gives"
+        )
+
+
+def alike(white: Array, names: pd.Index, cosine: float = 0.95) -> list[tuple[str, str]]:
     """Pairs of directions with nearly the same whitened effects."""
     unit = white / np.maximum(np.linalg.norm(white, axis=0), np.finfo(float).tiny)
     first, second = np.triu_indices(unit.shape[1], 1)
-    alike = (unit.T @ unit)[first, second] > ALIKE
-    return [(names[i], names[k]) for i, k in zip(first[alike], second[alike], strict=True)]
+    are_alike = (unit.T @ unit)[first, second] > cosine
+    return [(names[i], names[k]) for i, k in zip(first[are_alike], second[are_alike], strict=True)]
 
 
-def largest_amount(directions: Any) -> float:
-    """That of each direction: a whole loss; without limit where directions are given in a unit of their own."""
-    return 1.0 if isinstance(directions, str) or _is_fem(directions) else np.inf
+def rare_level(index: Array, rate: float, tail: float = 0.1) -> float:
+    """The level that indices exceed at a rate: squares above the level of the tail exceed it exponentially.
 
-
-def _is_fem(directions: Any) -> bool:
-    """Whether an FE model or a chain gives the directions."""
-    return is_model(directions) or is_model(getattr(directions, "model", None))
-
-
-def _parts(records: Records) -> list[Records]:
-    """Some records after others, which bounds memory."""
-    return [records.of(slice(i, i + ROWS_AT_ONCE)) for i in range(0, len(records.values), ROWS_AT_ONCE)]
-
-
-@dataclass(frozen=True)
-class Tail:
-    """Squared indices of a baseline above a level, and by how much they exceed it on average, outliers apart."""
-
-    level: float
-    excess: float
-
-    @classmethod
-    def of(cls, index: Array) -> Tail:
-        """Of the highest tenth of the indices, or more of a short baseline; by their median, because of outliers."""
-        squares = index[np.isfinite(index)] ** 2
-        share = min(max(TAIL, FEWEST_IN_TAIL / max(len(squares), 1)), 0.5)
-        level = float(np.quantile(squares, 1 - share))
-        above = squares[squares > level]
-        return cls(level, float(np.median(above) - level) / np.log(2) if len(above) else 0.0)
-
-
-@dataclass(frozen=True)
-class JoinedTests:
-    """The index of the cone and that of the omnibus, joined so that the latter gives a share of the false alarms.
-
-    Squares of either index exceed their tails exponentially. The omnibus index is expressed as the index of the cone
-    that is exceeded as often, times what the shares of both are to each other; the larger of the two counts.
+    Their median tells by how much, so that outliers do not.
     """
-
-    cone: Tail
-    omnibus: Tail
-    share: float
-
-    @classmethod
-    def of(cls, cone: Array, omnibus: Array, share: float) -> JoinedTests:
-        """Learned from the indices of a baseline."""
-        return cls(Tail.of(cone), Tail.of(omnibus), share)
-
-    def __call__(self, cone: Array, omnibus: Array) -> Array:
-        if self.share in (0, 1):
-            return omnibus if self.share else cone
-        ratio = self.cone.excess / self.omnibus.excess if self.omnibus.excess > 0 else 1.0
-        rarer = np.log((1 - self.share) / self.share)
-        squared = self.cone.level + ratio * (omnibus**2 - self.omnibus.level) - self.cone.excess * rarer
-        return np.maximum(cone, np.sqrt(np.maximum(squared, 0.0)))
+    squares = index[np.isfinite(index)] ** 2
+    level = np.quantile(squares, 1 - tail)
+    excess = (np.median(squares[squares > level]) - level) / np.log(2)
+    return float(np.sqrt(level + excess * np.log(tail / rate)))
 
 
-@dataclass(frozen=True)
-class Detectability:
-    """Which amounts of each direction normal records let a threshold find, none above the ``largest``.
-
-    ``white`` are the effects of the directions on what is tested, whitened, (n_modes, n_directions).
-    """
-
-    tests: JoinedTests
-    white: Array
-    names: Sequence[Any]
-    threshold: float
-    largest: float
-
-    def pod(self, severities: ArrayLike) -> pd.DataFrame:
-        """Share of records above the threshold, by severity and direction."""
-        amounts = np.ravel(real_array(severities, "severities"))
-        if not ((amounts >= 0) & (amounts <= self.largest)).all():
-            expected = "losses from 0 to 1" if self.largest == 1 else "amounts that are not negative"
-            raise ValueError(f"severities is {severities!r:.200}; expected {expected}")
-        rates = [self._rates_of(direction, amounts) for direction in range(len(self.names))]
-        return pd.DataFrame(np.transpose(rates), pd.Index(amounts, name="severity"), list(self.names))
-
-    def smallest(self, level: float) -> pd.Series:
-        """Smallest amount that is found in a share of the records; infinite where not even the largest is."""
-        found = [self._smallest(effect, level) for effect in range(len(self.names))]
-        return pd.Series(found, pd.Index(list(self.names), name="direction"), dtype=float)
-
-    def _smallest(self, direction: int, level: float) -> float:
-        """The first of some steps that is found often enough, and again of finer ones before it."""
-        length = max(float(np.linalg.norm(self.white[:, direction])), np.finfo(float).tiny)
-        low, high = 0.0, min((self.threshold + BEYOND) / length, self.largest)
-        for _ in range(2):
-            steps = low + STEPS * (high - low)
-            reached = np.flatnonzero(self._rates_of(direction, steps) >= level)
-            if not len(reached):
-                return np.inf
-            last = max(reached[0], 1)
-            low, high = float(steps[last - 1]), float(steps[last])
-        return high
-
-    def _rates_of(self, direction: int, amounts: Array) -> Array:
-        """Shares of normal rows with each amount above the threshold."""
-        draws = np.random.RandomState(0).standard_normal((N_DRAWS, len(self.white)))
-        moved = draws + np.outer(amounts, self.white[:, direction])[:, np.newaxis]
-        moved = moved.reshape(-1, len(self.white))
-        products, all_alike = (self.white.T @ self.white)[np.newaxis], np.zeros(len(moved), dtype=np.intp)
-        lengths = project_on_cones(products, moved @ self.white, all_alike)[1]
-        above = self.tests(lengths, np.linalg.norm(moved, axis=1)) > self.threshold
-        return above.reshape(len(amounts), -1).mean(axis=1)
-
-
-def mean_squares(white: Array) -> Array:
-    """Mean squared length of the projections of normal rows on the cones of some effects, (n_cones, n_modes, n_dir)."""
-    draws = np.random.RandomState(0).standard_normal((N_DRAWS_OF_PATTERN, white.shape[1]))
-    which: NDArray[np.intp] = np.repeat(np.arange(len(white)), N_DRAWS_OF_PATTERN)
-    lengths = project_on_cones(white.swapaxes(1, 2) @ white, (draws @ white).reshape(len(which), -1), which)[1]
-    return (lengths.reshape(len(white), -1) ** 2).mean(axis=1)
-
-
-def explained_share(lengths: Array, distances: Array) -> Array:
-    """Share of squared distances that lies in a cone, from the lengths of the projections on it."""
-    known = distances > 0
-    return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=np.full(len(lengths), np.nan), where=known)
+def smallest_amount(rates: Callable[[Array], Array], highest: float, level: float) -> float:
+    """The first of 21 amounts up to the highest that is found often enough, refined once; infinite if none is."""
+    low, high = 0.0, highest
+    for _ in range(2):
+        amounts = np.linspace(low, high, 21)
+        reached = np.flatnonzero(rates(amounts) >= level)
+        if not len(reached):
+            return np.inf
+        last = max(reached[0], 1)
+        low, high = float(amounts[last - 1]), float(amounts[last])
+    return high

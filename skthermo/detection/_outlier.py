@@ -7,6 +7,7 @@ from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, DensityMixin, clone
 from sklearn.neighbors import KernelDensity
@@ -15,10 +16,8 @@ from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import HasMethods, Interval, StrOptions
 from skthermo._core.frames import column_names
 from skthermo._core.text import listed
-from skthermo.detection._base import DamageDetector, conformal_threshold
-from skthermo.residuals.folds import Neighbourhoods
-
-N_FOLDS = 5  # of the baseline, each evaluated by a clone that was fitted on the others
+from skthermo.detection._base import DamageDetector, conformal_threshold, interleaved_folds
+from skthermo.preprocessing.folds import BlockedKFold, out_of_fold
 
 
 class OutlierDetector(DamageDetector):
@@ -114,27 +113,34 @@ class OutlierDetector(DamageDetector):
 
     def _learn(self, F: Array, times: Array) -> Array:
         complete = ~np.isnan(F).any(axis=1)
-        baseline = Neighbourhoods(times[complete], F[complete])
         if complete.sum() < 2:
             raise ValueError(f"{complete.sum()} of {len(F)} rows have every mode; expected at least 2")
         scores = hasattr(self.estimator, "score_samples") or hasattr(self.estimator, "decision_function")
-        self.estimator_ = clone(self.estimator).fit(baseline.records) if scores else None
+        self.estimator_ = clone(self.estimator).fit(F[complete]) if scores else None
         if not hasattr(self.estimator_, "score_samples") and not _is_pyod(self.estimator_):
             raise ValueError(
                 f"estimator is {self.estimator!r}, which has no score_samples; expected an outlier detector that "
                 "scores new records, such as IsolationForest() or LocalOutlierFactor(novelty=True)"
             )
-        self.n_independent_ = baseline.n_independent
         if self.threshold == "quantile":
             return self._index(F)
-        index = np.full(len(F), np.nan)
-        index[complete] = baseline.out_of_fold(N_FOLDS, self._index_from, self.block)
+        known, index = F[complete], np.full(len(F), np.nan)
+        folds = self._folds(times[complete])
+        index[complete] = out_of_fold(lambda train: lambda test: self._index_from(known[train], known[test]), folds)
         return index
+
+    def _folds(self, times: Array) -> NDArray[np.intp]:
+        """The fold of each complete row."""
+        if self.block is None:
+            return interleaved_folds(times)
+        is_timed = np.ptp(times) > 1e12  # numbers of rows are smaller, and nanoseconds larger
+        index = pd.DatetimeIndex(times.astype("datetime64[ns]")) if is_timed else pd.Index(times)
+        return BlockedKFold(min(5, len(times)), block=self.block).fold_of(pd.DataFrame(index=index))
 
     def _limit(self, index: Array) -> float:
         if self.threshold == "quantile":
             return float(np.nanquantile(index, 1 - self.contamination))
-        return conformal_threshold(index, self.contamination, n_independent=self.n_independent_)
+        return conformal_threshold(index, self.contamination)
 
     def _index(self, F: Array) -> Array:
         index, complete = np.full(len(F), np.nan), ~np.isnan(F).any(axis=1)

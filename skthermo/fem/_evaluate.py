@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import closing, nullcontext
+from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,58 +31,50 @@ from skthermo._core.arrays import (
     real_array,
 )
 from skthermo._core.parallel import as_they_come, map_on_blas_threads, single_blas_thread, with_progress
+from skthermo._core.warnings import collected, warn_each
+from skthermo.exceptions import SkthermoWarning
 from skthermo.fem._protocol import FEModel
-from skthermo.fem._terms import ROWS_PER_CHUNK, warn_of_failures
+from skthermo.fem._terms import ROWS_PER_CHUNK, failures
 from skthermo.fem.modal import linearised_by_row
 
 if TYPE_CHECKING:
     from skthermo.fem._samples import Samples
 
 
-SMALLEST_STEP = float(np.sqrt(np.finfo(float).eps))
-"""Relative step of central differences at which rounding takes half of the digits of a frequency."""
-
-USUAL_STEP = 0.001
-EXPECTED_STEP = (
-    f"a relative step from {SMALLEST_STEP:.1e}, below which rounding takes more than half of the digits, to 1, such as "
-    "0.001"
-)
-
-
 def solve_rows(
     model: FEModel,
-    theta: ArrayLike,
+    theta: Array,
     method: str,
     shapes: Mapping[str, tuple[int, ...]],
     n_jobs: int | None,
     *,
     dofs: NDArray[np.intp] | None = None,
     progress: bool | None = False,
-) -> list[Array]:
-    """What a method of a model gives for every row of theta, NaN where theta has NaN; failures are one warning.
+) -> tuple[list[Array], list[SkthermoWarning]]:
+    """Results of a model's method for every row of theta, NaN where theta has NaN, with the findings about them.
 
     ``shapes`` names the results and gives the shape of each for one row; frequencies are the first. Shapes of modes are
     those at ``dofs``.
     """
-    rows = check_theta(theta, model.parameter_names, allow_nan=True)
-    results = [np.full((len(rows), *shape), np.nan) for shape in shapes.values()]
-    known = np.flatnonzero(~np.isnan(rows).any(axis=1))
+    results = [np.full((len(theta), *shape), np.nan) for shape in shapes.values()]
+    known = np.flatnonzero(~np.isnan(theta).any(axis=1))
     if not known.size:
-        return results
+        return results, []
     size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
     places = np.split(known, range(size, len(known), size))
     thread_safe = getattr(model, "thread_safe", False)
     job = Job(model.quiet() if thread_safe else model, method, dofs)  # type: ignore[attr-defined]
-    parts: Any
     if thread_safe and effective_n_jobs(n_jobs) == 1:
-        parts = map_on_blas_threads(job, [rows[place] for place in places])
+        parts = map_on_blas_threads(lambda rows: (job(rows), []), [theta[place] for place in places])
     else:
-        parallel = as_they_come(n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-        parts = parallel(delayed(on_one_thread)(job, rows[place]) for place in places)
-    with closing(parts) if hasattr(parts, "close") else nullcontext():
-        shown = with_progress(parts, len(known), progress, count=lambda part: len(part[0]))
-        for place, part in zip(places, shown, strict=True):
-            for result, array, what in zip(results, part, shapes, strict=True):
+        jobs = (delayed(on_one_thread)(job, theta[place]) for place in places)
+        parts = as_they_come(jobs, n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
+    findings: list[SkthermoWarning] = []
+    with closing(parts):
+        shown = with_progress(parts, len(known), progress, count=lambda part: len(np.atleast_1d(part[0][0])))
+        for place, (arrays, found) in zip(places, shown, strict=True):
+            findings += found
+            for result, array, what in zip(results, arrays, shapes, strict=True):
                 expected = (len(place), *shapes[what])
                 if np.shape(array) != expected:
                     raise ValueError(
@@ -90,8 +82,7 @@ def solve_rows(
                         "of theta"
                     )
                 result[place] = array
-    getattr(model, "warn_of", warn_of_failures)(rows, results[0])
-    return results
+    return results, [*findings, *getattr(model, "findings", failures)(theta, results[0])]
 
 
 class Job:
@@ -121,10 +112,10 @@ class Job:
         return 2**20
 
 
-def on_one_thread(job: Job, chunk: Array) -> tuple[Array, ...]:
-    """A job on a chunk of rows, with one thread of BLAS: its workers share the cores."""
-    with single_blas_thread():
-        return job(chunk)
+def on_one_thread(job: Job, chunk: Array) -> tuple[tuple[Array, ...], list[SkthermoWarning]]:
+    """A job on a chunk of rows, with one thread of BLAS: its workers share the cores; and what the model warns of."""
+    with single_blas_thread(), collected() as findings:
+        return job(chunk), findings
 
 
 def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, progress: bool | None = None) -> Array:
@@ -166,9 +157,25 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     array([[ 7.48, 27.5 ],
            [  nan,   nan]])
     """
+    rows = _read_rows(model, theta, n_jobs)
+    frequencies, findings = solve_frequencies(model, rows, n_jobs, progress)
+    warn_each(findings)
+    return frequencies
+
+
+def _read_rows(model: FEModel, theta: ArrayLike, n_jobs: int | None) -> Array:
     check_model(model)
     check_jobs(n_jobs)
-    return solve_rows(model, theta, "frequencies", {"frequencies": (model.n_modes,)}, n_jobs, progress=progress)[0]
+    return check_theta(theta, model.parameter_names, allow_nan=True)
+
+
+def solve_frequencies(
+    model: FEModel, theta: Array, n_jobs: int | None, progress: bool | None = False
+) -> tuple[Array, list[SkthermoWarning]]:
+    """Frequencies of rows of theta, and the findings about them."""
+    expected = {"frequencies": (model.n_modes,)}
+    (frequencies,), findings = solve_rows(model, theta, "frequencies", expected, n_jobs, progress=progress)
+    return frequencies, findings
 
 
 def evaluate_modes(
@@ -209,14 +216,21 @@ def evaluate_modes(
     >>> frequencies.shape, shapes.shape
     ((1, 6), (1, 2, 6))
     """
-    check_model(model)
-    check_jobs(n_jobs)
+    rows = _read_rows(model, theta, n_jobs)
+    (frequencies, shapes), findings = solve_modes(model, rows, dofs, n_jobs)
+    warn_each(findings)
+    return frequencies, shapes
+
+
+def solve_modes(
+    model: FEModel, theta: Array, dofs: ArrayLike, n_jobs: int | None
+) -> tuple[list[Array], list[SkthermoWarning]]:
+    """Frequencies and shapes of rows of theta, and the findings about them."""
     if not hasattr(model, "modes"):
         raise ValueError(f"{model!r} has no method 'modes'; expected a model that gives mode shapes, as AffineModel")
     places = _positions(model, dofs)
     expected = {"frequencies": (model.n_modes,), "shapes": (len(places), model.n_modes)}
-    frequencies, shapes = solve_rows(model, theta, "modes", expected, n_jobs, dofs=places)
-    return frequencies, shapes
+    return solve_rows(model, theta, "modes", expected, n_jobs, dofs=places)
 
 
 def _positions(model: Any, dofs: ArrayLike) -> NDArray[np.intp]:
@@ -271,19 +285,39 @@ def linearise(
     >>> jacobian[:, 0, 0].round(6)
     array([0.5, 0.5])
     """
-    check_model(model)
-    check_jobs(n_jobs)
-    rows = check_theta(theta, model.parameter_names, allow_nan=True)
-    if step is None and (hasattr(model, "linearised") or hasattr(model, "jacobian")):
-        expected = {"frequencies": (model.n_modes,), "derivatives": (model.n_modes, rows.shape[1])}
-        frequencies, jacobian = solve_rows(model, rows, "linearised", expected, n_jobs)
-    else:
-        size = USUAL_STEP if step is None else check_size(step, "step", SMALLEST_STEP, 1, EXPECTED_STEP)
-        frequencies = evaluate(model, rows, n_jobs=n_jobs)
-        jacobian = central_differences(partial(evaluate, model, n_jobs=n_jobs), rows, frequencies, size)
+    rows = _read_rows(model, theta, n_jobs)
+    (frequencies, jacobian), findings = solve_slopes(model, rows, step, n_jobs)
     if check_flag(relative, "relative"):
         jacobian = jacobian * rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
+    warn_each(findings)
     return frequencies, jacobian
+
+
+def solve_slopes(
+    model: FEModel, theta: Array, step: float | None, n_jobs: int | None
+) -> tuple[list[Array], list[SkthermoWarning]]:
+    """Frequencies of rows of theta and their derivatives, and the findings about them."""
+    if step is None and (hasattr(model, "linearised") or hasattr(model, "jacobian")):
+        expected = {"frequencies": (model.n_modes,), "derivatives": (model.n_modes, theta.shape[1])}
+        return solve_rows(model, theta, "linearised", expected, n_jobs)
+    frequencies, findings = solve_frequencies(model, theta, n_jobs)
+
+    def moved(rows: Array) -> Array:
+        there, found = solve_frequencies(model, rows, n_jobs)
+        findings.extend(found)
+        return there
+
+    return [frequencies, central_differences(moved, theta, frequencies, _step_size(step))], findings
+
+
+def _step_size(step: float | None) -> float:
+    """A relative step of central differences; below the smallest, rounding takes half of the digits of a frequency."""
+    lowest = float(np.sqrt(np.finfo(float).eps))
+    expected = (
+        f"a relative step from {lowest:.1e}, below which rounding takes more than half of the digits, to 1, such as "
+        "0.001"
+    )
+    return 0.001 if step is None else check_size(step, "step", lowest, 1, expected)
 
 
 def linearise_modes(
@@ -335,9 +369,7 @@ def linearise_modes(
     >>> [array.shape for array in linearise_modes(make_truss(), [[1.0, 1.0, 1.0, 1.0]], dofs=[0, 3, 8])]
     [(1, 6), (1, 6, 4), (1, 3, 6), (1, 3, 6, 4)]
     """
-    check_model(model)
-    check_jobs(n_jobs)
-    rows = check_theta(theta, model.parameter_names, allow_nan=True)
+    rows = _read_rows(model, theta, n_jobs)
     if step is None and (hasattr(model, "linearised_modes") or hasattr(model, "local_modes")):
         places = _positions(model, dofs)
         n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], len(places)
@@ -347,17 +379,28 @@ def linearise_modes(
             "shapes": (n_dofs, n_modes),
             "derivatives of shapes": (n_dofs, n_modes, n_parameters),
         }
-        solved = solve_rows(model, rows, "linearised_modes", expected, n_jobs, dofs=places)
-        return tuple(solved)  # type: ignore[return-value]
-    frequencies, jacobian = linearise(model, rows, step=step, n_jobs=n_jobs)
-    shapes = evaluate_modes(model, rows, dofs, n_jobs=n_jobs)[1]
+        results, findings = solve_rows(model, rows, "linearised_modes", expected, n_jobs, dofs=places)
+    else:
+        results, findings = _differenced_modes(model, rows, dofs, step, n_jobs)
+    warn_each(findings)
+    return tuple(results)  # type: ignore[return-value]
+
+
+def _differenced_modes(
+    model: FEModel, theta: Array, dofs: ArrayLike, step: float | None, n_jobs: int | None
+) -> tuple[list[Array], list[SkthermoWarning]]:
+    """The results of `linearise_modes` by central differences of the shapes, and the findings about them."""
+    (frequencies, jacobian), findings = solve_slopes(model, theta, step, n_jobs)
+    shapes = solve_modes(model, theta, dofs, n_jobs)[0][1]
 
     def with_the_same_signs(moved: Array) -> Array:
-        there = evaluate_modes(model, moved, dofs, n_jobs=n_jobs)[1]
-        reference = np.tile(np.repeat(shapes, rows.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
+        (_, there), found = solve_modes(model, moved, dofs, n_jobs)
+        findings.extend(found)
+        reference = np.tile(np.repeat(shapes, theta.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
         return there * np.sign(np.einsum("sdm,sdm->sm", there, reference))[:, np.newaxis]
 
-    return frequencies, jacobian, shapes, central_differences(with_the_same_signs, rows, shapes, step or USUAL_STEP)
+    slopes = central_differences(with_the_same_signs, theta, shapes, _step_size(step))
+    return [frequencies, jacobian, shapes, slopes], findings
 
 
 def add_noise(
@@ -474,10 +517,15 @@ def sample(
     theta = _unit_cube(method, n_samples, len(lowest), as_random_state(random_state))
     theta *= highest - lowest
     theta += lowest
-    if dofs is not None:
-        frequencies, shapes = evaluate_modes(model, theta, dofs, n_jobs=n_jobs)
-        return Samples(theta=theta, frequencies=frequencies, shapes=shapes)
-    return Samples(theta=theta, frequencies=evaluate(model, theta, n_jobs=n_jobs, progress=progress))
+    check_jobs(n_jobs)
+    if dofs is None:
+        frequencies, findings = solve_frequencies(model, theta, n_jobs, progress)
+        drawn = Samples(theta=theta, frequencies=frequencies)
+    else:
+        (frequencies, shapes), findings = solve_modes(model, theta, dofs, n_jobs)
+        drawn = Samples(theta=theta, frequencies=frequencies, shapes=shapes)
+    warn_each(findings)
+    return drawn
 
 
 def _unit_cube(method: str, n_samples: int, n_parameters: int, random_state: np.random.RandomState) -> Array:

@@ -16,10 +16,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
 
-VARIABLE = "SKTHERMO_SOLVER"
-SYMMETRIC = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-MINIMUM_DEGREE = "MMD_AT_PLUS_A"
-
+SYMMETRIC_MODE = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 
 Solve: TypeAlias = Callable[[Array], Array]
 """Gives the solution x of K x = b by the factors of a positive definite K, for one vector b or several side by side."""
@@ -34,16 +31,22 @@ class Elimination(Protocol):
 
 def elimination(rows: NDArray[np.int32], pointers: NDArray[np.int32]) -> Elimination:
     """The elimination of a pattern, given as compressed sparse columns with sorted rows, by the chosen solver."""
-    name = os.environ.get(VARIABLE, "superlu")
-    if name not in SOLVERS:
-        raise ValueError(f"{VARIABLE} is {name!r}; expected one of {list(SOLVERS)}")
-    return SOLVERS[name](rows, pointers)
+    eliminations = {"superlu": SuperLUElimination, "rslab": RslabElimination}
+    name = chosen_solver()
+    if name not in eliminations:
+        raise ValueError(f"SKTHERMO_SOLVER is {name!r}; expected one of {list(eliminations)}")
+    return eliminations[name](rows, pointers)
+
+
+def chosen_solver() -> str:
+    """The solver that the environment names."""
+    return os.environ.get("SKTHERMO_SOLVER", "superlu")
 
 
 def factorise(matrix: scipy.sparse.csc_array) -> Solve | None:
     """Solves with a single matrix; None where it is not positive definite."""
-    if os.environ.get(VARIABLE, "superlu") == "superlu":
-        factors = superlu(matrix, MINIMUM_DEGREE)
+    if chosen_solver() == "superlu":
+        factors = superlu(matrix, "MMD_AT_PLUS_A")
         return None if factors is None else factors.solve
     matrix = matrix.sorted_indices()
     return elimination(matrix.indices, matrix.indptr).factorise(matrix)
@@ -58,7 +61,7 @@ class SuperLUElimination:
         dominant = pattern + scipy.sparse.diags_array(np.diff(pointers) + 1.0, format="csc")
         # With all that may be dropped dropped, an incomplete factorisation costs little more than its order.
         incomplete = scipy.sparse.linalg.spilu(
-            dominant, drop_tol=1.0, fill_factor=1.0, permc_spec=MINIMUM_DEGREE, **SYMMETRIC
+            dominant, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", **SYMMETRIC_MODE
         )
         self._order = np.argsort(incomplete.perm_c)
         places = scipy.sparse.csc_array((np.arange(1, n_entries + 1), rows, pointers), shape=(n_dof, n_dof))
@@ -84,7 +87,7 @@ def solve_reordered(factors: scipy.sparse.linalg.SuperLU, order: NDArray[np.intp
 def superlu(matrix: scipy.sparse.csc_array, order: str, **options: int) -> scipy.sparse.linalg.SuperLU | None:
     """L U without pivoting, or None where a pivot is not positive: the matrix is not positive definite."""
     try:
-        factors = scipy.sparse.linalg.splu(matrix, permc_spec=order, **SYMMETRIC, **options)
+        factors = scipy.sparse.linalg.splu(matrix, permc_spec=order, **SYMMETRIC_MODE, **options)
     except RuntimeError:  # exactly singular
         return None
     return factors if (factors.U.diagonal() > 0).all() else None
@@ -125,12 +128,6 @@ def solve_by_rslab(factors: Any, columns: Array) -> Array:
     """Solve by rslab, which has one method for a vector and another for several."""
     solve = factors.solve if columns.ndim == 1 else factors.solve_many
     return np.asarray(solve(np.ascontiguousarray(columns)))
-
-
-SOLVERS: dict[str, Callable[[NDArray[np.int32], NDArray[np.int32]], Elimination]] = {
-    "superlu": SuperLUElimination,
-    "rslab": RslabElimination,
-}
 
 
 def _rslab() -> ModuleType:

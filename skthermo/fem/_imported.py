@@ -12,9 +12,6 @@ import scipy.sparse
 
 from skthermo._core.arrays import Array, Label, Matrix
 from skthermo.fem._structure import (
-    MASS,
-    SAME,
-    STIFFNESS,
     Assembled,
     Key,
     Structure,
@@ -132,11 +129,11 @@ class ImportedStructure(Structure):
 
     def _assembled(self, bindings: Mapping[str, Target], damageable: Mapping[str, Target]) -> Assembled:
         for name, (what, _, _) in {**bindings, **damageable}.items():
-            if what == MASS:
+            if what == "mass":
                 raise ValueError(f"{name!r} multiplies mass, which is not known by member; expected groups")
         members_of: dict[tuple[Key, Key], list[Hashable]] = {}
         for member in self._members:
-            key, damage = (tuple(self._bound(member, bound, STIFFNESS)) for bound in (bindings, damageable))
+            key, damage = (tuple(self._bound(member, bound, "stiffness")) for bound in (bindings, damageable))
             members_of.setdefault((key, damage), []).append(member)
         terms = [(key, self._sum_of(members)) for (key, _), members in members_of.items()]
         contents: list[list[tuple[Hashable, Key]]] = [[(one, ()) for one in members] for members in members_of.values()]
@@ -180,7 +177,7 @@ def matrices_by_member(
                 raise ValueError(f"members {owners[position]!r} and {member!r} share a term; expected one for each")
     none = scipy.sparse.csc_array(terms[0].shape)
     total = model.matrices(np.ones(len(known)))[0]
-    if abs(reduce(add, terms, none) - total).max() > SAME * abs(total).max():
+    if abs(reduce(add, terms, none) - total).max() > 1e-9 * abs(total).max():
         raise ValueError(f"{model!r} is damaged or calibrated; expected the model as the program has written it")
     matrices: dict[Hashable, Matrix] = {
         member: reduce(add, (terms[position] for position in known[member]), none) for member in members

@@ -35,6 +35,7 @@ class FEModel(Protocol):
     - ``local_modes(theta, follow=...)``, modes and their derivatives at one theta, as `LocalModes`, with ``n_dof``, and
       ``track``, whether a column follows its mode (True) or its rank (False);
     - ``groups`` and ``damaged(damage)``, damage groups by name, and a model with less stiffness in some;
+    - ``damage_directions(groups)``, relative changes of the frequencies per small loss of each group's stiffness;
     - ``with_damage_parameters(groups)``, a model whose theta ends with 1 - severity of each group;
     - ``with_mass_parameters(masses)``, a model whose theta ends with 1 + the amount of each added mass;
     - ``with_added(stiffness, mass)``, a model with further stiffness and mass;
@@ -44,8 +45,8 @@ class FEModel(Protocol):
     - ``reduction_pays(n_solves)``, whether ``reduced`` is expected to save time for so many rows of theta;
     - ``rows_per_chunk``, how many rows are best solved together; ``thread_safe``, whether several threads may ask it at
       the same time; ``prefer``, a hint to joblib, "threads" or "processes";
-    - ``quiet()``, the same model without warnings, for searches that may pass through theta of which it would warn, and
-      ``warn_of(theta, frequencies)``, which gives the warnings about a whole table and its solution.
+    - ``quiet()``, the same model without warnings, for searches that may pass through theta without a solution, and
+      ``findings(theta, frequencies)``, the list of its warnings about a whole table and its solution.
 
     scikit-learn's ``clone`` never copies a model in skthermo's estimators.
     """

@@ -12,9 +12,6 @@ from skthermo._core.arrays import Array, Label, Matrix, MatrixLike, real_array
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.elements import ROTATIONS, TRANSLATIONS, ByProperties, Dof, Element, check_element, check_matrices
 
-STIFFNESS = "stiffness"  # the whole stiffness of a group, whatever properties its members have
-MASS = "mass"  # the whole mass of a group
-
 Key = tuple[str, ...]
 
 
@@ -43,9 +40,9 @@ class TermAssembler:
             key = tuple(
                 parameter
                 for parameter, prop in bound.items()
-                for _ in range(1 if prop in (STIFFNESS, MASS) else properties.count(prop))
+                for _ in range(1 if prop in ("stiffness", "mass") else properties.count(prop))
             )
-            groups = frozenset(g for g, prop in (damage or {}).items() if prop in (STIFFNESS, *properties))
+            groups = frozenset(g for g, prop in (damage or {}).items() if prop in ("stiffness", *properties))
             block = matrix[square].ravel()
             self._entries.setdefault((key, groups), []).append((block, *grid))
             self._contents.setdefault((key, groups), []).append((member, properties))
@@ -83,16 +80,6 @@ class Assembled(NamedTuple):
     mass: list[tuple[Key, Matrix]] | Matrix
     scaled: dict[str, list[int]]
     contents: list[list[tuple[Hashable, Key]]]
-
-
-SAME = 1e-9  # relative difference of matrices up to which members are the model's
-
-EXPECTED = {
-    "nodes": "a mapping of node to coordinates",
-    "members": "a mapping of member to element",
-    "supports": "a mapping of node to directions, such as {'left': 'xy'}, or {} where springs hold the structure",
-    "groups": "a mapping of group to members",
-}
 
 
 class Structure:
@@ -146,10 +133,19 @@ class Structure:
         supports: Mapping[Hashable, Collection[str]],
         groups: Mapping[str, Collection[Hashable]] | None = None,
     ):
-        arguments = {"nodes": nodes, "members": members, "supports": supports, "groups": groups or {}}
-        for what, argument in arguments.items():
+        arguments = (
+            ("nodes", nodes, "a mapping of node to coordinates"),
+            ("members", members, "a mapping of member to element"),
+            (
+                "supports",
+                supports,
+                "a mapping of node to directions, such as {'left': 'xy'}, or {} where springs hold the structure",
+            ),
+            ("groups", groups or {}, "a mapping of group to members"),
+        )
+        for what, argument, expected in arguments:
             if not isinstance(argument, Mapping):
-                raise ValueError(f"{what} is {argument!r:.200}; expected {EXPECTED[what]}")
+                raise ValueError(f"{what} is {argument!r:.200}; expected {expected}")
         self._coordinates = _read_nodes(nodes)
         self._members = dict(members)
         places = np.array(list(self._coordinates.values()))
@@ -245,11 +241,11 @@ class Structure:
         for name, element in self._members.items():
             coordinates = np.array([self._coordinates[node] for node in element.nodes])
             dofs = element.dofs(self.dimension)
-            damage = self._bound(name, damageable, STIFFNESS)
-            matrices = check_matrices(name, element, element.stiffness(coordinates), len(dofs), STIFFNESS)
-            stiffness.add(name, matrices, dofs, self._bound(name, bindings, STIFFNESS), damage)
-            masses = check_matrices(name, element, element.mass(coordinates), len(dofs), MASS)
-            mass.add(name, masses, dofs, self._bound(name, bindings, MASS))
+            damage = self._bound(name, damageable, "stiffness")
+            matrices = check_matrices(name, element, element.stiffness(coordinates), len(dofs), "stiffness")
+            stiffness.add(name, matrices, dofs, self._bound(name, bindings, "stiffness"), damage)
+            masses = check_matrices(name, element, element.mass(coordinates), len(dofs), "mass")
+            mass.add(name, masses, dofs, self._bound(name, bindings, "mass"))
         scaled = {name: stiffness.positions(name) for name in damageable}
         return Assembled(stiffness.terms(), mass.terms(), scaled, stiffness.contents)
 
@@ -328,7 +324,7 @@ class Structure:
                 raise ValueError(
                     f"member {member!r} of the model is not in the structure; expected the model's structure"
                 )
-            part = {part_of[member]: STIFFNESS} if member in part_of else {}
+            part = {part_of[member]: "stiffness"} if member in part_of else {}
             assembler.add(member, {properties: matrices[properties]}, element.dofs(self.dimension), {}, part)
         summed = [matrix for _, matrix in assembler.terms()]
         check_same(sum(summed), term, contents)
@@ -355,16 +351,16 @@ class Structure:
             if not isinstance(target, str) and not (isinstance(target, Sequence) and len(target) in (2, 3)):
                 expected = "a group, (property, group) or (property, group, matrix)"
                 raise ValueError(f"{what} {name!r} is {target!r}; expected {expected}")
-            prop, group, *where = (STIFFNESS, target) if isinstance(target, str) else target
-            matrices = (prop,) if prop in (STIFFNESS, MASS) else (STIFFNESS, MASS)
+            prop, group, *where = ("stiffness", target) if isinstance(target, str) else target
+            matrices = (prop,) if prop in ("stiffness", "mass") else ("stiffness", "mass")
             if not set(where) <= set(matrices):
                 raise ValueError(f"{what} {name!r} is {target!r}; expected {' or '.join(matrices)} as its matrix")
             members = self._groups[self._known(group, f"{what} {name!r}")]
             known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
-            if prop not in known | {STIFFNESS, MASS}:
+            if prop not in known | {"stiffness", "mass"}:
                 raise ValueError(
                     f"{what} {name!r} is the property {prop!r} of group {group!r}; "
-                    f"expected {STIFFNESS!r}, {MASS!r} or one of {sorted(known)}"
+                    f"expected 'stiffness', 'mass' or one of {sorted(known)}"
                 )
             bindings[name] = (prop, group, tuple(where) or matrices)
         return bindings
@@ -427,7 +423,7 @@ class Structure:
 
 def check_same(summed: Matrix, term: Matrix, contents: Sequence[tuple[Hashable, Key]]) -> None:
     """Raise an error if the matrices of a term's members do not add up to the term."""
-    if abs(summed - term).max() > SAME * abs(term).max():
+    if abs(summed - term).max() > 1e-9 * abs(term).max():
         raise ValueError(
             f"members such as {contents[0][0]!r} have another stiffness in the model than in the structure; "
             "expected the structure that assembled the model"

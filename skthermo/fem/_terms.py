@@ -13,28 +13,24 @@ import scipy.sparse
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import ModelWarning
+from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._factors import Elimination, elimination
 
 Key = tuple[str, ...]
 
 ROWS_PER_CHUNK = 256  # largest number of samples solved together
-LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably a percentage given instead of a fraction
 
 
-def warn_of_failures(theta: Array, solved: Array) -> None:
-    """Warn of rows without NaN that have no solution: their number and the theta of the first."""
-    failed = np.isnan(solved).any(axis=tuple(range(1, solved.ndim))) & ~np.isnan(theta).any(axis=1)
-    if failed.any():
-        first = np.flatnonzero(failed)[0]
-        warn_user(
-            f"{failed.sum()} of {len(theta)} samples are NaN: their stiffness is not positive definite, or the solver "
-            f"failed. The first is theta = {theta[first].tolist()} (row {first}). Narrow the bounds, or correct the "
-            "model there",
-            ModelWarning,
-            "no-solution",
-        )
+def failures(theta: Array, frequencies: Array) -> list[SkthermoWarning]:
+    """The finding that some rows of known theta have no solution."""
+    failed = np.isnan(frequencies).any(axis=1) & ~np.isnan(theta).any(axis=1)
+    if not failed.any():
+        return []
+    text = (
+        "some rows of theta have no solution, and their frequencies are NaN: the stiffness there is not positive "
+        "definite, or the solver failed. Narrow the bounds, or correct the model there"
+    )
+    return [ModelWarning(text, "no-solution")]
 
 
 def by_name(row: Array, parameter_names: Sequence[str]) -> dict[str, float]:
@@ -65,18 +61,18 @@ def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
     return names
 
 
-def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
-    """Checks that groups are known and that severities leave some stiffness."""
+def check_severities(damage: Mapping[str, float], groups, *, lowest: float = -10.0) -> Mapping[str, float]:
+    """Check that groups are known, and severities leave some stiffness and are no percentages."""
     damage = as_mapping(damage)
     if not isinstance(damage, Mapping):
         raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
     for group, severity in damage.items():
         if group not in groups:
             raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
-        if not (is_real(severity) and LOWEST_SEVERITY <= float(severity) < 1):
+        if not (is_real(severity) and lowest <= float(severity) < 1):
             raise ValueError(
                 f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below "
-                f"{LOWEST_SEVERITY:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
+                f"{lowest:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
             )
     return damage
 
@@ -124,9 +120,6 @@ def read_matrix(matrix, what: str, n_dof: int | None) -> Matrix:
             f"{array[row, column]} and {array[column, row]}"
         )
     return (array + array.T) / 2
-
-
-SPARSE_ROWS_PER_CHUNK = 16  # sparse samples are solved one by one; a few of them are enough work for one task
 
 
 class AffineTerms(ABC):
@@ -288,7 +281,7 @@ class SparseTerms(AffineTerms):
     with ``entries`` and has the same pattern whatever theta is.
     """
 
-    is_dense, max_rows = False, SPARSE_ROWS_PER_CHUNK
+    is_dense, max_rows = False, 16  # sparse samples are solved one by one; a few of them are enough work for one task
 
     def __init__(self, entries: scipy.sparse.csc_array, pattern: SparsityPattern, exponents: NDArray[np.int64]):
         super().__init__(exponents)

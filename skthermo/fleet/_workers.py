@@ -19,14 +19,15 @@ from typing import Any, NamedTuple
 import joblib
 import numpy as np
 import pandas as pd
+import sklearn
 from joblib import Parallel, delayed, effective_n_jobs, parallel_config, wrap_non_picklable_objects
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
+import skthermo
 from skthermo._core.answers import content_of
 from skthermo._core.estimators import seed_parts
-from skthermo._core.memory import identity_of
-from skthermo._core.parallel import single_blas_thread, without_bars
+from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import counted_warnings
 from skthermo.metrics import mape
 from skthermo.monitoring import Monitor, MonitorStatus
@@ -136,7 +137,8 @@ class BridgeFit:
                 stage = "maker"
                 estimator = clone(call(self.maker))
                 seed_parts(estimator, np.random.RandomState(self.seed))
-                content = identity_of(joblib.__version__, *map(content_or_code, (estimator, T, F, self.monitor)))
+                versions = skthermo.__version__, sklearn.__version__, joblib.__version__
+                content = content_of(*versions, *map(content_or_code, (estimator, T, F, self.monitor)))
                 if self.known is not None and self.known.content == content:
                     return Result(self.known, is_as_before=True)
                 outcome, stage = replace(outcome, content=content), "fit"
@@ -225,11 +227,10 @@ def not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warn
 
 @contextmanager
 def _on_its_own() -> Iterator[Counter[tuple[str, str]]]:
-    """Work of one bridge: one core, no bar, its own warnings."""
+    """Work of one bridge: one core, its own warnings."""
     with ExitStack() as stack:
         stack.enter_context(parallel_config("sequential"))
         stack.enter_context(single_blas_thread())
-        stack.enter_context(without_bars())
         yield stack.enter_context(counted_warnings())
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._core.arrays import is_labelled, real_array
 from skthermo._core.frames import check_same_rows, row_times, time_of
-from skthermo._core.warnings import warn_user
+from skthermo._core.warnings import warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 
 
@@ -206,10 +206,6 @@ def _share_above(damage_index: ArrayLike, threshold: float) -> float:
     index, limit = _checked(damage_index, threshold)
     present = index[~np.isnan(index)]
     if len(present) < len(index):
-        warn_user(
-            f"{len(index) - len(present)} of {len(index)} records are not evaluated: their damage index is NaN. The "
-            f"rate is that of the other {len(present)}",
-            UnevaluatedRowsWarning,
-            "not-evaluated",
-        )
+        text = "records without a damage index (NaN) are not evaluated. The rate is that of the others"
+        warn_each([UnevaluatedRowsWarning(text, "not-evaluated")])
     return float((present > limit).mean()) if present.size else float("nan")

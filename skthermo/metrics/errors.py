@@ -11,9 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.metrics import r2_score
 
 from skthermo._core.arrays import as_columns, real_array
-from skthermo._core.frames import MARKERS, check_same_rows, column_names, row_weights
-
-AVERAGE = "Average"
+from skthermo._core.frames import MISSING_CODES, check_same_rows, column_names, row_weights
 
 
 def mape(y_true: ArrayLike, y_pred: ArrayLike) -> NDArray[np.float64]:
@@ -87,14 +85,14 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
         raise ValueError(f"scenarios has shape {labels.shape}; expected ({len(measured)},), one for each row")
     if pd.isna(labels).any():
         raise ValueError(f"the scenario of row {np.flatnonzero(pd.isna(labels))[0]} is missing; expected one")
-    if AVERAGE in labels:
-        raise ValueError(f"a scenario is called {AVERAGE!r}; expected another name: it is that of the averages")
+    if "Average" in labels:
+        raise ValueError("a scenario is called 'Average'; expected another name: it is that of the averages")
     table = pd.DataFrame(
         {label: _percentages(measured[labels == label], predicted[labels == label]) for label in dict.fromkeys(labels)},
         index=column_names(y_true, "f"),
     ).T
-    table.loc[AVERAGE] = table.mean()
-    table[AVERAGE] = table.mean(axis=1)
+    table.loc["Average"] = table.mean()
+    table["Average"] = table.mean(axis=1)
     return table
 
 
@@ -205,7 +203,7 @@ def _paired(
         _refuse(np.isinf(values), table, name, "a finite number, or NaN where a value is missing")
     if are_frequencies:
         _refuse(measured <= 0, y_true, "y_true", "a positive frequency, or NaN where it is missing")
-        _refuse(np.isin(predicted, MARKERS), y_pred, "y_pred", "a frequency, or NaN where it is missing")
+        _refuse(np.isin(predicted, MISSING_CODES), y_pred, "y_pred", "a frequency, or NaN where it is missing")
     return measured, predicted
 
 

@@ -20,11 +20,10 @@ from skthermo._core.frames import DAY, check_duration, usual_step
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo.detection import (
+    CompensatedDetector,
     DirectionalDetector,
-    FusedDetector,
     OutlierDetector,
     TemperatureCompensator,
-    WindowedAlarm,
 )
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._corrections import Corrections
@@ -52,7 +51,7 @@ PROBED = (5.0, 20.0, 80.0)  # standard deviations by which each response is lowe
 
 
 @dataclass(frozen=True)
-class Branch:
+class DetectorParts:
     """A detector, the steps before it, and the compensator among these; without one, the detector alone."""
 
     steps: list[Any]
@@ -60,24 +59,30 @@ class Branch:
     last: Any
 
     @classmethod
-    def all_of(cls, detector: Any) -> Iterator[Branch]:
-        """The one of a fitted detector, or those of each that a fused detector holds."""
-        last = last_step(detector)
-        if isinstance(last, FusedDetector):
-            for inner in last.detectors_:
-                yield from cls.all_of(inner)
-            return
-        *steps, _ = _steps(detector)
-        compensator = None
-        for step in reversed(steps):
-            compensator = step if isinstance(step, TemperatureCompensator) else compensator
-        yield cls(steps, compensator, last)
+    def read(cls, detector: Any) -> DetectorParts:
+        """Those of a fitted detector, in the last step of its pipeline or search."""
+        *steps, last = [*_steps(detector)]
+        compensators = [step for step in steps if isinstance(step, TemperatureCompensator)]
+        return cls(steps, compensators[0] if compensators else None, last)
 
     @property
     def directional(self) -> DirectionalDetector | None:
-        """The fitted detector that has directions of damage groups, alone or in a window."""
-        one = getattr(self.last, "detector_", self.last)
+        """The fitted detector that has directions of damage groups."""
+        one = self.last.detectors_[0] if isinstance(self.last, CompensatedDetector) else self.last
         return one if isinstance(one, DirectionalDetector) and not isinstance(one.directions, str) else None
+
+    @property
+    def needs_every_mode(self) -> bool:
+        one = self.last.detectors_[0] if isinstance(self.last, CompensatedDetector) else self.last
+        return isinstance(one, OutlierDetector)
+
+    @property
+    def has_window(self) -> bool:
+        return getattr(self.last, "window", None) is not None
+
+    @property
+    def compensates(self) -> bool:
+        return self.compensator is not None or isinstance(self.last, CompensatedDetector)
 
     def explanations(self, records: pd.DataFrame) -> tuple[pd.DataFrame, Array] | None:
         """Effects of losses of the damage groups in standard deviations, and the share of departures that they explain.
@@ -85,7 +90,7 @@ class Branch:
         None without a detector that has such directions.
         """
         directional = self.directional
-        if directional is None or not hasattr(self.last, "severities"):
+        if directional is None:
             return None
         table: Any = records
         for step in self.steps:
@@ -95,20 +100,19 @@ class Branch:
 
     def standard(self, records: pd.DataFrame, usual: tuple[Array, Array], targets: list[Any]) -> Array:
         """Residuals of records in standard deviations, or responses without a compensator; NaN for other targets."""
-        if self.compensator is None:
+        if not self.compensates:
             mean, deviation = usual
             return (as_floats(records[targets]) - mean) / deviation
-        table: Any = records
-        for step in self.steps[: self.steps.index(self.compensator)]:
+        table, whole = records, isinstance(self.last, CompensatedDetector)
+        for step in self.steps if whole else self.steps[: self.steps.index(self.compensator)]:
             table = step.transform(table)
-        residuals = as_floats(self.compensator.transform(table))
-        if self.compensator.whiten is None:
-            overall = self.compensator.spread_.overall
-            deviation = np.sqrt(np.diag(overall.covariance))
-            residuals = (residuals - overall.mean) / np.where(deviation > 0, deviation, 1.0)
-        names = list(self.compensator.get_feature_names_out())
+        part: Any = self.last.compensator_ if whole else self.compensator
+        residuals = as_floats(self.last.residuals(table) if whole else part.transform(table))
+        scale = self.last.scale_ if whole else part.scale_
+        residuals = residuals / np.where(scale > 0, scale, 1.0)
+        names = list(part.get_feature_names_out())
         if not set(names) <= set(targets):  # a step before has made arrays of the records
-            return residuals[:, np.argsort(self.compensator.targets_)]
+            return residuals[:, np.argsort(part.targets_)]
         return pd.DataFrame(residuals, columns=names).reindex(columns=targets).to_numpy()
 
 
@@ -180,6 +184,11 @@ class ActiveDetector(SavesFrames):
         smallest = smallest_at(damage.rule.threshold)
         parts = (memory, columns, temperatures, targets, usual, weather, corrections, smallest, estimates)
         return cls(detector, trained, *parts)
+
+    @property
+    def parts(self) -> DetectorParts:
+        """Detector, steps before it and compensator."""
+        return DetectorParts.read(self.detector)
 
     @property
     def rules(self) -> dict[str, EventRule]:
@@ -300,18 +309,12 @@ class ActiveDetector(SavesFrames):
             return modes, effects
         start = self.memory.start(records.index.asi8, first + rows[0])
         part, places = records.iloc[start : first + rows[-1] + 1][self.columns], first + rows - start
-        sizes, found = [], None
-        for branch in Branch.all_of(self.detector):
-            with without_warnings():
-                standard = branch.standard(part, self.usual, self.targets)
-                found = branch.explanations(part) if found is None else found
-            if isinstance(branch.last, WindowedAlarm):
-                standard = _window_means(standard, branch.last, part.index.asi8, places)
-            else:
-                standard = standard[places]
-            sizes.append(np.nan_to_num(np.abs(standard)))
+        with without_warnings():
+            standard = self.parts.standard(part, self.usual, self.targets)[places]
+            found = self.parts.explanations(part)
+        sizes = np.nan_to_num(np.abs(standard))
         names = list(map(str, self.targets))
-        for row, size in zip(rows, np.round(np.mean(sizes, axis=0), 2), strict=True):
+        for row, size in zip(rows, np.round(sizes, 2), strict=True):
             modes[row] = ", ".join(leading(dict(zip(names, size, strict=True))))
         if found is not None:
             table, shares = np.round(found[0].iloc[places], 2), np.round(found[1][places], 4)
@@ -323,28 +326,25 @@ class ActiveDetector(SavesFrames):
     def causes(self, records: pd.DataFrame, rows: NDArray[np.intp]) -> list[str]:
         if not len(rows):
             return []
-        branches = list(Branch.all_of(self.detector))
         start = self.memory.start(records.index.asi8, rows[0])
         part, places = records.iloc[start : rows[-1] + 1], rows - start
         with without_warnings():
-            standards = [branch.standard(part[self.columns], self.usual, self.targets)[places] for branch in branches]
+            standard = self.parts.standard(part[self.columns], self.usual, self.targets)[places]
         F, T = (as_floats(part[names])[places] for names in (self.targets, self.temperatures))
-        compensates = any(branch.compensator is not None for branch in branches)
-        unknown = np.isnan(np.concatenate(standards, axis=1)).all(axis=1)
+        unknown = np.isnan(standard).all(axis=1)
         causes = []
         for n in range(len(rows)):
             missing = [str(name) for name, value in zip(self.targets, F[n], strict=True) if np.isnan(value)]
             if len(missing) == len(self.targets):
                 causes.append("no mode has a value")
-            elif compensates and np.isnan(T[n]).all():
+            elif self.parts.compensates and np.isnan(T[n]).all():
                 causes.append("no temperature has a value")
+            elif self.parts.has_window:
+                causes.append("its window holds too few records with a value")
             elif unknown[n]:
                 causes.append("lags find no record, or a value before it is missing")
-            elif missing and all(isinstance(branch.last, OutlierDetector) for branch in branches):
+            elif missing and self.parts.needs_every_mode:
                 causes.append(f"{', '.join(missing)} missing, and the detector needs every mode")
-            elif any(isinstance(branch.last, WindowedAlarm) for branch in branches):
-                fewest = min(branch.last.fewest_ for branch in branches if isinstance(branch.last, WindowedAlarm))
-                causes.append(f"its window holds fewer than {fewest} records with a value")
             else:
                 causes.append("the detector gives no damage index")
         return causes
@@ -367,11 +367,10 @@ class ActiveDetector(SavesFrames):
 
     def _without_values(self, records: pd.DataFrame, first: int) -> dict[int, str]:
         """Which records from a position on say nothing themselves, so that others of their windows are evaluated."""
-        branches = list(Branch.all_of(self.detector))
-        if not any(isinstance(branch.last, WindowedAlarm) for branch in branches):
+        if not self.parts.has_window:
             return {}
         lacking = {"mode": self.targets}
-        if all(branch.compensator is not None for branch in branches):
+        if self.parts.compensates:
             lacking["temperature"] = self.temperatures
         found = {}
         for what, names in lacking.items():
@@ -406,11 +405,11 @@ def _index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array
 
 def _losses_of(detector: Any) -> pd.DataFrame | None:
     """Loss of each damage group that moves a record by one standard deviation, and the relative changes by it."""
-    found = [branch.directional for branch in Branch.all_of(detector) if branch.directional is not None]
-    if not found:
+    directional = DetectorParts.read(detector).directional
+    if directional is None:
         return None
-    seen = found[0].sensitivities_[found[0].sensitivities_ > 0]
-    return found[0].directions_.loc[seen.index].div(seen, axis=0).assign(loss=1 / seen)
+    seen = directional.sensitivities_[directional.sensitivities_ > 0]
+    return directional.directions_.loc[seen.index].div(seen, axis=0).assign(loss=1 / seen)
 
 
 def _names_together(detector: DirectionalDetector) -> dict[str, str]:
@@ -421,13 +420,3 @@ def _names_together(detector: DirectionalDetector) -> dict[str, str]:
         alike.loc[one, other] = 1.0
     together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
     return {name: " or ".join(names[together == together[name]]) for name in names}
-
-
-def _window_means(standard: Array, alarm: WindowedAlarm, times: NDArray[np.int64], rows: NDArray[np.intp]) -> Array:
-    """Means over the windows that end with some records; in their own standard deviations under the rule "mean"."""
-    memory, correlation = Memory.of(alarm), getattr(alarm.law_, "correlation", 1.0)
-    windows = [standard[memory.start(times, row) : row + 1] for row in rows]
-    with without_warnings():  # a mode that has no value in a window
-        means = np.array([np.nanmean(window, axis=0) for window in windows])
-    counts = np.array([np.maximum((~np.isnan(window)).sum(axis=0), 1) for window in windows])
-    return means / np.sqrt((1 - correlation) / counts + correlation)

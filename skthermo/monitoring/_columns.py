@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, clone
-from sklearn.pipeline import make_pipeline
 
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import positions_of
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import (
+    CompensatedDetector,
+    DirectionalDetector,
+    MahalanobisDetector,
+    TemperatureCompensator,
+)
 from skthermo.preprocessing.checks import SetAside, set_aside
 
 
@@ -32,7 +36,7 @@ class Columns:
     def of(cls, monitor: Any, detector: BaseEstimator, columns: list[Any]) -> Columns:
         """Those of a baseline, by the parameters of a monitor and the compensators of its detector."""
         parts = [detector, *detector.get_params(deep=True).values()]
-        compensators = [part for part in parts if isinstance(part, TemperatureCompensator)]
+        compensators = [part for part in parts if isinstance(part, TemperatureCompensator | CompensatedDetector)]
         reference = _among(monitor.reference or [], columns, "reference")
         inputs = [name for name in columns if name not in reference]
         places = [positions_of(one.targets, len(inputs), inputs) for one in compensators]
@@ -43,8 +47,6 @@ class Columns:
 
 def default_detector(monitor: Any, columns: list[Any]) -> BaseEstimator:
     """Directions of damage for responses in Hz, the Mahalanobis distance for others, of what the rest leaves."""
-    from skthermo.surrogate import TemperatureMapper  # a monitor with a detector of its own needs no surrogate
-
     reference = _among(monitor.reference or [], columns, "reference")
     inputs = [name for name in columns if name not in reference]
     targets = _responses(monitor, inputs, None)
@@ -53,7 +55,7 @@ def default_detector(monitor: Any, columns: list[Any]) -> BaseEstimator:
     last = DirectionalDetector(directions) if in_hertz else MahalanobisDetector()
     if len(targets) == len(inputs):
         return last
-    return make_pipeline(TemperatureCompensator(TemperatureMapper(), targets=targets), last)
+    return CompensatedDetector(last, targets=targets)
 
 
 def _responses(monitor: Any, columns: list[Any], own: list[Any] | None) -> list[Any]:
@@ -112,7 +114,7 @@ def usable_baseline(monitor: Any, baseline: pd.DataFrame) -> tuple[pd.DataFrame,
     if is_default:
         detector = default_detector(wanted, list(records.columns))
     for part in (detector, *detector.get_params(deep=True).values()):
-        if isinstance(part, TemperatureCompensator):
+        if isinstance(part, TemperatureCompensator | CompensatedDetector):
             part.set_params(targets=wanted.targets)
     return records, detector, Columns.of(wanted, detector, list(records.columns)), found
 

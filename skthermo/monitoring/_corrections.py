@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
-from skthermo._core.frames import MARKERS
+from skthermo._core.frames import MISSING_CODES
 from skthermo.monitoring.drift import DriftFollower
 from skthermo.monitoring.sensors import Dispute, SensorWatch
 from skthermo.preprocessing.checks import Plausible
@@ -82,7 +82,7 @@ class Corrections:
         sensors: bool = True,
     ) -> Corrections:
         """Learned from a raw baseline; drift is followed where there is a chain."""
-        plausible = Plausible.of(baseline, targets)
+        plausible = Plausible.learned(baseline, targets)
         cleaned = baseline.mask(plausible.implausible(baseline.to_numpy()))
         T, F = cleaned.drop(columns=targets), cleaned[targets]
         watch = SensorWatch.of(T, F, reference=reference, units=units) if sensors else None
@@ -108,7 +108,7 @@ class Corrections:
             T_seen, F_seen = self._masked(state, T, F)
             drift = self.drift.advance(drift, T_seen, F_seen.where(F_seen > 0))
         if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
-            seen = raw if day is raw else raw.mask(day.isna() & (raw.isin(MARKERS) | np.isinf(raw)))
+            seen = raw if day is raw else raw.mask(day.isna() & (raw.isin(MISSING_CODES) | np.isinf(raw)))
             sensors = self.sensors.advance(sensors, seen[self.temperatures], seen[self.targets])
         return CorrectionState(sensors, drift)
 

@@ -49,7 +49,7 @@ class Monitor(SavesFrames, Estimator):
     ----------
     detector : detector or Pipeline, optional
         Any detector of ``skthermo.detection``, or a pipeline that ends with one, such as
-        ``make_pipeline(TemperatureCompensator(...), WindowedAlarm("24h"))``. One without a compensator sees the
+        ``CompensatedDetector(targets=..., window="1D")``. One without a compensator sees the
         frequencies only. By default a `~skthermo.surrogate.TemperatureMapper` predicts the ``targets`` from the other
         columns, if there are any. Then a `~skthermo.detection.DirectionalDetector` evaluates responses in Hz, with the
         directions of ``fem`` if there is one, and a `~skthermo.detection.MahalanobisDetector` any others: only
@@ -155,7 +155,7 @@ class Monitor(SavesFrames, Estimator):
 
     See Also
     --------
-    skthermo.detection.WindowedAlarm : Alarms by several records in a row.
+    skthermo.detection.CompensatedDetector : Regression, regimes, windows and a detector.
 
     Notes
     -----

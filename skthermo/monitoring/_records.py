@@ -15,10 +15,10 @@ from sklearn.base import BaseEstimator
 from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import as_floats, is_model, refuse_no_table
-from skthermo._core.estimators import with_nan
 from skthermo._core.frames import DAY_NS, YEAR, usual_step
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import duration_text
+from skthermo.detection import CompensatedDetector
 from skthermo.preprocessing import HampelFilter
 
 JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong
@@ -56,8 +56,8 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
                 "tz_localize or tz_convert gives"
             )
         X = X.loc[:, list(columns)]
-    refuse_no_table(X, "the table of records", least_rows=0)
-    values = as_floats(with_nan(X))
+    refuse_no_table(X, "the table of records")
+    values = as_floats(X)
     stamps = X.index.as_unit("ns")
     stamps.freq = None  # that of one batch is not that of its parts
     frame = pd.DataFrame(values, stamps, X.columns)
@@ -231,6 +231,9 @@ def _paths(part: Any, seen: set[int]) -> set[Path]:
     """Ways through a fitted part, each with the reaches on it."""
     if id(part) in seen:
         return {()}
+    if isinstance(part, CompensatedDetector):
+        before = _paths(part.compensator_, seen)
+        return {way + more for way in _paths(part.means_, seen) for more in before}
     if isinstance(part, Pipeline):
         ways: set[Path] = {()}
         for _, step in reversed(part.steps):

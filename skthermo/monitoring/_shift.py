@@ -16,7 +16,7 @@ from skthermo._core.arrays import Array
 from skthermo._core.frames import correlation_time
 from skthermo._core.text import probability_text
 from skthermo._core.warnings import without_warnings
-from skthermo.detection import TemperatureCompensator
+from skthermo.detection import CompensatedDetector, TemperatureCompensator
 from skthermo.monitoring._threshold import WEEK, blocks_of
 from skthermo.residuals.gaussian import Gaussian
 
@@ -60,14 +60,12 @@ class WeatherFree:
         level, is_relative = records[targets].mean(), records[targets].min() > 0
         if len(records.columns) == len(targets):
             return cls((records[targets] - level) / level.where(is_relative, 1.0), level, is_relative, None, WEEK)
-        within = [one for one in detector.get_params().values() if isinstance(one, TemperatureCompensator)]
-        plain = clone(within[0]).set_params(whiten=None) if within else _piecewise_linear(targets)
+        plain = _regression(detector, targets)
         with without_warnings():
             left = np.asarray(plain.fit_transform(records))
         named = pd.DataFrame(left, records.index, list(plain.get_feature_names_out()))[targets]
-        block = plain.block_ if isinstance(plain.block_, np.timedelta64) else WEEK
-        rest = _relative(records[targets], named, is_relative)
-        return cls(rest, level, is_relative, plain, max(pd.Timedelta(block), WEEK))
+        is_relative = pd.Series(plain.relative_, plain.get_feature_names_out())[targets]
+        return cls(named, level, is_relative, plain, WEEK)
 
     @property
     def scale(self) -> pd.Series:
@@ -81,19 +79,17 @@ class WeatherFree:
             return (records[targets] - self.level) / self.scale
         with without_warnings():
             left = np.asarray(self.compensator.transform(records))
-        named = pd.DataFrame(left, records.index, list(self.compensator.get_feature_names_out()))
-        return _relative(records[targets], named[targets], self.is_relative)
+        return pd.DataFrame(left, records.index, list(self.compensator.get_feature_names_out()))[targets]
 
 
-def _relative(measured: pd.DataFrame, residuals: pd.DataFrame, is_relative: pd.Series) -> pd.DataFrame:
-    """Residuals, over predictions where they are relative."""
-    return residuals / np.where(is_relative, measured - residuals, 1.0)
-
-
-def _piecewise_linear(targets: list[Any]) -> TemperatureCompensator:
-    from skthermo.surrogate import TemperatureMapper  # monitors with a regression of their own need no chain
-
-    return TemperatureCompensator(TemperatureMapper(), targets=targets, whiten=None)
+def _regression(detector: BaseEstimator, targets: list[Any]) -> TemperatureCompensator:
+    """The regression within a detector, or the default one."""
+    for part in (detector, *detector.get_params().values()):
+        if isinstance(part, TemperatureCompensator):
+            return clone(part)
+        if isinstance(part, CompensatedDetector):
+            return TemperatureCompensator(part.regressor, targets=part.targets, cv=part.cv)
+    return TemperatureCompensator(targets=targets)
 
 
 @dataclass(frozen=True)
@@ -150,7 +146,7 @@ class LevelShift:
         rest = np.where(known, y - x * change, np.nan)
         blocks = blocks_of(free.residuals.index, free.block)
         covariance, n_independent = _of_means(rest, x / weight, blocks)
-        scatter = Gaussian.of(rest).covariance
+        scatter = Gaussian.fitted(rest).covariance
         size = float(Gaussian(np.zeros(len(change)), scatter).distances(change[np.newaxis])[0])
         of_mode = (
             pd.Series(one, free.residuals.columns)
@@ -247,7 +243,7 @@ def _of_means(rest: Array, weights: Array, blocks: NDArray[np.intp]) -> tuple[Ar
     if n_blocks < n_modes + 3 or np.isnan(means).all(axis=0).any():
         return np.full((n_modes, n_modes), np.nan), 0.0
     lasting = max(float(np.mean([correlation_time(column) for column in means.T])), 1.0)
-    together = Gaussian.of(means).covariance * n_blocks / (n_blocks - 1)
+    together = Gaussian.fitted(means).covariance * n_blocks / (n_blocks - 1)
     return together * np.sqrt(np.outer(*2 * [(weight**2).sum(axis=0)])) * lasting, n_blocks / lasting
 
 
@@ -267,4 +263,5 @@ def _beside(weather: pd.DataFrame, profiles: dict[str, Array]) -> Array:
     if not len(weather.columns):
         return (together - together.mean()).to_numpy()
     with without_warnings():
-        return np.asarray(_piecewise_linear(list(profiles)).fit_transform(weather.join(1 + together)))
+        below_zero = together - 2  # so that residuals are differences
+        return np.asarray(TemperatureCompensator(targets=list(profiles)).fit_transform(weather.join(below_zero)))

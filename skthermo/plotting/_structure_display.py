@@ -136,7 +136,7 @@ class StructureDisplay(Display):
 
         Parameters
         ----------
-        detector : DirectionalDetector, WindowedAlarm of one, or Pipeline
+        detector : DirectionalDetector, CompensatedDetector with one, or Pipeline
             Fitted, with directions of the structure's damage groups.
         structure : Structure
             Nodes, members, groups and supports.

@@ -1,14 +1,15 @@
 """Preparing temperatures and frequencies: files, faults, outliers, lags, gaps, hinges, offsets, tracked modes, folds.
 
-It uses ``_tables``. Start with ``checks/_set_aside.py``, through which all fits go.
+It uses ``_core``. Start with ``checks/_set_aside.py``, through which all fits go.
 """
 
+from skthermo.preprocessing._find_memory import MemoryFindings, find_memory
 from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._mode_tracker import ModeTracker
-from skthermo.preprocessing._past import ExponentialMeans, LagFeatures, MemoryFindings, find_memory
+from skthermo.preprocessing._past import ExponentialMeans, LagFeatures
 from skthermo.preprocessing._read_records import read_records
-from skthermo.preprocessing._records import BiasAligner, HingeFeatures, SensorMeans
+from skthermo.preprocessing._transformers import BiasAligner, HingeFeatures, SensorMeans
 from skthermo.preprocessing.checks import (
     RecordFindings,
     SetAside,

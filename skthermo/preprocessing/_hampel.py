@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._core.arrays import Array, as_floats, median, robust_deviation, spread_evenly
+from skthermo._core.arrays import Array, median, robust_deviation, spread_evenly
 from skthermo._core.estimators import Interval
 from skthermo._core.frames import (
     Table,
@@ -21,23 +21,16 @@ from skthermo._core.frames import (
     positions_of,
     row_times,
 )
-from skthermo.preprocessing._records import RecordTransformer
-from skthermo.preprocessing.folds import (
-    MOST_LEARNED,
-    Grams,
-    WeatherBasis,
-    distances_from_neighbours,
-    without_far,
-)
-
-LEAST_WINDOW = 3  # rows
+from skthermo.preprocessing._transformers import RecordTransformer
+from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, products, ridge, without_far
 
 
 class HampelFilter(RecordTransformer):
     """NaN in place of values that are far from the median of their neighbours in time.
 
-    With ``targets``, the other columns are the weather, and what it explains of the targets is subtracted before values
-    are compared with their neighbours. A frost night then is no outlier, and neither is damage, which stays.
+    With ``targets``, the other columns are the weather. A regression on the weather is subtracted from the targets
+    before values are compared with their neighbours. A frost night then is no outlier, and neither is damage, which
+    stays.
 
     Parameters
     ----------
@@ -45,8 +38,8 @@ class HampelFilter(RecordTransformer):
         Neighbours of a value, half of them before it: a number of rows or, for frames on a ``DatetimeIndex``, a
         duration such as "1D".
     n_deviations : float, default=5.0
-        Number of standard deviations beyond which a value is removed. They are estimated by medians of distances, those
-        of the neighbours or of all records, whichever is larger.
+        Number of standard deviations beyond which a value is removed. The standard deviation is estimated by the median
+        distance of the neighbours or of all records, whichever is larger.
     targets : sequence of str or sequence of int, optional
         Names of the frequency columns in a frame, or their positions counted from 0. The other columns, temperatures,
         stay as they are. By default all columns are filtered, each by itself.
@@ -61,7 +54,7 @@ class HampelFilter(RecordTransformer):
     targets_ : ndarray of int
         Positions of the columns that are filtered.
     regression_ : object or None
-        What the weather explains of the targets, piecewise-linear in it.
+        The targets as piecewise-linear functions of the weather; None without targets.
     n_features_in_, feature_names_in_ : int, ndarray of str
         Number of columns and, where `fit` saw a frame with such, their names.
 
@@ -89,7 +82,7 @@ class HampelFilter(RecordTransformer):
 
     _parameter_constraints: dict = {
         "window": [
-            Interval(Integral, LEAST_WINDOW, None, closed="left"),
+            Interval(Integral, 3, None, closed="left"),
             str,
             timedelta,
             np.timedelta64,
@@ -114,8 +107,8 @@ class HampelFilter(RecordTransformer):
         self.targets_, self.regression_ = np.arange(values.shape[1]), None
         if self.targets is not None:
             self.targets_ = positions_of(self.targets, values.shape[1], getattr(X, "columns", ()))
-            floats = as_floats(values)
-            self.regression_ = WeatherRegression.of(np.delete(floats, self.targets_, axis=1), floats[:, self.targets_])
+            T, F = np.delete(values, self.targets_, axis=1), values[:, self.targets_]
+            self.regression_ = WeatherRegression.learned(T, F)
         self.deviations_ = np.full(values.shape[1], np.nan)
         self.n_removed_ = np.zeros(values.shape[1], dtype=int)
         distances, local = self._distances(X, values)
@@ -134,9 +127,9 @@ class HampelFilter(RecordTransformer):
 
     def _distances(self, X: Table, values: NDArray) -> tuple[Array, Array]:
         """Distance of each value of the targets from the median of its neighbours, and their standard deviation."""
-        rest = as_floats(values)[:, self.targets_]
+        rest = values[:, self.targets_]
         if self.regression_ is not None:
-            predicted = self.regression_.predict(np.delete(as_floats(values), self.targets_, axis=1))
+            predicted = self.regression_.predict(np.delete(values, self.targets_, axis=1))
             rest = rest - np.where(np.isnan(predicted), self.regression_.centre, predicted)
         return distances_from_neighbours(rest, row_times(X), self._rows_or_duration(X))
 
@@ -156,23 +149,20 @@ class HampelFilter(RecordTransformer):
 class WeatherRegression:
     """Frequencies as piecewise-linear functions of the weather."""
 
-    basis: WeatherBasis
+    lines: WeatherLines
     coefficients: Array
     centre: Array
 
     @classmethod
-    def of(cls, temperatures: Array, frequencies: Array) -> WeatherRegression:
-        """Learn from records, the second time without what was far away the first time."""
-        rows = spread_evenly(np.arange(len(temperatures)), MOST_LEARNED)
-        basis, known = WeatherBasis.of(temperatures), frequencies[rows]
-        centre = median(known)
-        inputs, values = basis.lines(basis.coordinates(temperatures[rows])), known - centre
-        fold = np.ones(len(rows), dtype=np.intp)  # without fold 0, all are there
-        for _ in range(2):
-            coefficients = Grams.of(inputs, values, fold).coefficients()[0]
-            values = without_far(values, values - inputs @ coefficients.T)
-        return cls(basis, coefficients, centre)
+    def learned(cls, T: Array, F: Array) -> WeatherRegression:
+        """Learn from records, the second time without values that were far away the first time."""
+        rows = spread_evenly(np.arange(len(T)), 20_000)
+        lines, centre = WeatherLines.learned(T), median(F[rows])
+        inputs, values = lines.inputs(lines.coordinates(T[rows])), F[rows] - centre
+        first = ridge(*products(inputs, values))
+        near = without_far(values, values - inputs @ first.T)
+        return cls(lines, ridge(*products(inputs, near)), centre)
 
-    def predict(self, temperatures: Array) -> Array:
+    def predict(self, T: Array) -> Array:
         """Frequencies, (n_samples, n_modes); NaN where no sensor has a value."""
-        return self.basis.lines(self.basis.coordinates(as_floats(temperatures))) @ self.coefficients.T + self.centre
+        return self.lines.inputs(self.lines.coordinates(T)) @ self.coefficients.T + self.centre

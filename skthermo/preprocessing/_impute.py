@@ -16,20 +16,17 @@ from skthermo._core.arrays import Array, rows_by_pattern
 from skthermo._core.estimators import (
     _check_feature_names_in,
     _get_weights,
-    _num_samples,
     check_array,
     check_is_fitted,
     validate_data,
-    with_nan,
 )
-from skthermo._core.frames import frame_like, warn_of_markers
+from skthermo._core.frames import frame_like, marker_findings, named_frame
+from skthermo._core.warnings import warn_each
 
-FLOATS = [np.float64, np.float32]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 PAIRS_PER_TREE = 50_000  # below so many pairs of receiver and donor, computing all distances is faster than a tree
 PAIRS_AT_ONCE = 1_000_000  # pairs whose distances are in memory
-BLOCK = 512  # receivers in one query of a tree
 FEW_PAIRS = 10_000_000  # below so many pairs of receiver and donor, computing all distances is faster
 PAIRS_PER_POOL = 2000  # searching one pool takes about as long as so many distances
 
@@ -64,6 +61,8 @@ class KNNGapImputer(KNNImputer):
         Columns that had no value in `fit`.
     donors_ : object or None
         Records of `fit`, prepared for the search of neighbours; None where ``KNNImputer`` does the search.
+    findings_ : list of SkthermoWarning
+        Doubts about the records of `fit`, which it also gives as warnings.
     indicator_ : MissingIndicator or None
         Makes the columns of ``add_indicator``.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -75,8 +74,8 @@ class KNNGapImputer(KNNImputer):
 
     Notes
     -----
-    The results are those of ``KNNImputer``, in a time that grows as n log n, not as n squared. ``KNNImputer`` itself
-    does the work for few rows, for very many different patterns of missing columns, for another metric, and for other
+    The results equal ``KNNImputer``'s, in a time that grows as n log n, not as n squared. ``KNNImputer`` itself does
+    the work for few rows, for very many different patterns of missing columns, for another metric, and for other
     ``missing_values`` than NaN. Where several rows are equally far away, the two may choose different neighbours; with
     ``weights="distance"`` the ninth digit can differ.
 
@@ -141,22 +140,21 @@ class KNNGapImputer(KNNImputer):
             raise ValueError(f"n_neighbors is {self.n_neighbors}; expected an integer")
         if isinstance(self.weights, type) or isinstance(self.metric, type):
             raise ValueError(f"weights is {self.weights!r} and metric {self.metric!r}; expected no class")
-        values = check_array(X, input_name="X", copy=True)
-        X = with_nan(X)
-        super().fit(X, y)
+        values = check_array(X, input_name="X")
+        super().fit(named_frame(X, values), y)
         kept = set(super().get_feature_names_out())
         self.is_empty_ = np.array([name not in kept for name in _check_feature_names_in(self, None)])
         if self.is_empty_.any() and not self.keep_empty_features:
             empty = list(_check_feature_names_in(self, None)[self.is_empty_])
             raise ValueError(
-                f"the columns {empty} are missing in all {_num_samples(X)} rows; expected values to "
-                "impute from: leave them out, or keep_empty_features=True fills them with zeros"
+                f"the columns {empty} are missing in all {len(values)} rows; expected values to impute from: "
+                "leave them out, or keep_empty_features=True fills them with zeros"
             )
-        self.donors_ = None
+        self.donors_, self.findings_ = None, []
         if self.metric == "nan_euclidean" and isinstance(self.missing_values, float) and np.isnan(self.missing_values):
-            values = values.astype(float, copy=False)
-            warn_of_markers(frame_like(X, values))
             self.donors_ = Donors(values)
+            self.findings_ = marker_findings(named_frame(X, values))
+        warn_each(self.findings_)
         return self
 
     @overload
@@ -177,13 +175,10 @@ class KNNGapImputer(KNNImputer):
             A frame gives a frame on its own index.
         """
         check_is_fitted(self)
-        check_array(X, input_name="X")
-        X, values = with_nan(X), None
+        values = validate_data(self, X, reset=False)
         names = [*getattr(X, "columns", ()), *self.get_feature_names_out()[self.n_features_in_ :]]
-        if self.donors_ is not None:
-            values = validate_data(self, X, dtype=FLOATS, reset=False)
-        if values is None or not self.donors_.trees_are_faster(np.isnan(values)):
-            return frame_like(X, np.asarray(super().transform(X)), names)
+        if self.donors_ is None or not self.donors_.trees_are_faster(np.isnan(values)):
+            return frame_like(X, np.asarray(super().transform(named_frame(X, values))), names)
         filled = self._filled(values)
         if self.add_indicator:
             filled = np.hstack([filled, self.indicator_.transform(np.isnan(values))])
@@ -210,7 +205,7 @@ class KNNGapImputer(KNNImputer):
         return mean
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
-        """Names of the columns: those of the input, then those of ``add_indicator``.
+        """Names of the columns: the input's names, then the names of the indicators.
 
         Parameters
         ----------
@@ -274,7 +269,7 @@ class Donors:
             tree = cKDTree(pool, leafsize=32, balanced_tree=False, compact_nodes=False)
             points, order = receivers[:, shared], [*range(1, min(n_neighbors, len(pool)) + 1)]
             # A query has one bound for all its receivers, so those with near neighbours go together.
-            for block in np.array_split(np.argsort(distances[:, -1]), math.ceil(len(points) / BLOCK)):
+            for block in np.array_split(np.argsort(distances[:, -1]), math.ceil(len(points) / 512)):
                 # A neighbour exactly at the bound must be found in spite of rounding.
                 within = distances[block[-1], -1] / scale * (1 + 1e-9) + 1e-300
                 found, at = tree.query(points[block], k=order, distance_upper_bound=within)

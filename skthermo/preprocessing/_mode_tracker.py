@@ -15,8 +15,8 @@ from sklearn.utils import Bunch
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted
 from skthermo._core.frames import as_stamps, check_duration
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
+from skthermo._core.warnings import warn_each
+from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.preprocessing._poles import (
     Pairs,
     Poles,
@@ -28,9 +28,6 @@ from skthermo.preprocessing._poles import (
     read_reference,
     shape_agreement,
 )
-
-FEW_RECORDS = 20  # too few for a warning that a mode is missing
-NEAR_FREQUENCY = 0.02  # relative difference in frequency of a pole that is probably the mode's own
 
 
 class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
@@ -48,15 +45,15 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         ``frequencies``, ``shapes`` and, optionally, ``sensors``, names by which the sensors of the records are chosen.
         Where shapes are None, frequency alone decides. If frequencies are a Series, its index names the modes.
     max_shift : float, default=0.15
-        Largest relative difference of a pole's frequency from that of its mode.
+        Largest relative difference of a pole's frequency from its mode's frequency.
     min_mac : float, default=0.8
-        Lowest modal assurance criterion (MAC) [AB82]_ of a pole's shape and that of its mode.
+        Lowest modal assurance criterion (MAC) [AB82]_ of a pole's shape and its mode's shape.
     follow : float, str, timedelta or None, default=None
-        Time constant with which exponential means of the assigned frequencies replace those of the reference: a number
-        of records, or a duration such as "30D" for records on a DatetimeIndex. None keeps the reference. Shapes are
-        always compared with those of the reference.
+        Time constant of exponential means of the assigned frequencies, which replace the reference's frequencies: a
+        number of records, or a duration such as "30D" for records on a DatetimeIndex. None keeps the reference. Shapes
+        are always compared with the reference's shapes.
     max_drift : float, default=0.3
-        Largest relative difference of a followed frequency from that of the reference.
+        Largest relative difference of a followed frequency from the reference's frequency.
     close : float, default=0.02
         Reference modes closer than this share of their frequency count as close modes, whose shapes may mix:
         ``min_mac`` then applies to the MAC of a pole with the space that their shapes span.
@@ -71,21 +68,23 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         Names of the reference's sensors.
     mode_names_ : list of str
         Names of the modes.
+    findings_ : list of SkthermoWarning
+        Doubts about the reference, which `fit` also gives as warnings.
 
     See Also
     --------
-    skthermo.fem.match_modes : Pairs measured modes with those of an FE model.
+    skthermo.fem.match_modes : Pairs measured modes with the modes of an FE model.
 
     Notes
     -----
     A pole is a candidate for a mode if both tolerances hold. Candidates are assigned one-to-one in every record, at the
     lowest sum of ``(1 - MAC) / (1 - min_mac) + |f / f_reference - 1| / max_shift``; a mode without a pole costs 3, more
-    than any candidate. For close modes, the MAC in this sum is that with their space, and what the mode's own MAC is
-    lower is added. NaN components of a shape, from sensors that failed, are left out of its MAC.
+    than any candidate. For close modes, the MAC in this sum is the pole's MAC with their space, and the amount by which
+    the mode's own MAC is lower is added. NaN components of a shape, from sensors that failed, are left out of its MAC.
 
     With ``follow``, records are taken in the order of time, and every call of `transform` starts at the reference. A
     mode that is missing keeps its mean. :doc:`/guide/modes` says how to set the tolerances. The tracker comes before a
-    pipeline, not into it: its ``frequencies`` are what the other estimators take.
+    pipeline, not into it: the other estimators take its ``frequencies``.
 
     Examples
     --------
@@ -165,8 +164,9 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         if isinstance(self.follow, bool):
             raise ValueError(f"follow is {self.follow}; expected a number of records, a duration or None")
         modes = read_reference(self.reference)
-        modes.warn_of_similar(self.max_shift, self.min_mac)
         self.frequencies_, self.shapes_, self.mode_names_, self.sensors_ = modes
+        self.findings_ = modes.similar(self.max_shift, self.min_mac)
+        warn_each(self.findings_)
         return self
 
     def transform(self, X: Any) -> TrackedModes:
@@ -215,7 +215,7 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         Warns
         -----
         UserWarning
-            If a mode is found in no record; if many records without a mode have poles of its shape at another
+            One, if a mode is found in no record; if many records without a mode have poles of its shape at another
             frequency, or of other shapes at its frequency; if poles have no shape.
         """
         check_is_fitted(self)
@@ -232,7 +232,8 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
             )
         result = tracked_modes(poles, pairs.at(chosen), pairs.at(near), followed, modes)
         if poles.shapes is not None:
-            warn_of_doubts(poles, pairs, chosen, followed, result.frequencies.notna().to_numpy(), modes)
+            found = result.frequencies.notna().to_numpy()
+            warn_each(doubts_of_assignment(poles, pairs, chosen, followed, found, modes))
         return result
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
@@ -356,86 +357,84 @@ def aligned(shapes: NDArray, reference: NDArray) -> NDArray:
     return shapes * np.divide(products.conj(), sizes, out=np.ones_like(products), where=sizes > 0)
 
 
-def warn_of_doubts(
+def doubts_of_assignment(
     poles: Poles,
     pairs: Pairs,
     chosen: NDArray[np.intp],
     followed: Array,
     found: NDArray[np.bool_],
     modes: ReferenceModes,
-) -> None:
-    """Warn of what is doubtful about an assignment: modes not found, modes of other shapes, poles without shape."""
+) -> list[UnevaluatedRowsWarning]:
+    """One finding of modes that are not found, modes of other shapes, and poles without a shape."""
     is_free = ~np.isin(np.arange(len(poles.record)), pairs.pole[chosen])
     left = pairs.at(is_free[pairs.pole])
-    _warn_of_losses(left, left.frequency / followed[left.record, left.mode], found, modes.names)
-    _warn_of_other_shapes(poles, is_free, followed, found, modes)
     n_present = (~np.isnan(poles.shapes)).sum(axis=1)
     is_zero = ~np.nan_to_num(poles.shapes).any(axis=1)
-    n_without = (is_zero | (n_present < min(2, poles.shapes.shape[1]))).sum()
-    if n_without:
-        warn_user(
-            f"{n_without} of {len(poles.record)} poles have a frequency but no shape: zero, or NaN at all sensors but "
-            "one. No mode takes them. Give shapes at two sensors or more",
-            UnevaluatedRowsWarning,
-            "poles-without-shape",
+    problems = [
+        *_lost_modes(left, left.frequency / followed[left.record, left.mode], found, modes.names),
+        *_other_shapes(poles, is_free, followed, found, modes),
+    ]
+    if (is_zero | (n_present < min(2, poles.shapes.shape[1]))).any():
+        problems.append(
+            "poles have no shape, zero or NaN at all sensors but one, and no mode takes them: give shapes at two "
+            "sensors or more"
         )
+    return [UnevaluatedRowsWarning("; ".join(problems), "modes-not-found")] if problems else []
 
 
-def _warn_of_losses(pairs: Pairs, ratio: Array, found: NDArray[np.bool_], names: list[str]) -> None:
-    """One warning for modes that no record has, and modes whose shapes are found, among poles that were left over, at
-    frequencies too far away. Poles that are 2 pi times as high or as low as the reference are an error."""
+def _lost_modes(pairs: Pairs, ratio: Array, found: NDArray[np.bool_], names: list[str], few: int = 20) -> list[str]:
+    """A sentence on modes that no record has, and modes whose shapes are found, among poles that were left over, at
+    frequencies too far away, in more than a few records. Poles that are 2 pi times as high or as low as the reference
+    are an error."""
     lost = ~found[pairs.record, pairs.mode]
     mode, record, ratio = pairs.mode[lost], pairs.record[lost], ratio[lost]
     in_rad = np.maximum(ratio, 1 / ratio) / (2 * np.pi)
     n_in_rad = (np.abs(in_rad - 1) < 0.15).sum()
-    if n_in_rad > max(FEW_RECORDS / 2, 10 * found.sum(), len(ratio) / 2):
+    if n_in_rad > max(few / 2, 10 * found.sum(), len(ratio) / 2):
         raise ValueError(
             f"{n_in_rad} poles have the shapes of reference modes and about {np.median(ratio):.3g} times their "
             f"frequencies, and {found.sum()} have their frequencies: rad/s? expected Hz in both"
         )
     problems = []
     never = [name for name, some in zip(names, found.any(axis=0), strict=True) if not some]
-    if never and len(found) >= FEW_RECORDS:
-        problems.append(f"the modes {never} are found in none of {len(found)} records")
+    if never and len(found) >= few:
+        problems.append(f"the modes {never} are found in no record")
     for j, name in enumerate(names):
         n_missing, ratios = (~found[:, j]).sum(), ratio[mode == j]
         if not ratios.size:
             continue
         is_similar = np.abs(ratios / np.median(ratios) - 1) < 0.1
         n_similar = len(np.unique(record[mode == j][is_similar]))
-        if n_similar >= FEW_RECORDS / 2 and n_similar > 0.1 * n_missing and is_similar.mean() > 0.5:
+        if n_similar >= few / 2 and n_similar > 0.1 * n_missing and is_similar.mean() > 0.5:
+            ratio_text = f"{np.median(ratios):.2g}"
             problems.append(
-                f"{n_similar} of {n_missing} records without {name!r} have a pole of its shape at about "
-                f"{np.median(ratios):.3g} times its frequency"
+                f"records without {name!r} have a pole of its shape at about {ratio_text} times its frequency"
             )
-    if problems:
-        more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
-        action = ". Widen max_shift, or correct the reference"
-        warn_user("; ".join(problems[:3]) + more + action, UnevaluatedRowsWarning, "modes-not-found")
+    return [f"{', and '.join(problems)}: widen max_shift, or correct the reference"] if problems else []
 
 
-def _warn_of_other_shapes(
-    poles: Poles, is_free: NDArray[np.bool_], followed: Array, found: NDArray[np.bool_], modes: ReferenceModes
-) -> None:
-    """One warning for modes that most records lack although they have a pole at the frequency: its shape differs."""
+def _other_shapes(
+    poles: Poles,
+    is_free: NDArray[np.bool_],
+    followed: Array,
+    found: NDArray[np.bool_],
+    modes: ReferenceModes,
+    few: int = 20,
+) -> list[str]:
+    """A sentence on modes that most records lack although they have a pole of another shape at the frequency."""
     free = np.flatnonzero(is_free)
     record = poles.record[free]
-    is_near = np.abs(poles.frequencies[free, np.newaxis] / followed[record] - 1) < NEAR_FREQUENCY
-    problems = []
+    is_near = np.abs(poles.frequencies[free, np.newaxis] / followed[record] - 1) < 0.02
+    names = []
     for j, name in enumerate(modes.names):
         near, n_missing = free[is_near[:, j] & ~found[record, j]], (~found[:, j]).sum()
         n_near = len(np.unique(poles.record[near]))
         mac = shape_agreement(poles.shapes[near], modes.shapes[:, [j]], [])[0]
-        if n_near >= FEW_RECORDS / 2 and n_near > n_missing / 2 and np.isfinite(mac).any():
-            problems.append(
-                f"{n_near} of {n_missing} records without {name!r} have a pole within {NEAR_FREQUENCY:.0%} of its "
-                f"frequency, whose MAC with the reference is about {np.nanmedian(mac):.2f}"
-            )
-    if problems:
-        more = f" ({len(problems) - 3} more like these)" if len(problems) > 3 else ""
-        warn_user(
-            "; ".join(problems[:3]) + f"{more}. Give the sensors in the order of the reference, with its signs and "
-            "gains, or a lower min_mac for noisy shapes",
-            RecordsWarning,
-            "other-shapes",
-        )
+        if n_near >= few / 2 and n_near > n_missing / 2 and np.isfinite(mac).any():
+            names.append(name)
+    if not names:
+        return []
+    return [
+        f"most records without {names} have a pole of another shape at the frequency: give the sensors in the order of "
+        "the reference, with its signs and gains, or a lower min_mac for noisy shapes"
+    ]

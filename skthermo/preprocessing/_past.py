@@ -1,71 +1,26 @@
-"""Earlier temperatures as columns: lags, exponentially weighted means, and whether these explain frequencies."""
+"""Earlier temperatures as columns: lags and exponentially weighted means."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 from datetime import timedelta
 from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, means_of_known, median, piecewise_linear, robust_deviation, spread_evenly
-from skthermo._core.estimators import Interval, StrOptions, check_array, check_is_fitted
-from skthermo._core.frames import (
-    DAY,
-    DAY_NS,
-    Table,
-    as_stamps,
-    check_duration,
-    check_same_rows,
-    column_names,
-    columns_by_sensor,
-    frame_like,
-    has_stamps,
-)
-from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.arrays import Array
+from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
+from skthermo._core.frames import Table, as_stamps, check_duration, frame_like
 from skthermo._core.text import duration_text
-from skthermo._core.warnings import explain_rows, warn_user
+from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning
-from skthermo.preprocessing._records import RecordTransformer
-from skthermo.preprocessing.folds import (
-    KNOTS,
-    Grams,
-    WeatherBasis,
-    predicted_by_weather,
-    without_far,
-)
+from skthermo.preprocessing._transformers import RecordTransformer
 
-EARLIEST = np.iinfo(np.int64).min  # stamp that there may be, in nanoseconds
-DEFAULT_TOLERANCE = 6  # times freq
-MISSING = -1  # instead of the number of a row
-MAX_LAGS = 10_000  # or as many as there are rows: a list of 10^9 lags would end the interpreter
-LONGEST_LAG = np.timedelta64(100 * 365, "D")  # stamps in nanoseconds span 292 years
-
-REACH = 4  # time constants beyond which records have no weight; they would have 2 % of it
-PAST = 2  # time constants after the first record from which means are as good as later
-LONGEST = np.timedelta64(10 * 365, "D")
-LONGEST_STRETCH = 300.0  # time constants whose weights are multiplied up without overflow
-TIME_CONSTANTS = ("3h", "12h", "2D", "5D", "10D", "20D", "40D", "60D")
-MOST_CHOSEN = 2  # time constants that are put in
-LEAST_SPANS = 4  # time constants that the records last
-N_FOLDS = 5  # contiguous ones, so that a season is predicted from others
-LEAST_ROWS = 100
-MOST_ROWS = 3000  # evenly spread, from which errors are computed
-MOST_SENSORS = 8  # evenly spread, of which means are tried
-N_PLACES = 24  # of a step that competes with memory
-LEAST_FALL = 0.05  # share by which the error falls
-WEEKS = pd.Timedelta(days=5)  # time constants from which a mean can follow a season, a trend or a step
-LEAST_FALL_OF_WEEKS = 0.15
-ALL_SEASONS = pd.Timedelta(days=270)  # of records; in shorter ones a mean over days extrapolates to other seasons
-LEAST_FALL_WITHOUT_SEASONS = 0.25  # by a mean over more than a day, in such records
-LEAST_BESIDE = 0.5  # of that share, beside a trend and a step
-WORST = 1.0  # ratio of errors in the fold that gains least
-COLUMNS = ["time_constant", "sensor", "mode", "error_without", "error_with", "fall", "chosen"]
+MEAN_REACH = 4  # time constants beyond which records have no weight: they would have 2 % of it
 
 
 class PastFeatures(RecordTransformer):
@@ -76,14 +31,13 @@ class PastFeatures(RecordTransformer):
     time_zone_: str | None
 
     def _transformed(self, X: Table, values: NDArray) -> Table:
-        features, warned = self._features(X, values, self._stamps_as_in_fit(X))
-        return explain_rows(frame_like(X, features, self._names(getattr(X, "columns", ()))), warned)
+        features, findings = self._features(values, self._stamps_as_in_fit(X))
+        warn_each(findings)
+        return frame_like(X, features, self._names(getattr(X, "columns", ())))
 
     @abstractmethod
-    def _features(
-        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
-    ) -> tuple[NDArray, NDArray[np.bool_] | np.bool_]:
-        """The features, and the rows of which a warning has said why they lack some."""
+    def _features(self, values: Array, stamps: pd.DatetimeIndex | None) -> tuple[Array, list[FewRecordsWarning]]:
+        """The features, and a finding where many rows lack some."""
 
     def _remember(self, X: Table, values: NDArray) -> pd.DatetimeIndex | None:
         """Store the records of `fit` where they have stamps, and return these."""
@@ -109,7 +63,7 @@ class PastFeatures(RecordTransformer):
     def _found(self, own: NDArray[np.int64], reach: int) -> NDArray[np.bool_]:
         """Which records of `fit` are so many nanoseconds before some stamps, or between them."""
         old = self.stamps_.view(np.int64)
-        return (old >= max(int(own.min()) - reach, EARLIEST)) & (old <= own.max())
+        return (old >= max(int(own.min()) - reach, np.iinfo(np.int64).min)) & (old <= own.max())
 
     def _joined(
         self, found: NDArray[np.bool_], own: NDArray[np.int64], values: NDArray
@@ -151,7 +105,7 @@ class LagFeatures(PastFeatures):
     tolerance : str or timedelta, optional
         How much older than t - k freq the record for lag k may be. By default 6 freq.
     padding : {"edge", "nan"}, default="edge"
-        Values before the first record: those of the first record, or NaN.
+        Values before the first record: the values of the first record, or NaN.
 
     Attributes
     ----------
@@ -170,8 +124,7 @@ class LagFeatures(PastFeatures):
     lookback_ : int or numpy.timedelta64
         How far back the longest lag looks: a number of rows, or a time on a DatetimeIndex, the tolerance included.
     first_rows_ : ndarray
-        First records of `fit`: the padding of records that begin with them is known from `fit`, and no warning says so
-        again.
+        First records of `fit`. New records that begin with them are padded without a warning.
     n_features_in_, feature_names_in_ : int, ndarray of str
         Number of sensors and, where `fit` saw a frame with such, their names.
 
@@ -239,20 +192,18 @@ class LagFeatures(PastFeatures):
                 if self.freq is None
                 else check_duration(self.freq, "freq", may_be_zero=False).to_timedelta64()
             )
-            self.tolerance_ = DEFAULT_TOLERANCE * self.freq_
+            self.tolerance_ = 6 * self.freq_
             if self.tolerance is not None:
                 self.tolerance_ = check_duration(self.tolerance, "tolerance").to_timedelta64()
-            if max(self.lags_) > LONGEST_LAG / self.freq_:
+            if max(self.lags_) > np.timedelta64(100 * 365, "D") / self.freq_:  # stamps in nanoseconds span 292 years
                 raise ValueError(
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
                 )
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
 
-    def _features(
-        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
-    ) -> tuple[NDArray, NDArray | np.bool_]:
+    def _features(self, values: Array, stamps: pd.DatetimeIndex | None) -> tuple[Array, list[FewRecordsWarning]]:
         if stamps is None:
-            return self._by_row(values, self.lags_), self._warn_of_padding(values)
+            return self._by_row(values, self.lags_), self._doubts_of_first_rows(values)
         return self._by_time(stamps, values)
 
     @property
@@ -264,34 +215,33 @@ class LagFeatures(PastFeatures):
     def _names(self, sensors: Sequence[Hashable]) -> list[Hashable]:
         return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
 
-    def _warn_of_padding(self, values: NDArray) -> NDArray[np.bool_]:
-        """Warn of first rows whose lags are not known, unless they are those of `fit`; which rows these are."""
-        reach, n_rows = max(self.lags_), len(values)
+    def _doubts_of_first_rows(self, values: Array) -> list[FewRecordsWarning]:
+        """A finding where lags of the first rows are not known, unless these are the first rows of `fit`."""
+        reach = max(self.lags_)
         begins = values[: reach + 1]
-        is_warned = bool(reach) and not np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True)
-        if is_warned:
-            done = "are padded with the first record" if self.padding == "edge" else "lack lags"
-            warn_user(
-                f"lags reach {reach} rows back: the first {min(reach, n_rows)} of {n_rows} rows {done}. Give the "
-                f"{reach} rows before, too, or a frame on a DatetimeIndex",
-                FewRecordsWarning,
+        if not reach or np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True):
+            return []
+        done = "are padded with the first record" if self.padding == "edge" else "lack lags"
+        return [
+            FewRecordsWarning(
+                f"lags reach {reach} rows back, and rows that have fewer rows before {done}. Give the {reach} rows "
+                "before, too, or a frame on a DatetimeIndex",
                 "no-earlier-records",
             )
-        return is_warned & (np.arange(n_rows) < reach)
+        ]
 
-    def _warn_of_no_history(self, stamps: pd.DatetimeIndex, unknown: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Warn if more than half of the rows have lags that reach before the first of them and find no record; which
-        rows these are."""
-        is_warned = bool(2 * unknown.sum() > len(unknown))
-        if is_warned:
-            reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
-            warn_user(
-                f"lags reach {reach} back: {unknown.sum()} of {len(unknown)} rows have one before the first record, "
-                f"{stamps.min()}, and lack lags. Give the {reach} before, too",
-                FewRecordsWarning,
+    def _doubts_of_history(self, unknown: NDArray[np.bool_]) -> list[FewRecordsWarning]:
+        """A finding where more than half of the rows have lags that reach before the first of them and find nothing."""
+        if 2 * unknown.sum() <= len(unknown):
+            return []
+        reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
+        return [
+            FewRecordsWarning(
+                f"lags reach {reach} back, and most rows lack lags, for which there are no records. Give the {reach} "
+                "before, too",
                 "no-earlier-records",
             )
-        return is_warned & unknown
+        ]
 
     def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
         n_rows, sensors = len(values), np.ascontiguousarray(values.T)
@@ -302,13 +252,12 @@ class LagFeatures(PastFeatures):
             lagged[:, k, :before] = sensors[:, :1] if self.padding == "edge" else np.nan
         return lagged.reshape(-1, n_rows).T
 
-    def _by_time(self, stamps: pd.DatetimeIndex, values: NDArray) -> tuple[NDArray, NDArray[np.bool_] | np.bool_]:
-        """Lagged values, and the rows of which a warning says that they lack lags."""
+    def _by_time(self, stamps: pd.DatetimeIndex, values: Array) -> tuple[Array, list[FewRecordsWarning]]:
         own, old = stamps.as_unit("ns").asi8, self.stamps_.view(np.int64)
         freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
         rows_per_lag = _rows_per_step(own, freq)
         if rows_per_lag and np.array_equal(own, old):
-            return self._by_row(values, [lag * rows_per_lag for lag in self.lags_]), np.False_
+            return self._by_row(values, [lag * rows_per_lag for lag in self.lags_]), []
         found = self._found(own, max(self.lags_) * freq + tolerance)
         found[old.argmin()] = True  # the padding of what is before the first record of all
         known, records = self._joined(found, own, values)
@@ -321,20 +270,20 @@ class LagFeatures(PastFeatures):
             stale = wanted - ascending[at] > tolerance
             before = at < 0
             unknown |= (stale | before) & (wanted < own.min())
-            source = np.where(stale & ~before, MISSING, order[np.maximum(at, 0)])
-            sources.append(np.where(before & (self.padding == "nan"), MISSING, source))
-        warned = self._warn_of_no_history(stamps, unknown) if not np.isin(own, old[found]).all() else np.False_
-        return _rows_by_lag(records, sources), warned
+            source = np.where(stale & ~before, -1, order[np.maximum(at, 0)])
+            sources.append(np.where(before & (self.padding == "nan"), -1, source))
+        are_of_fit = np.isin(own, old[found]).all()
+        return _rows_by_lag(records, sources), [] if are_of_fit else self._doubts_of_history(unknown)
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
-    """Values of the source rows of every lag, one block of columns for each sensor."""
+    """Values of the source rows of every lag, NaN for -1, one block of columns for each sensor."""
     sensors = np.ascontiguousarray(values.T)
     lagged = np.empty((len(sensors), len(sources), len(sources[0])), dtype=values.dtype)
     for k, source in enumerate(sources):
         for sensor, column in zip(sensors, lagged[:, k], strict=True):
             np.take(sensor, source, out=column, mode="clip")
-        lagged[:, k, source == MISSING] = np.nan
+        lagged[:, k, source == -1] = np.nan
     return lagged.reshape(-1, len(sources[0])).T
 
 
@@ -349,10 +298,8 @@ def _read_lags(lags: Any, n_rows: int) -> list[int]:
     if isinstance(lags, bool | np.bool_):
         raise ValueError(f"lags is {lags!r}; expected a positive number or different non-negative integers")
     count = lags if isinstance(lags, Integral) else len(lags)
-    if count > max(MAX_LAGS, n_rows):
-        raise ValueError(
-            f"lags are {count} for {n_rows} rows; expected at most {MAX_LAGS}, or as many as there are rows"
-        )
+    if count > max(10_000, n_rows):  # a list of 10^9 lags would end the interpreter
+        raise ValueError(f"lags are {count} for {n_rows} rows; expected at most 10000, or as many as there are rows")
     if isinstance(lags, Integral):
         return list(range(lags))
     explicit = list(lags)
@@ -397,7 +344,7 @@ class ExponentialMeans(PastFeatures):
     time_zone_ : str or None
         Time zone of the stamps.
     first_row_ : ndarray of shape (n_sensors,)
-        Earliest record of `fit`: means of records that begin with it have no past, and no warning says so again.
+        Earliest record of `fit`. Means of new records that begin with it have no past, and give no warning.
     lookback_ : int or numpy.timedelta64
         How far back means look: a number of rows, or a time on a DatetimeIndex.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -410,8 +357,8 @@ class ExponentialMeans(PastFeatures):
 
     Notes
     -----
-    The mean of a record at time t is that of the known values at s with weights exp(-(t - s) / time constant), for t -
-    s up to four time constants, the record's own value included. Near the first record it is the mean of what is known.
+    The mean of a record at time t has weights exp(-(t - s) / time constant) for the known values at times s from four
+    time constants before t up to t itself. Near the first record it is the mean of the known values.
     Missing values have no weight, and a mean is NaN only where no value is known. Records of `fit` and of `transform`
     count together, as in `LagFeatures`. There is a warning if more than half of the rows have no record that is older
     than the longest time constant, and do not begin as the records of `fit` do.
@@ -455,21 +402,18 @@ class ExponentialMeans(PastFeatures):
         self.sensors_ = self._read_sensors(values.shape[1])
         self.first_row_ = values[0 if stamps is None else stamps.argmin()].copy()
 
-    def _features(
-        self, X: Table, values: NDArray, stamps: pd.DatetimeIndex | None
-    ) -> tuple[NDArray, NDArray | np.bool_]:
+    def _features(self, values: Array, stamps: pd.DatetimeIndex | None) -> tuple[Array, list[FewRecordsWarning]]:
         if stamps is None:
             own, records = np.arange(len(values)), values
             times = own
         else:
             own = stamps.as_unit("ns").asi8
-            times, records = self._joined(self._found(own, REACH * self._longest), own, values)
+            times, records = self._joined(self._found(own, MEAN_REACH * self._longest), own, values)
         order = np.argsort(times, kind="stable")
         sorted_times, sorted_records = times[order], records[np.ix_(order, self.sensors_)]
         rows = np.argsort(order)[len(order) - len(own) :]
         means = [trailing_means(sorted_times, sorted_records, int(constant))[rows] for constant in self.time_constants_]
-        warned = self._warn_of_no_past(X, values, own, sorted_times)
-        return np.hstack([values, *means]).astype(values.dtype, copy=False), warned
+        return np.hstack([values, *means]), self._doubts_of_past(values, own, sorted_times)
 
     def lacks_past(self, X: pd.DataFrame) -> NDArray[np.bool_]:
         """Which rows follow the first record by less than two time constants: their means lack the weather before.
@@ -487,12 +431,12 @@ class ExponentialMeans(PastFeatures):
         check_is_fitted(self)
         own = self._stamps_as_in_fit(X).as_unit("ns").asi8
         first = min(int(own.min()), int(self.stamps_.view(np.int64).min()))
-        return own - first < PAST * self._longest
+        return own - first < 2 * self._longest
 
     @property
     def lookback_(self) -> int | np.timedelta64:
         """How far back means look: a number of rows, or a time on a DatetimeIndex."""
-        reach = REACH * self._longest
+        reach = MEAN_REACH * self._longest
         return reach if self.stamps_ is None else np.timedelta64(reach, "ns")
 
     @property
@@ -514,40 +458,39 @@ class ExponentialMeans(PastFeatures):
         chosen = [sensors[position] for position in self.sensors_]
         return [*sensors, *(f"{one}_mean{_as_label(constant)}" for constant in self.time_constants for one in chosen)]
 
-    def _warn_of_no_past(
-        self, X: Table, values: NDArray, own: NDArray[np.int64], times: NDArray[np.int64]
-    ) -> NDArray[np.bool_] | np.bool_:
-        """Warn if more than half of the rows have no record a time constant back, unless the first is that of `fit`;
-        which rows these are."""
+    def _doubts_of_past(
+        self, values: Array, own: NDArray[np.int64], times: NDArray[np.int64]
+    ) -> list[FewRecordsWarning]:
+        """A finding where more than half of the rows have no record a time constant back, unless the first of them is
+        that of `fit`."""
         at = np.searchsorted(times, own - self._longest, side="right") - 1
-        lacking = (at < 0) | (own - times[np.maximum(at, 0)] > REACH * self._longest)
+        lacking = (at < 0) | (own - times[np.maximum(at, 0)] > MEAN_REACH * self._longest)
         is_first = np.array_equal(values[own.argmin()], self.first_row_, equal_nan=True)
         if is_first or 2 * lacking.sum() <= len(own):
-            return np.False_
+            return []
         is_timed = self.stamps_ is not None
         reach = duration_text(pd.Timedelta(self._longest)) if is_timed else f"{self._longest} rows"
-        warn_user(
-            f"{lacking.sum()} of {len(own)} rows have no record {reach} or more before. Their means are of the few "
-            f"records since {X.index.min() if is_timed else 'the first row'}. Give the records of {REACH} times "
-            f"{reach} before, too",
-            FewRecordsWarning,
-            "no-earlier-records",
-        )
-        return lacking
+        return [
+            FewRecordsWarning(
+                f"most rows have no record {reach} or more before, and their means are of fewer records than the time "
+                f"constant asks for. Give the records of {MEAN_REACH} times {reach} before, too",
+                "no-earlier-records",
+            )
+        ]
 
 
 def trailing_means(times: NDArray[np.int64], values: NDArray, constant: int) -> NDArray[np.float64]:
-    """Exponentially weighted means of columns in order of time, NaN left out, over `REACH` time constants."""
+    """Exponentially weighted means of columns in order of time, NaN left out, over `MEAN_REACH` time constants."""
     known = ~np.isnan(values)
     centre = np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     table = np.hstack([np.where(known, values - centre, 0.0), known])
     ages = (times - times[0]) / constant
     sums = _decayed_sums(ages, table)
-    before = np.searchsorted(times, times - REACH * constant, side="right") - 1
+    before = np.searchsorted(times, times - MEAN_REACH * constant, side="right") - 1
     old = np.flatnonzero(before >= 0)
     sums[old] -= sums[before[old]] * np.exp(ages[before[old]] - ages[old])[:, np.newaxis]
     counts = sums[:, values.shape[1] :]
-    is_known = counts > 0.5 * np.exp(-REACH)
+    is_known = counts > 0.5 * np.exp(-MEAN_REACH)
     means = np.divide(sums[:, : values.shape[1]], counts, out=np.full(values.shape, np.nan), where=is_known)
     return means + centre
 
@@ -557,7 +500,8 @@ def _decayed_sums(ages: NDArray[np.float64], table: NDArray[np.float64]) -> NDAr
     sums = np.empty(table.shape)
     carried, start = np.zeros(table.shape[1]), 0
     while start < len(ages):
-        stop = int(np.searchsorted(ages, ages[start] + LONGEST_STRETCH, side="right"))
+        # weights of more than 300 time constants, multiplied up, would overflow
+        stop = int(np.searchsorted(ages, ages[start] + 300, side="right"))
         growth = np.exp(ages[start:stop] - ages[start])[:, np.newaxis]
         before = carried * np.exp(ages[start - 1] - ages[start]) if start else carried
         sums[start:stop] = (before + np.cumsum(table[start:stop] * growth, axis=0)) / growth
@@ -573,7 +517,7 @@ def _read_time_constants(given: Any, is_timed: bool) -> NDArray[np.int64]:
         is_count = isinstance(one, Integral) and not isinstance(one, bool | np.bool_ | np.timedelta64)
         if is_timed:
             duration = check_duration(one, "time constant", may_be_zero=False)
-            if duration > LONGEST:
+            if duration > np.timedelta64(10 * 365, "D"):
                 raise ValueError(f"time constant is {one!r}; expected at most ten years")
             constants.append(duration.value)
         elif not is_count:
@@ -592,262 +536,3 @@ def _read_time_constants(given: Any, is_timed: bool) -> NDArray[np.int64]:
 def _as_label(constant: Any) -> str:
     """A time constant as a part of a name, such as "30D"."""
     return constant if isinstance(constant, str) else str(constant).replace(" ", "")
-
-
-@dataclass(frozen=True, repr=False)
-class MemoryFindings(SavesFrames):
-    """What `find_memory` has found.
-
-    Parameters
-    ----------
-    table : DataFrame
-        A row for each ``time_constant`` and ``mode``: the ``sensor`` whose mean explains most, mean absolute
-        out-of-fold errors of the frequencies without and with this mean (``error_without``, ``error_with``, in their
-        unit), the share by which they ``fall``, and whether the mean is ``chosen``.
-    features : ExponentialMeans or None
-        The transformer to put before a `~skthermo.surrogate.TemperatureMapper`; None where nothing is gained.
-    fall : float
-        Share by which the out-of-fold error falls by the chosen means, on average over the modes.
-
-    Examples
-    --------
-    >>> from skthermo.preprocessing import find_memory
-    >>> memory = find_memory([[4.0], [5.0]], [[2.1], [2.0]])
-    >>> print(memory.summary())
-    Earlier temperatures explain no more of the frequencies: their means do not lower the error in periods held out.
-    >>> memory.fall
-    0.0
-    """
-
-    table: pd.DataFrame
-    features: ExponentialMeans | None
-    fall: float
-
-    def summary(self) -> str:
-        """What was found, in a sentence.
-
-        Returns
-        -------
-        str
-            The means that explain the frequencies, and by how much the error falls.
-        """
-        if self.features is None:
-            return (
-                "Earlier temperatures explain no more of the frequencies: their means do not lower the error in "
-                "periods held out."
-            )
-        means = " and ".join(f"{one} of {self._sensors}" for one in self.features.time_constants)
-        return (
-            "The frequencies depend on earlier temperatures: exponentially weighted means over "
-            f"{means} lower the error in periods held out by {self.fall:.0%}."
-        )
-
-    @property
-    def _sensors(self) -> str:
-        return " and ".join(repr(one) for one in self.features.sensors)
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-
-def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindings:
-    """Look whether exponentially weighted means of earlier temperatures explain frequencies.
-
-    Parameters
-    ----------
-    temperatures : array-like or DataFrame of shape (n_samples, n_sensors)
-        In degrees Celsius; NaN is allowed.
-    frequencies : array-like or DataFrame of shape (n_samples, n_modes)
-        Of the healthy structure, in Hz, or another quantity that follows the weather; NaN is allowed. A mode with fewer
-        than 100 values does not count, where others have more.
-
-    Returns
-    -------
-    MemoryFindings
-        Its ``features`` is the transformer to put in, or None; ``summary()`` is a sentence.
-
-    Raises
-    ------
-    ValueError
-        If the tables differ in length or index, repeat the name of a column, or hold something that is no real number
-        or is infinite.
-
-    See Also
-    --------
-    ExponentialMeans : The transformer.
-    check_records : Names memory of weeks among other findings.
-
-    Notes
-    -----
-    A mean is chosen if it lowers the mean absolute out-of-fold error of a piecewise-linear regression on the weather
-    enough, by the rules of :doc:`/guide/records_theory`. Nothing is looked for in records without a DatetimeIndex.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import pandas as pd
-    >>> from skthermo.preprocessing import ExponentialMeans, find_memory
-    >>> random, days = np.random.default_rng(0), pd.date_range("2023-01-01", periods=1000)
-    >>> season = 10 - 10 * np.cos(2 * np.pi * np.arange(1000) / 365.25)
-    >>> air = pd.DataFrame({"air": season + 4 * random.standard_normal(1000)}, days)
-    >>> soil = ExponentialMeans(["40D"]).fit_transform(air)["air_mean40D"]
-    >>> f = pd.DataFrame({"f1": 4 - 0.004 * air["air"] - 0.008 * soil + 0.01 * random.standard_normal(1000)})
-    >>> memory = find_memory(air[270:], f[270:])
-    >>> round(memory.fall, 1)
-    0.7
-    >>> memory.features
-    ExponentialMeans(sensors=['air'], time_constants=['40D'])
-    """
-    check_same_rows(temperatures, frequencies, ("temperatures", "frequencies"))
-    T = check_array(temperatures, dtype=np.float64, input_name="temperatures")
-    F = check_array(frequencies, dtype=np.float64, input_name="frequencies")
-    nothing = MemoryFindings(pd.DataFrame(columns=COLUMNS), None, 0.0)
-    if not has_stamps(temperatures):
-        return nothing
-    stamps = temperatures.index.as_unit("ns").asi8
-    order = np.argsort(stamps, kind="stable")
-    first = {name: columns[0] for name, columns in columns_by_sensor(temperatures).items()}
-    T, F = T[np.ix_(order, list(first.values()))], F[order]
-    is_known = ~np.isnan(F) & ~np.isnan(T).all(axis=1)[:, np.newaxis]
-    is_scarce = is_known.sum(axis=0) < LEAST_ROWS  # modes that say nothing
-    F = np.where(is_scarce & ~is_scarce.all(), np.nan, F)
-    usable = np.flatnonzero(is_known[:, ~is_scarce | is_scarce.all()].any(axis=1))
-    if len(usable) < LEAST_ROWS:
-        return nothing
-    return _Candidates(stamps[order], T, F, usable).findings(list(first), column_names(frequencies, "f"))
-
-
-class _Candidates:
-    """Inputs in rows: the weather, a trend and a step, and the means that are tried; their products by fold.
-
-    Rows are in order of time. A mean has the positions of its time constant and its sensor as a key.
-    """
-
-    def __init__(self, times: NDArray[np.int64], T: Array, F: Array, usable: NDArray[np.intp]):
-        rows = spread_evenly(usable, MOST_ROWS)
-        self.ages, self.folds = (times[rows] - times[0]) / DAY_NS, np.arange(len(rows)) * N_FOLDS // len(rows)
-        self.has_all_seasons = pd.Timedelta(np.ptp(times), "ns") >= ALL_SEASONS
-        basis = WeatherBasis.of(T)
-        lines = basis.lines(basis.coordinates(T[rows]))
-        left = F[rows] - predicted_by_weather(lines, F[rows], self.folds)
-        self.scale = robust_deviation(left)
-        self.values = without_far(F[rows] - median(F[rows]), left) / np.where(self.scale > 0, self.scale, np.inf)
-        blocks: dict[Any, Array] = {"weather": lines, "time": _time_shapes(without_far(left, left))}
-        sensors = spread_evenly(np.flatnonzero(~np.isnan(T).all(axis=0)), MOST_SENSORS)
-        for i, one in enumerate(TIME_CONSTANTS):
-            constant = pd.Timedelta(one).as_unit("ns").value
-            if np.median(np.diff(times)) <= constant <= np.ptp(times) / LEAST_SPANS:
-                averages = trailing_means(times, T[:, sensors], constant)[rows]
-                for sensor, column in zip(sensors, averages.T, strict=True):
-                    if np.ptp(column) > 0:  # False for NaN
-                        blocks[i, int(sensor)] = lines_of(column)
-        self.places: dict[Any, NDArray[np.intp]] = {}  # of the columns of each block
-        start = 0
-        for key, block in blocks.items():
-            self.places[key] = np.arange(start, start + block.shape[1])
-            start += block.shape[1]
-        self.means = list(self.places)[2:]
-        inputs = np.hstack(list(blocks.values()))
-        self.grams = Grams.of(inputs, self.values, self.folds)
-        self.inputs = np.ascontiguousarray(inputs.T)
-        self.known_left: dict[tuple[Any, ...], Array] = {}
-
-    def errors(self, *blocks: Any, after: float = 0.0) -> Array:
-        """Mean absolute error out of fold by fold and mode, relative to the scale of the mode, after some days."""
-        if blocks not in self.known_left:
-            columns = np.concatenate([self.places[block] for block in blocks])
-            square = np.ix_(range(N_FOLDS), range(self.values.shape[1]), columns, columns)
-            grams = Grams(self.grams.inputs[square], self.grams.targets[..., columns], self.grams.counts)
-            inputs, left = self.inputs[columns], np.empty_like(self.values)
-            for fold, coefficients in enumerate(grams.coefficients()):
-                rows = self.folds == fold
-                left[rows] = np.abs(self.values[rows] - (coefficients @ inputs[:, rows]).T)
-            self.known_left[blocks] = left
-        left = self.known_left[blocks]
-        counted = ~np.isnan(left) & (self.ages >= after)[:, np.newaxis]
-        starts = np.searchsorted(self.folds, np.arange(N_FOLDS))
-        sums = np.add.reduceat(np.where(counted, left, 0.0), starts)
-        counts = np.add.reduceat(counted.astype(float), starts)
-        return np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
-
-    def chosen(self) -> list[tuple[int, int]]:
-        """Means that lower the error clearly, in nearly every part of the records, and beside a trend and a step.
-
-        Records of the first two time constants do not count: their means lack the weather before.
-        """
-        chosen: list[tuple[int, int]] = []
-        while len(chosen) < MOST_CHOSEN:
-            known, found = ["weather", *chosen], []
-            for mean in self.means:
-                if chosen and (mean in chosen or mean[1] != chosen[0][1]):
-                    continue
-                constant = pd.Timedelta(TIME_CONSTANTS[mean[0]])
-                least = LEAST_FALL_OF_WEEKS if constant >= WEEKS else LEAST_FALL
-                if constant > DAY and not self.has_all_seasons:
-                    least = LEAST_FALL_WITHOUT_SEASONS
-                after = PAST * (constant / DAY)
-                fall, worst = _fall(self.errors(*known, after=after), self.errors(*known, mean, after=after))
-                if fall >= least and worst <= WORST:
-                    known_beside = [*known, "time"]
-                    beside = self.errors(*known_beside, after=after), self.errors(*known_beside, mean, after=after)
-                    if _fall(*beside)[0] >= LEAST_BESIDE * fall:
-                        found.append((fall, mean))
-            if not found:
-                break
-            chosen.append(max(found)[1])
-        return chosen
-
-    def findings(self, sensors: list[Hashable], modes: list[Hashable]) -> MemoryFindings:
-        """What is chosen, as a table and a transformer."""
-        chosen = self.chosen()
-        without = self.errors("weather")
-        before, table = means_of_known(without), []
-        for i, constant in enumerate(TIME_CONSTANTS):
-            best, least, after, ratio = None, np.inf, before, before
-            for mean in self.means:
-                if mean[0] != i or (best in chosen and best is not None):
-                    continue
-                error = means_of_known(self.errors("weather", mean))
-                with np.errstate(invalid="ignore", divide="ignore"):  # of modes without an error
-                    share = error / before
-                if best is None or mean in chosen or np.nansum(share) < least:
-                    best, least, after, ratio = mean, np.nansum(share), error, share
-            if best is not None:
-                columns = modes, before * self.scale, after * self.scale, 1 - ratio
-                table += [[constant, sensors[best[1]], *row, best in chosen] for row in zip(*columns, strict=True)]
-        features = None
-        if chosen:
-            constants = [TIME_CONSTANTS[i] for i, _ in sorted(chosen)]
-            features = ExponentialMeans(constants, sensors=[sensors[chosen[0][1]]])
-        fall = _fall(without, self.errors("weather", *chosen))[0]
-        return MemoryFindings(pd.DataFrame(table, columns=COLUMNS), features, fall)
-
-
-def lines_of(column: Array) -> Array:
-    """Piecewise-linear functions of a standardised column."""
-    standard = ((column - column.mean()) / column.std())[:, np.newaxis]
-    return piecewise_linear(standard, np.quantile(standard, KNOTS, axis=0))
-
-
-def _time_shapes(left: Array) -> Array:
-    """A straight line, and the step that explains most of residuals, (n_samples, 2)."""
-    place = np.arange(len(left)) / len(left)
-    shapes = (place[:, np.newaxis] >= np.arange(1, N_PLACES) / N_PLACES).astype(float)
-    shapes -= shapes.mean(axis=0)
-    deviation = robust_deviation(left)
-    standard = np.nan_to_num((left - median(left)) / np.where(deviation > 0, deviation, np.inf))
-    explained = ((shapes.T @ standard) ** 2).sum(axis=1) / (shapes**2).sum(axis=0)
-    return np.column_stack([place - 0.5, shapes[:, explained.argmax()]])
-
-
-def _fall(before: Array, after: Array) -> tuple[float, float]:
-    """Share by which errors, (n_folds, n_modes), fall on average over the modes; ratio where they fall least.
-
-    What is not known in a fold is NaN in both.
-    """
-    known = ~np.isnan(before) & (before > 0)
-    if not known.any():
-        return 0.0, np.inf
-    modes, sums = known.any(axis=0), np.where(known, [before, after], 0.0).sum(axis=1)
-    ratios = np.divide(after, before, out=np.full(before.shape, np.nan), where=known)[known.any(axis=1)]
-    return 1 - float(np.mean(sums[1, modes] / sums[0, modes])), float(np.nanmean(ratios, axis=1).max())

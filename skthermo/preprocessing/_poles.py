@@ -12,15 +12,11 @@ from scipy.optimize import linear_sum_assignment
 
 from skthermo._core.arrays import Array, as_floats, real_array, rows_by_pattern, shape_array
 from skthermo._core.frames import check_same_rows
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import RecordsWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 
-FIELDS = ("frequencies", "damping", "shapes")
+POLE_FIELDS = ("frequencies", "damping", "shapes")
 Positions = NDArray[np.intp]
-MISSED = 3.0  # cost of a mode without a pole: no pair costs more
-FORBIDDEN = 1e6
-POLES_AT_A_TIME = 65_536
-LARGEST_RATIO = 8.0  # of frequencies that are compared: those in rad/s are 6.3 times those in Hz
+MISSED_MODE = 3.0  # cost of a mode without a pole: no pair costs more
 
 
 class Poles(NamedTuple):
@@ -72,14 +68,14 @@ def _fields(X: Any) -> tuple[dict[str, Any], Any]:
     """Frequencies, damping ratios, shapes and index of all records, and the names of their sensors."""
     sensors = None
     if isinstance(X, Mapping):
-        fields, sensors = {name: X.get(name) for name in FIELDS}, X.get("sensors")
+        fields, sensors = {name: X.get(name) for name in POLE_FIELDS}, X.get("sensors")
         if fields["frequencies"] is None:
             raise ValueError(f"X has the fields {list(X)}; expected 'frequencies', and mostly 'shapes' and 'damping'")
     elif is_table(X):
         fields = {"frequencies": X, "damping": None, "shapes": None}
     elif isinstance(X, Sequence | pd.Series) and len(X) and all(isinstance(record, Mapping) for record in X):
         fields = {}
-        for name in FIELDS:
+        for name in POLE_FIELDS:
             has = [record.get(name) is not None for record in X]
             if any(has) and not all(has):
                 raise ValueError(f"record {has.index(False)} has no {name!r}, others have; expected all or none")
@@ -182,29 +178,31 @@ class ReferenceModes(NamedTuple):
     sensors: list | None
 
     def close_groups(self, close: float) -> list[NDArray[np.intp]]:
-        """Groups of modes, in each of which neighbours in frequency are no farther apart than a share of it."""
+        """Groups of modes whose neighbours in frequency are no farther apart than a share of it."""
         order = np.argsort(self.frequencies)
         steps = np.diff(self.frequencies[order]) > close * self.frequencies[order][1:]
         return np.split(order, np.flatnonzero(steps) + 1)
 
-    def warn_of_similar(self, max_shift: float, min_mac: float) -> None:
-        """Warn of modes that neither their frequencies nor their shapes distinguish."""
+    def similar(self, max_shift: float, min_mac: float) -> list[SkthermoWarning]:
+        """A finding of modes that neither their frequencies nor their shapes distinguish."""
         pairs = np.array(list(combinations(range(len(self.names)), 2)), dtype=int).reshape(-1, 2)
         low, high = np.sort(self.frequencies[pairs], axis=1).T
         similar = (1 - max_shift) * high <= (1 + max_shift) * low
         if self.shapes is not None:
             mac, _ = shape_agreement(self.shapes.T, self.shapes, [])
             similar &= mac[pairs[:, 0], pairs[:, 1]] >= min_mac
-        if similar.any():
-            first = "/".join(self.names[mode] for mode in pairs[similar][0])
-            by = "no shapes are given" if self.shapes is None else f"their shapes have a MAC of {min_mac:g} or more"
-            warn_user(
-                f"{similar.sum()} of {len(pairs)} pairs of reference modes cannot be distinguished, the first {first}: "
-                f"a frequency can lie within max_shift={max_shift:g} of both, and {by}. One may be taken for the "
-                "other. Use a smaller max_shift, or more sensors",
-                RecordsWarning,
+        if not similar.any():
+            return []
+        named = ", ".join("/".join(self.names[mode] for mode in pair) for pair in pairs[similar])
+        by = "no shapes are given" if self.shapes is None else f"their shapes have a MAC of {min_mac:g} or more"
+        return [
+            RecordsWarning(
+                f"reference modes cannot be distinguished: {named}. A frequency can lie within "
+                f"max_shift={max_shift:g} of both, and {by}. One may be taken for the other. Use a smaller max_shift, "
+                "or more sensors",
                 "similar-modes",
             )
+        ]
 
 
 def read_reference(reference: Any) -> ReferenceModes:
@@ -290,13 +288,15 @@ class Pairs(NamedTuple):
 
 
 def fitting_pairs(poles: Poles, modes: ReferenceModes, min_mac: float, close: float) -> Pairs:
-    """All pairs of a pole and a mode with similar shapes, within a factor of `LARGEST_RATIO` in frequency."""
+    """All pairs of a pole and a mode with similar shapes, within a factor of 8 in frequency: those in rad/s are 6.3
+    times those in Hz."""
     groups = modes.close_groups(close)
     blocks = []
-    for start in range(0, max(len(poles.frequencies), 1), POLES_AT_A_TIME):
-        block = slice(start, start + POLES_AT_A_TIME)
+    at_a_time = 65_536  # poles whose products with all modes are in memory
+    for start in range(0, max(len(poles.frequencies), 1), at_a_time):
+        block = slice(start, start + at_a_time)
         ratios = poles.frequencies[block, np.newaxis] / modes.frequencies
-        fits = (ratios < LARGEST_RATIO) & (ratios > 1 / LARGEST_RATIO)
+        fits = (ratios < 8) & (ratios > 1 / 8)
         if poles.shapes is None or modes.shapes is None:
             mac = span = np.ones(ratios.shape)
         else:
@@ -311,7 +311,7 @@ def fitting_pairs(poles: Poles, modes: ReferenceModes, min_mac: float, close: fl
 
 def assign(record: Positions, pole: Positions, mode: Positions, cost: Array) -> Positions:
     """Positions of the pairs that assign poles to modes one-to-one in every record, at the lowest total cost. A mode
-    may stay without a pole at the cost `MISSED`."""
+    may stay without a pole at the cost `MISSED_MODE`."""
     order = np.lexsort((cost, mode, record))
     is_first = np.ones(len(order), dtype=bool)
     is_first[1:] = (np.diff(record[order]) != 0) | (np.diff(mode[order]) != 0)
@@ -325,8 +325,8 @@ def assign(record: Positions, pole: Positions, mode: Positions, cost: Array) -> 
         pairs = order[start:end]
         modes, row = np.unique(mode[pairs], return_inverse=True)
         poles, column = np.unique(pole[pairs], return_inverse=True)
-        costs = np.full((len(modes), len(poles) + len(modes)), MISSED)
-        costs[:, : len(poles)] = FORBIDDEN
+        costs = np.full((len(modes), len(poles) + len(modes)), MISSED_MODE)
+        costs[:, : len(poles)] = 1e6  # pairs that do not fit
         costs[row, column] = cost[pairs]
         solution = linear_sum_assignment(costs)[1]
         chosen.append(pairs[solution[row] == column])

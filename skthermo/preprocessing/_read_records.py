@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from skthermo._core.text import counted
-from skthermo._core.warnings import warn_user
+from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.loggers.together import LoggerRecords
 
@@ -30,11 +30,11 @@ def read_records(
     Parameters
     ----------
     *files : str or Path
-        One file with all columns, or those of temperatures first and those of frequencies second. Files with the same
-        columns follow each other; others are joined by their stamps.
+        One file with all columns, or a file of temperatures and then a file of frequencies. Files with the same columns
+        follow each other; others are joined by their stamps.
     temperatures, responses : sequence of str, optional
-        Names of the columns. By default those of the first and of the second of two files, else as names and units
-        tell.
+        Names of the columns. By default, the columns of the first of two files are temperatures and the columns of the
+        second are responses; names and units decide in one file.
     zone : str, optional
         Time zone of the logger's clock, such as "Europe/Brussels". By default stamps have no time zone, and those with
         an offset are in UTC.
@@ -83,19 +83,20 @@ def read_records(
     if stamps is not None and not (isinstance(stamps, str) and stamps):
         raise ValueError(f"stamps is {stamps!r:.100}; expected a format such as '%d.%m.%Y %H:%M'")
     temperatures, responses = _names(temperatures, "temperatures"), _names(responses, "responses")
-    read = LoggerRecords.of(list(map(Path, files)), temperatures, responses, (), zone, stamps)
+    read = LoggerRecords.read(list(map(Path, files)), temperatures, responses, (), zone, stamps)
+    findings = [finding for look in read.looks for finding in look.findings]
     said = [note for look in read.looks for note in look.notes]
     said += [f"{name!r} is not used, as {why}" for name, why in read.ignored.items()]
     if said:
         text = f"{'; '.join(said)}. If that is wrong, name the columns, or the format of stamps"
-        warn_user(text, RecordsWarning, "read-as")
+        findings.append(RecordsWarning(text, "read-as"))
     if len(read.waiting):
-        warn_user(
+        text = (
             f"{counted(len(read.waiting), 'stamp')} are not in all files, the first {read.waiting.min()}. They are "
-            f"left out; {len(read.table)} records have all columns. If they are many, compare the loggers' clocks",
-            RecordsWarning,
-            "unmatched-stamps",
+            f"left out; {len(read.table)} records have all columns. If they are many, compare the loggers' clocks"
         )
+        findings.append(RecordsWarning(text, "unmatched-stamps"))
+    warn_each(findings)
     return read.table[read.roles["temperatures"]], read.table[read.roles["responses"]]
 
 

@@ -14,9 +14,9 @@ import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.arrays import Array, rows_by_pattern
+from skthermo._core.arrays import Array, means_of_known, median, rows_by_pattern
 from skthermo._core.frames import correlation_times
-from skthermo._core.warnings import without_warnings
+from skthermo.exceptions import WeatherWarning
 from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.gaussian import Gaussian
@@ -60,6 +60,7 @@ class BaselineResiduals:
     out-of-fold predictions. ``errors``, (n_records, n_modes), are the relative standard deviations of out-of-fold
     predictions as a mapper states them, None if it does not; ``reach`` is the weather within which they hold, all by
     default, and ``beyond``, (n_records,), how far each record was outside that of the mapper that predicted it.
+    ``findings`` say in which weather residuals are not to be trusted.
     """
 
     weather: Array
@@ -71,6 +72,7 @@ class BaselineResiduals:
     errors: Array | None = None
     reach: TrainingRange | None = None
     beyond: Array | None = None
+    findings: tuple[WeatherWarning, ...] = ()
 
     @cached_property
     def coordinates(self) -> Pipeline:
@@ -151,7 +153,7 @@ class BaselineResiduals:
     @property
     def is_overfitted(self) -> bool:
         """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
-        own, out_of_fold = (np.nanmedian(np.abs(values), axis=0) for values in (self.own, self.values))
+        own, out_of_fold = median(np.abs(self.own)), median(np.abs(self.values))
         return bool(own.mean() < OVERFITTED * out_of_fold.mean())
 
     def quantiles(self, confidence: float) -> Array:
@@ -212,19 +214,16 @@ class BaselineResiduals:
         are too small, and do not count where it has learned noise: where they change less from record to record.
         """
         own, out_of_fold = np.abs(np.diff(self.own, axis=0)), np.abs(np.diff(self.values, axis=0))
-        with without_warnings():  # of modes that are never there twice in a row
-            size = np.nanmean(np.nanmedian(out_of_fold, axis=0))
-            is_overfitted = np.nanmean(np.nanmedian(own, axis=0)) < OVERFITTED * size
+        is_overfitted = np.nansum(median(own)) < OVERFITTED * np.nansum(median(out_of_fold))
         return self.values if is_overfitted else (self.values + self.own) / 2
 
     @cached_property
     def level_errors(self) -> Array:
         """Relative standard error of each mode's standard deviation, (n_modes,), from its fourth moment; without
         outliers, and with as many records as are independent."""
-        with without_warnings():
-            centred = self.usual - np.nanmean(self.usual, axis=0)
-            squares = np.nanmean(centred**2, axis=0)
-            kurtosis = np.nanmean(centred**4, axis=0) / np.maximum(squares, np.finfo(float).tiny) ** 2
+        centred = self.usual - means_of_known(self.usual)
+        squares = means_of_known(centred**2)
+        kurtosis = means_of_known(centred**4) / np.maximum(squares, np.finfo(float).tiny) ** 2
         n_independent = (~np.isnan(self.usual)).sum(axis=0) / self.correlation_time
         return np.nan_to_num(np.sqrt(np.maximum(kurtosis - 1, 0.0) / np.maximum(4 * n_independent, 1.0)))
 
@@ -236,8 +235,7 @@ class BaselineResiduals:
     @cached_property
     def _normal(self) -> Gaussian:
         """Normal distribution of the residuals without outliers."""
-        with without_warnings():
-            found = Gaussian.of(self.usual)
+        found = Gaussian.fitted(self.usual)
         return Gaussian(found.mean, found.covariance + JITTER * np.diag(np.diag(found.covariance)))
 
     def draw_records(self, weather: Array, random_state: np.random.RandomState) -> tuple[NDArray[np.intp], list[Array]]:
@@ -342,7 +340,7 @@ class BaselineResiduals:
         if self.errors is None or not self.errors.any():
             return self.values
         variances = self.errors[:, :, np.newaxis] ** 2 * np.eye(self.n_modes)
-        own = np.diag(Gaussian.of(self.values, variances).covariance)
+        own = np.diag(Gaussian.fitted(self.values, variances).covariance)
         return self.values * np.sqrt(own / (own + self.errors**2))
 
     @cached_property

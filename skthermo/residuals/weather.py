@@ -16,8 +16,8 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo._core.arrays import Array, as_floats, median, range_sums, robust_deviation, spread_evenly
-from skthermo._core.frames import Table, column_names, frame_like, has_stamps, row_times
-from skthermo._core.warnings import warn_user, without_warnings
+from skthermo._core.frames import Table, column_names, frame_like, row_times
+from skthermo._core.warnings import collected
 from skthermo.exceptions import RecordsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.gaussian import Gaussian
@@ -70,66 +70,64 @@ class TrainingRange:
         beyond = np.maximum(np.maximum(self.lowest - values, values - self.highest), 0.0)
         return beyond / np.where(width > 0, width, 1.0) + np.where(np.isnan(values), np.nan, 0.0)
 
-    def warning(self, inputs: Any) -> str:
-        """Text of the warning if rows are far outside the range, else an empty string."""
+    def doubts(self, inputs: Any) -> list[WeatherWarning]:
+        """The finding that rows are far outside the range, in units of it."""
         values = as_floats(inputs)
-        known = ~np.isnan(values).any(axis=1)
-        if not known.any():
-            return ""
-        limits = np.array([np.fmin.reduce(values), np.fmax.reduce(values)])
-        if (np.nan_to_num(self.excess(limits)) <= FAR_OUTSIDE).all():
-            return ""
-        excess = np.where(known[:, np.newaxis], self.excess(inputs), 0.0)
-        rows = (excess > FAR_OUTSIDE).any(axis=1)
-        if not rows.any():
-            return ""
-        column = int(excess.max(axis=0).argmax())
-        row = int(excess[:, column].argmax())
-        kelvin = " (these look like kelvin)" if np.nanmin(values[known]) > 150 else ""
-        value, lowest, highest = values[row, column], self.lowest[column], self.highest[column]
-        return (
-            f"{rows.sum()} of {len(rows)} rows have temperatures outside the training range by more than "
-            f"{FAR_OUTSIDE:.0%} of it: {self.names[column]!r} is {value:.4g} in row {row}, trained from {lowest:.4g} "
-            f"to {highest:.4g}. Predictions there are extrapolated. Give degrees Celsius{kelvin}, or train on such "
-            "weather"
-        )
+        known = values[~np.isnan(values).any(axis=1)]
+        far = (np.nan_to_num(self.excess(known)) > FAR_OUTSIDE).any(axis=0)
+        if not far.any():
+            return []
+        names = ", ".join(repr(name) for name, is_far in zip(self.names, far, strict=True) if is_far)
+        kelvin = " (these look like kelvin)" if np.nanmin(known) > 150 else ""
+        return [
+            WeatherWarning(
+                f"temperatures are outside the training range by more than {FAR_OUTSIDE:.0%} of it: {names}. "
+                f"Predictions there are extrapolated (extrapolation_distance says how far). Give degrees Celsius"
+                f"{kelvin}, or train on such weather",
+                "outside-training-weather",
+            )
+        ]
 
 
-def warn_of_implausible(known: TrainingRange, temperatures: Any) -> None:
-    """Warn of temperatures that no weather gives, beside a known range; an input may be something else, so it is no
-    error."""
-    values = as_floats(temperatures)
-    far = Plausible.beside(known.lowest, known.highest).implausible(values)
-    if far.any():
-        column = int(far.sum(axis=0).argmax())
-        value = values[far[:, column].argmax(), column]
-        warn_user(
-            f"temperatures are implausible: {known.names[column]!r} is {value:g} in {far[:, column].sum()} of "
-            f"{len(far)} rows, {far.sum()} values in all. Their predictions are wrong. Give degrees Celsius, and NaN "
-            "where a value is missing",
-            RecordsWarning,
+def implausible(known: TrainingRange, temperatures: Any) -> list[RecordsWarning]:
+    """The finding of temperatures that no weather gives, beside a known range; an input may be something else, so it is
+    no error."""
+    far = Plausible.beside(known.lowest, known.highest).implausible(as_floats(temperatures)).any(axis=0)
+    if not far.any():
+        return []
+    names = ", ".join(repr(name) for name, is_far in zip(known.names, far, strict=True) if is_far)
+    return [
+        RecordsWarning(
+            f"temperatures are implausible: {names}. Their predictions are wrong. Give degrees Celsius, and NaN where "
+            "a value is missing",
             "implausible-temperatures",
         )
+    ]
 
 
-def warn_of_unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> None:
-    """Warn of the fold that has most records in weather that the other folds, from 0, have not seen."""
-    values, worst, text = as_floats(weather), SHARE_OUTSIDE, ""
+def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> list[WeatherWarning]:
+    """The finding that a fold has many records in weather that the other folds, from 0, have not seen.
+
+    That is a tenth of its records, and at least ten.
+    """
+    values, names = as_floats(weather), column_names(weather, "T")
+    found = np.zeros(values.shape[1], dtype=bool)
     for fold in np.unique(folds[folds >= 0]):
         test = folds == fold
-        known = TrainingRange.of(weather, ~test)
-        excess = np.nan_to_num(known.excess(values[test]))
-        outside = (excess > BEYOND).any(axis=1)
-        if outside.mean() > worst and outside.sum() >= FEWEST_OUTSIDE:
-            worst, column = outside.mean(), int(excess.max(axis=0).argmax())
-            seen = values[test, column]
-            text = (
-                f"{outside.sum()} of {test.sum()} records of fold {fold + 1} of {folds.max() + 1} are in weather that "
-                f"the other folds lack: {known.names[column]!r} is there from {np.nanmin(seen):.4g} to "
-                f"{np.nanmax(seen):.4g}, elsewhere from {known.lowest[column]:.4g} to {known.highest[column]:.4g}. "
-                f"{consequence}. Train on a whole year, in folds that each have all seasons, such as blocks of a week"
-            )
-    warn_user(text, WeatherWarning, "weather-of-one-fold")
+        outside = np.nan_to_num(TrainingRange.of(weather, ~test).excess(values[test])) > BEYOND
+        n_outside = outside.any(axis=1).sum()
+        if n_outside >= 10 and n_outside > 0.1 * test.sum():
+            found |= outside.any(axis=0)
+    if not found.any():
+        return []
+    listed = ", ".join(repr(name) for name, is_found in zip(names, found, strict=True) if is_found)
+    return [
+        WeatherWarning(
+            f"records of a fold are in weather that the other folds lack: {listed}. {consequence}. Train on a whole "
+            "year, in folds that each have all seasons, such as blocks of a week",
+            "weather-of-one-fold",
+        )
+    ]
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,7 @@ class SensorRegression:
         values = as_floats(temperatures)
         telling = _telling_rows(values)
         learned = ~np.isnan(telling).all(axis=0)
-        found = Gaussian.of(telling[:, learned])
+        found = Gaussian.fitted(telling[:, learned])
         variances = np.diag(found.covariance)
         own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
         reach = TrainingRange.of(temperatures, np.ones(len(values), dtype=bool))
@@ -184,37 +182,39 @@ class SensorRegression:
             departures[:, self.learned] = centred @ precision / np.diag(precision)
         return departures
 
-    def warning(self, temperatures: Any) -> str:
-        """Text of the warning if a sensor departs from the others as it did not in training, else an empty string.
+    def doubts(self, temperatures: Any) -> list[RecordsWarning]:
+        """The finding that a sensor departs from the others as it did not in training.
 
         Records count in which the others are within their training range and it is not far outside, if these are most.
+        A departure is one in the mean of consecutive records: three times the largest in training (a season that these
+        lack gives two), at least a degree, below which thermometers may differ without a fault, and at least 3 % of the
+        training range, below which predictions hardly move.
         """
         order = np.argsort(row_times(temperatures), kind="stable")
         lengths = np.array(list(self.usual), dtype=int)
         length = lengths[lengths <= len(order)].max(initial=0)
         if not length:
-            return ""
+            return []
         values = as_floats(temperatures)[order]
         beyond = np.nan_to_num(self.reach.excess(values))
         outside = beyond > 0
         evaluated = (outside.sum(axis=1, keepdims=True) == outside) & (beyond <= FAR_OUTSIDE)
         departures = np.where(evaluated, self.departures(values), np.nan)
         departures[:, evaluated.mean(axis=0) < 0.5] = np.nan
-        means, usual = _running_means(departures, length), self.usual[length]
-        least = np.maximum(MATTERS * (self.reach.highest - self.reach.lowest), A_DEGREE)
-        limits = np.maximum(TIMES_USUAL * usual, least)
-        excess = np.nan_to_num(np.abs(means) / limits)
-        place, sensor = np.unravel_index(excess.argmax(), excess.shape)
-        if excess[place, sensor] <= 1:
-            return ""
-        rows = np.flatnonzero(np.convolve(excess[:, sensor] > 1, np.ones(length)) > 0.5)
-        first = temperatures.index[order[rows[0]]] if has_stamps(temperatures) else f"row {order[rows[0]]}"
-        return (
-            f"{self.reach.names[int(sensor)]!r} departs from what the other sensors predict in {len(rows)} of "
-            f"{len(order)} rows, {first} the first: by {means[place, sensor]:+.2g} degrees in the mean of {length} "
-            f"records (at most {usual[sensor]:.2g} in training). It drifts, is stuck or was moved, which moves "
-            "predictions and gives false alarms. Put NaN where it is wrong: the other sensors fill it"
-        )
+        least = np.maximum(0.03 * (self.reach.highest - self.reach.lowest), 1.0)
+        limits = np.maximum(3.0 * self.usual[length], least)
+        excess = np.nan_to_num(np.abs(_running_means(departures, length)) / limits)
+        sensor = int(np.unravel_index(excess.argmax(), excess.shape)[1])
+        if excess[:, sensor].max() <= 1:
+            return []
+        return [
+            RecordsWarning(
+                f"{self.reach.names[sensor]!r} departs from what the other sensors predict, more than it did in "
+                "training. It drifts, is stuck or was moved, which moves predictions and gives false alarms. Put NaN "
+                "where it is wrong: the other sensors fill it",
+                "sensor-disagrees",
+            )
+        ]
 
     def errors(self, temperatures: Any) -> Iterator[Array]:
         """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
@@ -262,7 +262,7 @@ class PredictionError:
         What was filled is moved by one standard deviation up and down, sensor by sensor, and predicted again. The error
         is that of the ``outcome`` of each prediction.
         """
-        with without_warnings():
+        with collected():
             middle = np.empty(0)
             moved: list[Array] = []
             for error in sensors.errors(raw):
@@ -302,25 +302,21 @@ NO_ERRORS = PredictionError(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
 
 
 def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:
-    """Text of the warning that counts by sensor what was filled, from its standard deviations; else an empty string."""
-    filled = deviations > 0
+    """Text of the warning that names sensors that were filled, from standard deviations; else an empty string."""
+    filled = (deviations > 0).any(axis=0)
     if not filled.any():
         return ""
-    sensors = [
-        f"{name!r} in {rows.sum()} of {len(rows)} rows (standard deviation {np.sqrt(np.mean(sizes[rows] ** 2)):.2g})"
-        for name, rows, sizes in zip(names, filled.T, deviations.T, strict=True)
-        if rows.any()
-    ]
+    listed = ", ".join(repr(name) for name, is_filled in zip(names, filled, strict=True) if is_filled)
     return (
-        f"missing temperatures were filled from the other sensors: {', '.join(sensors)}. {consequence}. If a sensor "
-        "has failed, leave it out and fit again"
+        f"missing temperatures were filled from the other sensors: {listed}. {consequence}. If a sensor has failed, "
+        "leave it out and fit again"
     )
 
 
 def unpredicted_text(
     unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach to no record"
 ) -> str:
-    """Text of the warning that counts rows that cannot be predicted, for want of weather or as ``others`` says."""
+    """Text of the warning of rows that cannot be predicted, for want of weather or as ``others`` says."""
     if not unknown.any():
         return ""
     empty = np.isnan(weather).all(axis=1)
@@ -328,10 +324,8 @@ def unpredicted_text(
         "without any temperature": (unknown & empty, "A row needs a temperature of at least one sensor"),
         others: (unknown & ~empty, "Lags need the records before a row: give these, too"),
     }
-    found = {cause: one for cause, one in causes.items() if one[0].any()}
-    counts = ", ".join(f"{rows.sum()} {cause}" for cause, (rows, _) in found.items())
-    needed = ". ".join(need for _, need in found.values())
-    return f"{unknown.sum()} of {len(unknown)} rows cannot be predicted and are NaN: {counts}. {needed}"
+    found = {cause: need for cause, (rows, need) in causes.items() if rows.any()}
+    return f"rows {', and rows '.join(found)} cannot be predicted and are NaN. {'. '.join(found.values())}"
 
 
 def _running_means(columns: Array, length: int) -> Array:
@@ -409,14 +403,7 @@ def weather_axes(weather: Array, explained: float = EXPLAINED) -> tuple[Array, A
 
 
 class NearestPlaces:
-    """Places, of which a number is nearest to each wanted one; many wanted places are searched for once.
-
-    Results are kept up to `MOST_KEPT` positions, those asked for first, and few new ones beside many are searched for
-    again rather than sorted in. Copies, saved ones too, begin with none.
-    """
-
-    _kept: tuple[NDArray[np.void], Array, NDArray[np.int32]] | None = None
-    """Bytes of wanted places in order, mean distances and positions of those nearest to each."""
+    """Places, of which a number is nearest to each wanted one."""
 
     def __init__(self, places: Array, number: int) -> None:
         self.places, self.number = places, min(number, len(places))
@@ -431,21 +418,10 @@ class NearestPlaces:
     def of(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
         """Mean distance (n_wanted,) to the places nearest to each wanted one, and their positions, nearest first,
         (n_wanted, number)."""
-        size = wanted.itemsize * wanted.shape[1]
-        keys = np.ascontiguousarray(wanted).view(np.dtype((np.void, size))).ravel()  # equal where all bytes are
-        kept = self._kept or (keys[:0], np.empty(0), np.empty((0, self.number), dtype=np.int32))
-        at = np.searchsorted(kept[0], keys)
-        new = (at == len(kept[0])) | (np.append(kept[0], keys[:1])[at] != keys)
-        distances, near = np.empty(len(keys)), np.empty((len(keys), self.number), dtype=np.int32)
-        distances[~new], near[~new] = kept[1][at[~new]], kept[2][at[~new]]
-        rows = np.flatnonzero(new)
-        for part in parts(len(rows), self.number):
-            lengths, near[rows[part]] = self._tree.kneighbors(wanted[rows[part]])
-            distances[rows[part]] = lengths.mean(axis=1)
-        if len(rows) > LEAST_NEW * len(kept[0]) and (len(kept[0]) + len(rows)) * self.number <= MOST_KEPT:
-            known, first = np.unique(np.append(kept[0], keys[rows]), return_index=True)
-            both = np.append(kept[1], distances[rows]), np.append(kept[2], near[rows], axis=0)
-            self._kept = known, *(values[first] for values in both)
+        distances, near = np.empty(len(wanted)), np.empty((len(wanted), self.number), dtype=np.int32)
+        for part in parts(len(wanted), self.number):
+            lengths, near[part] = self._tree.kneighbors(wanted[part])
+            distances[part] = lengths.mean(axis=1)
         return distances, near
 
 

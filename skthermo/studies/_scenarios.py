@@ -16,7 +16,7 @@ from skthermo._core.arrays import HUGE, as_mapping, check_names, is_real, real_a
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import Table, row_times, time_of
 from skthermo.fem import FEModel
-from skthermo.surrogate import FittedChain
+from skthermo.surrogate import DataInformedFEM
 
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
 
@@ -74,14 +74,14 @@ class BaseScenario(ABC):
         """Hook: the arguments that differ from those of the healthy structure."""
 
 
-def check_chain(fem: FittedChain) -> None:
+def check_chain(fem: DataInformedFEM) -> None:
     """Raise an error for what is not a fitted chain."""
     if isinstance(fem, type) or not hasattr(fem, "simulate"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
     check_is_fitted(fem)
 
 
-def checked_models(fem: FittedChain, models: Any) -> list[FEModel]:
+def checked_models(fem: DataInformedFEM, models: Any) -> list[FEModel]:
     """Models that a chain can be refitted with, or an error."""
     if isinstance(models, str) or not isinstance(models, Sequence) or not len(models):
         raise ValueError(

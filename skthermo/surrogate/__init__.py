@@ -6,7 +6,6 @@ step.
 
 from skthermo.surrogate._regression import TemperatureMapper, paper_network
 from skthermo.surrogate.chain import DataInformedFEM, FitReport, refitted, resampled, with_model
-from skthermo.surrogate.chain import FittedChain as FittedChain  # what annotations of other packages name
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
 
 __all__ = [

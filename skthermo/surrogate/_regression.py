@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -28,6 +25,7 @@ from skthermo._core.estimators import (
     check_is_fitted,
     check_takes_weights,
     fit_outputs,
+    fit_weighted,
     predict_with_std,
     seed_parts,
     seeded,
@@ -43,18 +41,10 @@ from skthermo._core.frames import (
 )
 from skthermo._core.memory import remembered
 from skthermo._core.parallel import single_blas_thread
+from skthermo._core.warnings import collected, warn_each
 from skthermo.fem import evaluate
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import HingeFeatures, set_aside
-
-NETWORKS: dict[str, dict[str, Any]] = {
-    "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
-    "kw51-inverse": {"hidden_layer_sizes": (256, 128, 64, 32, 16), "alpha": 1e-4, "batch_size": 128},
-    "kw51-mapper": {"hidden_layer_sizes": (256, 128, 64, 32), "alpha": 1.0, "batch_size": 256},
-}
-PENALTIES = np.logspace(-3, 5, 33)
-ALLOWED = ("no-rows", "stuck-sensor", "implausible-values")  # findings in rows of any order, of any inputs
-TABLES = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
 
 
 def default_network() -> MLPRegressor:
@@ -64,10 +54,10 @@ def default_network() -> MLPRegressor:
     )
 
 
-def default_lines(penalties: Any = PENALTIES, **options: Any) -> Pipeline:
+def default_lines(penalties: ArrayLike | None = None, **options: Any) -> Pipeline:
     """Piecewise-linear regression with penalised changes of slope, which goes on straight beyond the data."""
     hinges = HingeFeatures().set_output(transform="default")  # whatever the global setting is at fit and at predict
-    return make_pipeline(hinges, RidgeCV(penalties, **options))
+    return make_pipeline(hinges, RidgeCV(np.logspace(-3, 5, 33) if penalties is None else penalties, **options))
 
 
 def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:
@@ -104,48 +94,25 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
     >>> paper_network("kw51-inverse", alpha=0.01).hidden_layer_sizes
     (256, 128, 64, 32, 16)
     """
+    networks: dict[str, dict[str, Any]] = {
+        "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
+        "kw51-inverse": {"hidden_layer_sizes": (256, 128, 64, 32, 16), "alpha": 1e-4, "batch_size": 128},
+        "kw51-mapper": {"hidden_layer_sizes": (256, 128, 64, 32), "alpha": 1.0, "batch_size": 256},
+    }
+    tables = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
     is_name = isinstance(network, str | int) and not isinstance(network, bool)
-    purpose = TABLES.get(network, network) if is_name else None
-    if purpose not in NETWORKS:
-        raise ValueError(f"network is {network!r}; expected one of {[*NETWORKS]} or of the tables {[*TABLES]}")
-    settings = NETWORKS[purpose] | {"learning_rate_init": 0.001, "max_iter": 1000}
-    return MLPRegressor(**(settings | parameters))
-
-
-@dataclass(frozen=True)
-class Standardiser:
-    """z = (x - mean) / scale, or of log x, and the inverse."""
-
-    mean: Array
-    scale: Array
-    log: bool
-
-    @classmethod
-    def fitted(cls, values: Array, *, log: bool, sample_weight: Array | None = None) -> Standardiser:
-        """Mean and standard deviation of some values; the scale of a constant column is 1."""
-        scaler = StandardScaler().fit(np.log(values) if log else values, sample_weight=sample_weight)
-        return cls(scaler.mean_, scaler.scale_, log)
-
-    def transform(self, values: Array) -> Array:
-        return ((np.log(values) if self.log else values) - self.mean) / self.scale
-
-    def inverse_transform(self, standardised: Array) -> Array:
-        """Values from standardised values; a logarithm too large for a float becomes infinity."""
-        x = self.mean + standardised * self.scale
-        with np.errstate(over="ignore"):
-            return np.exp(x) if self.log else x
-
-    def inverse_deviations(self, deviations: Array, values: Array) -> Array:
-        """Standard deviations of values from those of the standardised values, to first order."""
-        return deviations * self.scale * (values if self.log else 1)
+    purpose = tables.get(network, network) if is_name else None
+    if purpose not in networks:
+        raise ValueError(f"network is {network!r}; expected one of {[*networks]} or of the tables {[*tables]}")
+    return MLPRegressor(**(networks[purpose] | {"learning_rate_init": 0.001, "max_iter": 1000} | parameters))
 
 
 class MultiplierRegressor(RegressorMixin, Estimator):
     """Base of regressors that predict multipliers: fitted to complete rows, NaN where an input is missing.
 
-    A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`. Hook:
-    `_predict_arrays` gives multipliers and standard deviations of rows of X, and calls `_regress`.
-    ``_default_regressor`` makes the regressor where none is given.
+    A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`. Hooks:
+    ``_default_regressor`` makes the regressor where none is given, ``_inputs`` reads and checks the inputs of
+    ``predict``.
     """
 
     _default_regressor: Callable[[], BaseEstimator]
@@ -181,8 +148,10 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         ValueError
             If ``return_std`` is set and the regressor gives no standard deviations.
         """
-        theta, std = self._predict_arrays(X, check_flag(return_std, "return_std"))
-        return (self._as_targets(X, theta), self._as_targets(X, std)) if return_std else self._as_targets(X, theta)
+        theta, std = self._regress(self._inputs(X), check_flag(return_std, "return_std"))
+        if std is None:
+            return self._as_targets(X, theta)
+        return self._as_targets(X, theta), self._as_targets(X, std)
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over parameters.
@@ -208,6 +177,10 @@ class MultiplierRegressor(RegressorMixin, Estimator):
     def _default_part(self, name: str) -> BaseEstimator | None:
         return self._default_regressor() if name == "regressor" else None
 
+    def _inputs(self, X: ArrayLike) -> Array:
+        check_is_fitted(self)
+        return validate_data(self, X, dtype=np.float64, reset=False)
+
     def _read_xy(self, X: Table, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
         """X and y, (n_samples, n_parameters), with NaN where something is missing."""
         if y is None:
@@ -227,10 +200,10 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         self,
         X: Array,
         y: Array,
-        random_state: np.random.RandomState | None,
-        *,
-        log_inputs: bool,
         sample_weight: Array | None = None,
+        *,
+        random_state: int | np.random.RandomState | None,
+        log_inputs: bool = False,
         memory: str | Memory | None = None,
     ) -> None:
         """Fit on the complete rows of X and y (n_samples, n_parameters); a memory keeps the regressor."""
@@ -246,36 +219,39 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         X, y = X[complete], y[complete]
         weights = None if sample_weight is None else sample_weight[complete]
         self.n_parameters_ = y.shape[1]
-        self.inputs_ = Standardiser.fitted(X, log=log_inputs and bool((X > 0).all()), sample_weight=weights)
-        self.targets_ = Standardiser.fitted(y, log=bool((y > 0).all()), sample_weight=weights)
+        self.log_inputs_, self.log_targets_ = log_inputs and bool((X > 0).all()), bool((y > 0).all())
+        X, y = np.log(X) if self.log_inputs_ else X, np.log(y) if self.log_targets_ else y
+        self.inputs_, self.targets_ = (StandardScaler().fit(values, sample_weight=weights) for values in (X, y))
+        X, y = self.inputs_.transform(X), self.targets_.transform(y)
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
-        seed_parts(regressor, random_state)
-        targets = self.targets_.transform(y)
-        learned = self.inputs_.transform(X), targets[:, 0] if targets.shape[1] == 1 else targets, weights
+        seed_parts(regressor, seeded(random_state))
         with single_blas_thread():
-            self.regressor_ = remembered(
-                memory, "regressor", partial(fit_outputs, regressor, *learned), (regressor, *learned)
-            )
+            y = y[:, 0] if y.shape[1] == 1 else y
+            self.regressor_ = remembered(memory, fit_outputs, regressor, X, y, weights)
 
-    @abstractmethod
-    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
-        """Multipliers and standard deviations, (n_samples, n_parameters); NaN where unknown or not requested."""
-
-    def _regress(self, inputs: Array, return_std: bool = False) -> tuple[Array, Array]:
-        """What the regressor gives for inputs that have been read."""
+    def _regress(self, inputs: Array, return_std: bool = False) -> tuple[Array, Array | None]:
+        """Multipliers, (n_samples, n_parameters), of inputs that have been read, and their standard deviations."""
         complete = ~np.isnan(inputs).any(axis=1)
         theta = np.full((len(inputs), self.n_parameters_), np.nan)
-        std = np.full_like(theta, np.nan)
-        if complete.any():
-            standardised = self.inputs_.transform(inputs[complete])
-            if return_std:
-                means, deviations = predict_with_std(self.regressor_, standardised)
-                theta[complete] = self.targets_.inverse_transform(means)
-                std[complete] = self.targets_.inverse_deviations(deviations, theta[complete])
-            else:
-                means = as_columns(self.regressor_.predict(standardised))
-                theta[complete] = self.targets_.inverse_transform(means)
-        return theta, std
+        std = np.full_like(theta, np.nan) if return_std else None
+        if not complete.any():
+            return theta, std
+        known = np.log(inputs[complete]) if self.log_inputs_ else inputs[complete]
+        standardised = self.inputs_.transform(known)
+        if std is None:
+            means = as_columns(self.regressor_.predict(standardised))
+        else:
+            means, deviations = predict_with_std(self.regressor_, standardised)
+            if deviations is None:
+                raise ValueError(
+                    f"{self.regressor_!r} gives no standard deviations; expected a regressor whose predict takes "
+                    "return_std, such as GaussianProcessRegressor or BayesianRidge"
+                )
+            std[complete] = deviations * self.targets_.scale_
+        found = self.targets_.inverse_transform(means)
+        with np.errstate(over="ignore"):
+            theta[complete] = np.exp(found) if self.log_targets_ else found
+        return theta, std * theta if std is not None and self.log_targets_ else std
 
     def _as_targets(self, X: Table, values: Array) -> Any:
         """Predictions as a vector or a frame if the training targets were."""
@@ -319,7 +295,7 @@ class FrequencyInverse(TransformerMixin):
         if shapes is None:
             values = evaluate(model, X, n_jobs=self.n_jobs)
         else:
-            values = shapes.of_parameters(model, as_floats(X), self.n_jobs)
+            values = shapes.simulated(model, as_floats(X), self.n_jobs)
             names += [f"shape{i + 1}_dof{dof}" for i in range(model.n_modes) for dof in shapes.dofs]
         return frame_like(X, values, getattr(self, "feature_names_in_", names))
 
@@ -377,8 +353,12 @@ class TemperatureMapper(MultiplierRegressor):
     ----------
     regressor_ : regressor
         Fitted to standardised temperatures (inputs) and standardised log parameters (outputs).
-    inputs_, targets_ : Standardiser
-        Means and scales of the temperatures and of the (log) parameters.
+    inputs_, targets_ : StandardScaler
+        Means and scales of the temperatures and of the parameters, or of their logarithms.
+    log_inputs_, log_targets_ : bool
+        Whether logarithms of the inputs, and of the parameters, are standardised; never those of temperatures.
+    findings_ : list of SkthermoWarning
+        Values of the records that were set aside.
     n_parameters_, parameter_names_ : int, list of str or None
         Number of parameters and, where `fit` saw them in a frame, their names.
     y_is_vector_ : bool
@@ -443,15 +423,25 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        found = set_aside(frame_like(X, T), exclude=ALLOWED, needs_all=True)
-        T = np.asarray(found.temperatures)
+        harmless = ("no-rows", "stuck-sensor", "implausible-values")  # in rows of any order, of any inputs
+        with collected() as self.findings_:
+            found = set_aside(frame_like(X, T), exclude=harmless, needs_all=True)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)
-        self._learn(T, theta, seeded(self.random_state), log_inputs=False, sample_weight=weights)
+        self._learn(np.asarray(found.temperatures), theta, weights, random_state=self.random_state)
+        warn_each(self.findings_)
         return self
 
-    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
-        check_is_fitted(self)
-        inputs = validate_data(self, X, dtype=np.float64, reset=False)
-        return self._regress(inputs, return_std)
+    def _fit_checked(self, X: Table, y: Table, sample_weight: Array | None) -> TemperatureMapper:
+        self.findings_ = []
+        T, theta = self._read_xy(X, y, ("temperatures", "theta"))
+        self._learn(T, theta, sample_weight, random_state=self.random_state)
+        return self
+
+
+def fit_checked(regressor: BaseEstimator, X: Table, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
+    """Fit a regressor to records that were checked before: a `TemperatureMapper` does not check them again."""
+    if isinstance(regressor, TemperatureMapper):
+        return regressor._fit_checked(X, y, sample_weight)
+    return fit_weighted(regressor, X, y, sample_weight)

@@ -14,15 +14,6 @@ from skthermo.fem import FEModel, mac
 from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes
 
 LOW_MAC = 0.5  # MAC below which a measured shape is not that of the mode it is paired with
-DISTANCE_AT_BOUND = 1e-4
-"""Distance from a bound, as a share of the box, below which a parameter counts as being at the bound."""
-
-LARGE_ERROR = 15.0  # error of a frequency of the updated model, in percent, above which a warning is given
-RAD_PER_S = 0.15  # error of frequencies over 2 pi, below which rad/s may have been given in place of Hz
-LARGE_DEVIATION = 1e4  # multiple of the smallest standard deviation above which a parameter is not determined
-NOISE_LIMIT = 10.0  # error of a frequency, in standard deviations, that noise does not explain
-SAME_OPTIMUM = 1e-3  # difference of multipliers below which two starts have ended at the same optimum
-SMALL_WEIGHT = 100  # weight of shapes below which the objective may be a narrow curved valley, slow to search
 
 
 def modes_table(model: FEModel, measured: Measured, theta: Array) -> pd.DataFrame:
@@ -46,7 +37,7 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
     optima: list[Array] = []
     for i in np.argsort(table["objective"], kind="stable"):
         theta = outcomes[i].theta
-        near = (number for number, known in enumerate(optima) if np.abs(theta - known).max() < SAME_OPTIMUM)
+        near = (number for number, known in enumerate(optima) if np.abs(theta - known).max() < 1e-3)
         table.loc[i, "optimum"] = number = next(near, len(optima))
         if number == len(optima):
             optima.append(theta)
@@ -55,12 +46,12 @@ def starts_table(outcomes: list[Outcome]) -> pd.DataFrame:
 
 def unfinished(outcome: Outcome, residuals: Residuals) -> ModelWarning:
     """The warning about a best start that has not converged."""
-    failed = f", {outcome.n_failed} of them without modes" if outcome.n_failed else ""
+    failed = ", and met theta without modes" if outcome.n_failed else ""
     weights = residuals.measured.shape_weights[residuals.weighted]
-    heavier = f", shape weights of {SMALL_WEIGHT} or more" if (weights < SMALL_WEIGHT).any() else ""
+    heavier = ", shape weights of 100 or more" if (weights < 100).any() else ""  # lighter ones make curved valleys
     return ModelWarning(
-        f"the best start has not converged in {outcome.n_evaluations} evaluations{failed}. theta_ may not be the "
-        f"optimum. Raise max_iter{heavier}, or narrow bounds to where the model has modes",
+        f"the best start has not converged{failed}. theta_ may not be the optimum (starts_ lists evaluations). Raise "
+        f"max_iter{heavier}, or narrow bounds to where the model has modes",
         "not-converged",
     )
 
@@ -74,7 +65,7 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
             yield ModelWarning(
                 f"modes {swapped.tolist()} change their order between the nominal model and the optimum. Frequencies "
                 "of other modes are fitted to theirs. Use a model with track=True, or give shapes",
-                "modes-cross",
+                "mode-order",
             )
         return
     modes = paired_modes(model, measured, theta)
@@ -95,55 +86,70 @@ def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[
         )
 
 
-def doubtful_parameters(
-    names: Sequence[str], theta: Array, bounds: Array, covariance: Array | None
-) -> Iterator[ModelWarning]:
-    """Warnings about parameters at their bounds and, without a prior, those that the modes do not determine."""
-    at_bound = at_bounds(theta, bounds)
-    if at_bound.any():
-        listed = ", ".join(f"{names[i]!r} ({theta[i]:.3g})" for i in np.flatnonzero(at_bound))
+def undetermined(names: Sequence[str], n_residuals: int, covariance: Array) -> Iterator[ModelWarning]:
+    """The warning, without a prior, about parameters that the measured modes do not determine."""
+    if len(names) > n_residuals:
         yield ModelWarning(
-            f"the optimum lies at the bounds of {listed}. The best value may be outside. Widen bounds, or correct what "
-            "the model lacks",
-            "at-bounds",
+            f"{len(names)} parameters are to be found from {n_residuals} residuals. Many theta fit equally well. Use "
+            "fewer parameters, shapes, or a prior",
+            "underdetermined",
         )
-    if covariance is not None:
-        deviations = np.sqrt(np.diagonal(covariance))
-        undetermined = ~(deviations < LARGE_DEVIATION * np.nanmin(deviations))
-        if undetermined.any() and not undetermined.all():
-            listed = [names[i] for i in np.flatnonzero(undetermined)]
-            yield ModelWarning(
-                f"the parameters {listed} hardly move the measured modes and are not determined. Leave them out, or "
-                "give a prior",
-                "undetermined-parameters",
-            )
+        return
+    deviations = np.sqrt(np.diagonal(covariance))
+    hardly = ~(deviations < 1e4 * np.fmin.reduce(deviations))
+    if hardly.any() and not hardly.all():
+        listed = [names[i] for i in np.flatnonzero(hardly)]
+        yield ModelWarning(
+            f"the parameters {listed} hardly move the measured modes and are not determined. Leave them out, or "
+            "give a prior",
+            "underdetermined",
+        )
 
 
 def at_bounds(theta: Array, bounds: Array) -> NDArray[np.bool_]:
-    """Which parameters are at their bounds."""
-    return np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < DISTANCE_AT_BOUND * np.diff(bounds, axis=1)[:, 0]
+    """Which parameters are at their bounds, within 1e-4 of the box."""
+    return np.abs(theta[:, np.newaxis] - bounds).min(axis=1) < 1e-4 * np.diff(bounds, axis=1)[:, 0]
 
 
-def doubtful_frequencies(measured: Measured, table: pd.DataFrame) -> Iterator[ModelWarning]:
-    """Warnings about frequencies of the updated model that noise cannot explain."""
-    far = table["error_after"].abs() > LARGE_ERROR
+def doubtful_optimum(
+    names: Sequence[str], theta: Array, bounds: Array, measured: Measured, table: pd.DataFrame
+) -> Iterator[ModelWarning]:
+    """The warning about parameters at their bounds, and frequencies that noise cannot explain."""
+    doubts = []
+    at_bound = at_bounds(theta, bounds)
+    if at_bound.any():
+        listed = [names[i] for i in np.flatnonzero(at_bound)]
+        doubts.append(
+            f"the optimum lies at the bounds of {listed}. The best value may be outside. Widen bounds, or correct what "
+            "the model lacks"
+        )
+    doubts += _missed_frequencies(measured, table)
+    if doubts:
+        yield ModelWarning(". ".join(doubts), "poor-fit")
+
+
+def _missed_frequencies(
+    measured: Measured, table: pd.DataFrame, percent: float = 15.0, most: float = 10.0
+) -> list[str]:
+    """A sentence about frequencies missed by more than some percent, or by more standard deviations than noise has."""
+    far = table["error_after"].abs() > percent
     if far.any():
         off = (table["measured"] / table["after"] / (2 * np.pi) - 1).abs().dropna()
-        units = " (rad/s instead of Hz?)" if len(off) and (off < RAD_PER_S).all() else ""
-        yield ModelWarning(
-            f"the updated model misses the frequencies {table.index[far].tolist()} by more than {LARGE_ERROR:g} "
-            f"%{units}. Give frequencies in Hz, in the order of the model's modes, or correct the model",
-            "poor-fit",
-        )
-    elif not np.array_equal(measured.deviations, measured.frequencies, equal_nan=True):
-        residuals = np.abs(table["after"].to_numpy() - measured.frequencies) / measured.deviations
-        if (beyond := residuals > NOISE_LIMIT).any():
-            yield ModelWarning(
-                f"the updated model misses the frequencies {table.index[beyond].tolist()} by up to "
-                f"{np.nanmax(residuals):.0f} times frequency_std (expected at most {NOISE_LIMIT:g}): covariance_ is "
-                "too small. Give a larger frequency_std, or correct the model",
-                "poor-fit",
-            )
+        units = " (rad/s instead of Hz?)" if len(off) and (off < 0.15).all() else ""
+        return [
+            f"the updated model misses the frequencies {table.index[far].tolist()} by more than {percent:g} %{units}. "
+            "Give frequencies in Hz, in the order of the model's modes, or correct the model"
+        ]
+    if np.array_equal(measured.deviations, measured.frequencies, equal_nan=True):  # no frequency_std
+        return []
+    residuals = np.abs(table["after"].to_numpy() - measured.frequencies) / measured.deviations
+    beyond = residuals > most
+    if not beyond.any():
+        return []
+    return [
+        f"the updated model misses the frequencies {table.index[beyond].tolist()} by more than {most:g} times "
+        "frequency_std: covariance_ is too small. Give a larger frequency_std, or correct the model"
+    ]
 
 
 def _swapped(model: Any, theta: Array) -> NDArray[np.bool_]:

@@ -8,21 +8,12 @@ import numpy as np
 from joblib import delayed
 
 from skthermo._core.arrays import Array, check_names
-from skthermo._core.effects import read_groups
 from skthermo._core.parallel import run_jobs
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem import CallableModel, FEModel, ReducedModel
+from skthermo.fem.damage import read_groups
 from skthermo.updating._diagnostics import at_bounds, false_matches
 from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise
-
-WIDEST = 4.0
-"""Standard deviations of the prior by which the stiffness of a damage group may differ from 1, as far as it stays
-positive."""
-
-SOFTEST = 0.1  # lowest multiplier of a group's stiffness
-MOST_AT_BOUND = 0.1
-"""Share of models at a bound up to which these models differ nearly as much as the prior allows: at a bound of two
-standard deviations of the prior it is 5 %."""
 
 
 class Ensemble:
@@ -36,7 +27,7 @@ class Ensemble:
         self, model: FEModel, measured: Measured, bounds: Array, prior: Array, groups: Sequence[str], spread: float
     ):
         self.model, self.measured, self.groups = model, measured, list(groups)
-        limits = max(1 - WIDEST * spread, SOFTEST), 1 + WIDEST * spread
+        limits = max(1 - 4 * spread, 0.1), 1 + 4 * spread
         self.bounds = np.vstack([bounds, np.tile(limits, (len(self.groups), 1))])
         prior = np.append(prior, np.full(len(self.groups), spread))
         self.extended: Any = model
@@ -68,8 +59,8 @@ class Ensemble:
             model = model.damaged(dict(zip(self.groups, (1 - multipliers[n_parameters:]).tolist(), strict=True)))
         return rescaled(model, multipliers[:n_parameters])
 
-    def doubts(self, outcomes: Sequence[Outcome]) -> Iterator[SkthermoWarning]:
-        """Warnings about the draws."""
+    def findings(self, outcomes: Sequence[Outcome]) -> Iterator[SkthermoWarning]:
+        """Warnings about the draws, and those of the model about their parameters."""
         n = len(outcomes)
         theta = np.array([outcome.theta for outcome in outcomes])
         if unfinished := sum(not outcome.success for outcome in outcomes):
@@ -79,28 +70,24 @@ class Ensemble:
                 "not-converged",
             )
         at_bound = np.sum([at_bounds(row, self.bounds) for row in theta], axis=0)
-        if (at_bound > MOST_AT_BOUND * n).any():
+        if (at_bound > 0.1 * n).any():  # 5 % are at a bound of two standard deviations
             counts = zip(self.names, at_bound, strict=True)
             listed = ", ".join(f"{name!r} ({count} of {n})" for name, count in counts if count)
             yield ModelWarning(
                 f"drawn models lie at the bounds of {listed}. They differ less than is unknown. Widen the bounds, or "
                 "give a narrower prior",
-                "at-bounds",
+                "poor-fit",
             )
         mismatched = sum(any(false_matches(self.residuals.model, self.measured, row)) for row in theta)
         if mismatched:
             yield ModelWarning(
                 f"modes change their order in {mismatched} of {n} drawn models. A measured mode is fitted with another "
                 "one there. Use a model with track=True, or give shapes",
-                "modes-cross",
+                "mode-order",
             )
-
-    def warn_of(self, multipliers: Sequence[Array]) -> None:
-        """Warnings of the model about drawn multipliers, such as those outside the bounds of a reduced model."""
-        if hasattr(self.model, "warn_of"):
-            theta = np.array(multipliers)
+        if hasattr(self.model, "findings"):  # such as bounds of a reduced model
             own = theta[:, : len(self.model.parameter_names)]
-            self.model.warn_of(own, self.residuals.model.frequencies(theta))
+            yield from self.model.findings(own, self.residuals.model.frequencies(theta))
 
 
 def groups_beside(model: Any, groups: Sequence[str] | None) -> list[str]:

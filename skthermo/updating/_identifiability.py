@@ -127,11 +127,6 @@ def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
     return check_theta(np.ones(len(names)) if theta is None else theta, names, one_row=True)
 
 
-COLLINEAR_COSINE = 0.99  # cosine between two parameters' effects at and above which they cannot be distinguished
-ACCURATE = 0.1  # largest relative standard deviation of the estimates of a recommended subset
-SMALLEST_SHARE = 1e-6  # singular value, as a share of the largest, below which it counts as zero
-
-
 class Identifiability(Bunch):
     """What `identifiability` returns."""
 
@@ -172,7 +167,7 @@ class Identifiability(Bunch):
             )
         for group in self.collinear:
             yield f"Cannot be distinguished: {listed(group)}."
-        within = f"a standard deviation of at most {100 * ACCURATE:g} % at this noise"
+        within = "a standard deviation of at most 10 % at this noise"
         if self.recommended:
             others = " if the others are known" if len(self.recommended) < len(names) else ""
             yield f"Identifiable together with {within}{others}: {listed(self.recommended)}."
@@ -274,7 +269,7 @@ def identifiability(
     smallest = values[-1] if len(values) == len(names) else 0.0
     ranking = scipy.linalg.qr(rows, mode="r", pivoting=True)[1]
     return Identifiability(
-        rank=int((values > SMALLEST_SHARE * values[0]).sum()),
+        rank=int((values > 1e-6 * values[0]).sum()),
         n_modes=model.n_modes,
         n_dofs=0 if dofs is None else len(dofs),
         sensitivity=S,
@@ -306,16 +301,16 @@ def _deviations(rows: Array, level: float) -> Array:
 def _recommended(rows: Array, ranking: NDArray[np.intp], level: float) -> NDArray[np.intp]:
     """Longest prefix of the ranking whose parameters can be estimated well together."""
     for size in range(len(ranking), 0, -1):
-        if (_deviations(rows[:, ranking[:size]], level) <= ACCURATE).all():
+        if (_deviations(rows[:, ranking[:size]], level) <= 0.1).all():
             return ranking[:size]
     return ranking[:0]
 
 
 def collinear_groups(rows: Array) -> list[NDArray[np.intp]]:
-    """Groups of two or more columns that point almost the same way, or the opposite way."""
+    """Groups of two or more columns that point almost the same way, or the opposite way: by a cosine of 0.99."""
     lengths = np.linalg.norm(rows, axis=0)
     nonzero = np.flatnonzero(lengths > 0)
     directions = rows[:, nonzero] / lengths[nonzero]
-    labels = connected_components(csr_array(np.abs(directions.T @ directions) >= COLLINEAR_COSINE), directed=False)[1]
+    labels = connected_components(csr_array(np.abs(directions.T @ directions) >= 0.99), directed=False)[1]
     groups = (nonzero[labels == label] for label in np.unique(labels))
     return [group for group in groups if len(group) > 1]

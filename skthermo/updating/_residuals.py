@@ -1,7 +1,7 @@
 """Measured modes, the model's modes paired with them, the residuals between them and the search for their minimum."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +19,7 @@ from skthermo._core.arrays import (
     shape_array,
 )
 from skthermo._core.parallel import single_blas_thread
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import RecordsWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel
 
 
@@ -35,6 +34,7 @@ class Measured:
     shapes: Array  # (n_dofs, n_measured), of unit length; NaN where only the frequency was measured
     dofs: NDArray[np.intp]  # empty where no shapes were measured
     shape_weights: Array  # 0 where no shape was measured
+    findings: list[SkthermoWarning] = field(default_factory=list)  # about the shapes
 
     @property
     def has_frequency(self) -> NDArray[np.bool_]:
@@ -71,7 +71,7 @@ def read_measured(
         )
     counts = np.isfinite(F).sum(axis=0)
     means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
-    places, unit = _read_shapes(shapes, dofs, n_modes, n_dof, names, labels)
+    places, unit, findings = _read_shapes(shapes, dofs, n_modes, n_dof, names, labels)
     weights = _per_mode(shape_weight, names, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
         raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
@@ -91,22 +91,21 @@ def read_measured(
         shapes=unit[:, columns],
         dofs=places,
         shape_weights=np.where(with_shape, weights, 0.0)[columns],
+        findings=findings,
     )
 
 
-def _real_shapes(shapes: NDArray) -> Array:
-    """Real parts of complex shapes, each rotated by the phase that makes its real part largest."""
+def _real_shapes(shapes: NDArray) -> tuple[Array, list[SkthermoWarning]]:
+    """Real parts of complex shapes, each rotated by the phase that makes its real part largest, and what is lost."""
     squares = np.nansum(shapes**2, axis=0)
     turned = shapes * np.exp(-0.5j * np.angle(squares))
     lengths = np.sqrt(np.nansum(np.abs(shapes) ** 2, axis=0))
     lost = np.sqrt(np.nansum(turned.imag**2, axis=0)) / np.where(lengths > 0, lengths, 1)
-    warn_user(
+    text = (
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
-        "shape's length, is dropped. If that is more than a few percent, check how the shape was identified",
-        RecordsWarning,
-        "complex-shapes",
+        "shape's length, is dropped. If that is more than a few percent, check how the shape was identified"
     )
-    return np.where(np.isnan(shapes), np.nan, turned.real)
+    return np.where(np.isnan(shapes), np.nan, turned.real), [RecordsWarning(text, "complex-shapes")]
 
 
 def _given(shapes: Array) -> NDArray[np.bool_]:
@@ -116,12 +115,12 @@ def _given(shapes: Array) -> NDArray[np.bool_]:
 
 def _read_shapes(
     shapes, dofs, n_modes: int, n_dof: int, names: list[str], labels: Sequence[Label]
-) -> tuple[NDArray[np.intp], Array]:
+) -> tuple[NDArray[np.intp], Array, list[SkthermoWarning]]:
     if (shapes is None) != (dofs is None):
         given, missing = ("shapes", "dofs") if dofs is None else ("dofs", "shapes")
         raise ValueError(f"{given} were given without {missing}; expected both, or neither")
     if shapes is None:
-        return np.empty(0, dtype=np.intp), np.empty((0, n_modes))
+        return np.empty(0, dtype=np.intp), np.empty((0, n_modes)), []
     places = check_dofs(dofs, n_dof, labels)
     array = shape_array(shapes, "shapes")
     if array.shape != (len(places), n_modes):
@@ -129,14 +128,14 @@ def _read_shapes(
             f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
             "column for each mode of F"
         )
-    array = _real_shapes(array) if np.iscomplexobj(array) else array
+    array, findings = _real_shapes(array) if np.iscomplexobj(array) else (array, [])
     for name, column in zip(names, array.T, strict=True):
         if np.isnan(column).any() and not np.isnan(column).all():
             row = np.flatnonzero(np.isnan(column))[0]
             raise ValueError(f"the shape of {name!r} is NaN in row {row} but not in all; expected all rows or none")
         if np.isinf(column).any() or not column.any():
             raise ValueError(f"the shape of {name!r} is zero throughout or infinite; expected a mode shape")
-    return places, array / np.linalg.norm(array, axis=0)
+    return places, array / np.linalg.norm(array, axis=0), findings
 
 
 def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[str]) -> Array:
@@ -158,12 +157,6 @@ def _per_mode(values: ArrayLike, names: list[str], what: str) -> Array:
     if array.shape not in ((), (n_modes,)):
         raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
     return np.broadcast_to(array, (n_modes,)).copy()
-
-
-DIFFERENCE_STEP = 1e-3  # relative step of central differences for a model without ``jacobian``
-NOMINAL_SHARE = 0.25
-"""Weight of the MAC with the nominal modes beside the MAC with the measured shapes. It decides where sensors are so few
-that several modes look the same at them."""
 
 
 @dataclass
@@ -220,7 +213,7 @@ def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
         elif hasattr(model, "jacobian"):
             slopes = model.jacobian(row)
         else:
-            slopes = central_differences(frequencies_at, row, frequencies, DIFFERENCE_STEP)
+            slopes = central_differences(frequencies_at, row, frequencies, 1e-3)
         return slopes[0, measured.columns], np.empty((0, len(measured.columns), row.shape[1]))
 
     frequencies, exact = model.linearised(row) if hasattr(model, "linearised") else (frequencies_at(row), None)
@@ -230,7 +223,8 @@ def _by_column(model: FEModel, measured: Measured, row: Array) -> PairedModes:
 def _by_shape(model: Any, measured: Measured, theta: Array) -> PairedModes:
     modes = model.local_modes(theta)
     shapes = modes.shapes(measured.dofs)
-    mac_sums = NOMINAL_SHARE * modes.nominal_mac[measured.columns]
+    # The MAC with the nominal modes decides where sensors are so few that several modes look the same at them.
+    mac_sums = 0.25 * modes.nominal_mac[measured.columns]
     with_shape = measured.has_shape
     mac_sums[with_shape] += mac_table(shapes, measured.shapes[:, with_shape])
     ranks = linear_sum_assignment(np.nan_to_num(mac_sums), maximize=True)[1]
@@ -352,9 +346,6 @@ class Point:
         )
 
 
-TOLERANCE = 1e-9  # relative change of the objective and of theta below which a start has converged
-
-
 class Outcome(NamedTuple):
     """The result of one start; ``n_failed`` of its evaluations met theta without modes."""
 
@@ -395,8 +386,10 @@ class NoDerivatives(Exception):
     """The model has no finite derivatives at some theta."""
 
 
-def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
-    """Minimise the residuals' loss within bounds.
+def optimise(
+    residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int, tol: float = 1e-9
+) -> Outcome:
+    """Minimise the residuals' loss within bounds, until a relative change of it and of theta is below ``tol``.
 
     Where the model has no modes, steps are cut short, which looks like convergence. A search that met such theta is
     therefore started again from its best point, and has converged when it meets none.
@@ -406,10 +399,10 @@ def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max
     with single_blas_thread():
         history = SearchHistory(residuals, start)
         first, before = history.best.objective, np.inf
-        while max_iter > 0 and history.best.objective < (1 - TOLERANCE) * before:
+        while max_iter > 0 and history.best.objective < (1 - tol) * before:
             before, n_failed = history.best.objective, history.n_failed
             try:
-                result = search(history, residuals, bounds, max_iter, first)
+                result = search(history, residuals, bounds, max_iter, first, tol)
             except NoDerivatives:
                 break
             max_iter -= result.get("nit", result.nfev)
@@ -420,7 +413,7 @@ def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max
 
 
 def _least_squares(
-    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float
+    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float, tol: float
 ) -> OptimizeResult:
     def jacobian(theta: Array) -> Array:
         return _finite(history.at(theta).jacobian())
@@ -431,14 +424,16 @@ def _least_squares(
         jacobian,
         bounds=(bounds[:, 0], bounds[:, 1]),
         loss=residuals.loss,
-        ftol=TOLERANCE,
-        xtol=TOLERANCE,
+        ftol=tol,
+        xtol=tol,
         gtol=np.finfo(float).eps,
         max_nfev=max_iter,
     )
 
 
-def _lbfgs(history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _lbfgs(
+    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float, tol: float
+) -> OptimizeResult:
     """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
 
     Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.
@@ -457,7 +452,7 @@ def _lbfgs(history: SearchHistory, residuals: Residuals, bounds: Array, max_iter
 
     scale = first or 1.0
     uphill = np.empty_like(history.theta)
-    options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": TOLERANCE, "gtol": TOLERANCE, "maxcor": 20}
+    options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": tol, "gtol": tol, "maxcor": 20}
     return minimize(share, history.theta, jac=True, method="L-BFGS-B", bounds=Bounds(*bounds.T), options=options)
 
 

@@ -38,21 +38,18 @@ from skthermo._core.estimators import (
 )
 from skthermo._core.frames import column_names
 from skthermo._core.parallel import run_jobs
-from skthermo._core.warnings import warn_each, warn_user
-from skthermo.exceptions import FewRecordsWarning
+from skthermo._core.warnings import warn_each
 from skthermo.fem import FEModel
 from skthermo.updating._diagnostics import (
-    doubtful_frequencies,
-    doubtful_parameters,
+    doubtful_optimum,
     false_matches,
     modes_table,
     starts_table,
+    undetermined,
     unfinished,
 )
 from skthermo.updating._ensemble import Ensemble, groups_beside, rescaled
 from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise, read_measured
-
-EVALUATIONS_PER_START = 10  # of the model, which a search is expected to take
 
 
 class ModelUpdater(Estimator):
@@ -112,6 +109,8 @@ class ModelUpdater(Estimator):
         not determine has an infinite variance and NaN covariances.
     measured_ : Measured
         What `fit` was given, with its weights.
+    findings_ : list of SkthermoWarning
+        The warnings of `fit`.
     has_deviations_ : bool
         Whether `fit` was given ``frequency_std``, which `sample_models` needs.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -229,13 +228,6 @@ class ModelUpdater(Estimator):
         bounds = self._read_bounds()
         prior = None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
         n_parameters = len(bounds)
-        if prior is None and n_parameters > measured.n_residuals:
-            warn_user(
-                f"{n_parameters} parameters are to be found from {measured.n_residuals} residuals. Many theta fit "
-                "equally well. Use fewer parameters, shapes, or a prior",
-                FewRecordsWarning,
-                "underdetermined",
-            )
         model = self.model.quiet() if hasattr(self.model, "quiet") else self.model
         residuals = Residuals(model, measured, prior)
         outcomes = self._run(residuals, bounds)
@@ -253,16 +245,18 @@ class ModelUpdater(Estimator):
         self.starts_ = starts_table(outcomes)
         self.covariance_ = cramer_rao(residuals.at(best.theta).information())
         self.table_ = modes_table(model, measured, best.theta)
-        doubts = [*false_matches(model, measured, best.theta)]
+        names = self.model.parameter_names
+        findings = [*measured.findings, *false_matches(model, measured, best.theta)]
+        if prior is None:
+            findings += undetermined(names, measured.n_residuals, self.covariance_)
         if best.success:
-            covariance = self.covariance_ if prior is None else None
-            doubts += doubtful_parameters(self.model.parameter_names, best.theta, bounds, covariance)
-            doubts += doubtful_frequencies(measured, self.table_)
+            findings += doubtful_optimum(names, best.theta, bounds, measured, self.table_)
         else:
-            doubts.append(unfinished(best, residuals))
-        warn_each(doubts)
-        if hasattr(self.model, "warn_of"):  # of the optimum alone, not of all that a search passes through
-            self.model.warn_of(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
+            findings.append(unfinished(best, residuals))
+        if hasattr(self.model, "findings"):  # of the optimum alone, not of all that a search passes through
+            findings += self.model.findings(best.theta[np.newaxis], self.table_["after"].to_numpy()[np.newaxis])
+        self.findings_ = findings
+        warn_each(findings)
         return self
 
     def sample_models(
@@ -336,9 +330,9 @@ class ModelUpdater(Estimator):
         )
         options = {"n_jobs": self.n_jobs, "prefer": getattr(self.model, "prefer", None)}
         outcomes = ensemble.multipliers(n, self.theta_, as_random_state(random_state), self.max_iter, **options)
-        warn_each(ensemble.doubts(outcomes))
-        ensemble.warn_of([outcome.theta for outcome in outcomes])
-        return Parallel(**options)(delayed(ensemble.model_at)(outcome.theta) for outcome in outcomes)
+        models = Parallel(**options)(delayed(ensemble.model_at)(outcome.theta) for outcome in outcomes)
+        warn_each(ensemble.findings(outcomes))
+        return models
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
         check_model(self.model)
@@ -396,7 +390,7 @@ class ModelUpdater(Estimator):
 
     def _reduced(self, bounds: Array) -> FEModel | None:
         """The reduced model that the starts search by; None without one."""
-        tol = tolerance(self.model, self.reduce, EVALUATIONS_PER_START * self.n_starts)
+        tol = tolerance(self.model, self.reduce, 10 * self.n_starts)  # a search takes about ten evaluations
         if tol is None:
             return None
         try:

@@ -11,7 +11,7 @@ from tests.monitoring.nightly import truss_records
 @pytest.fixture
 def one_detector(monkeypatch):
     """``init`` need not choose a detector where its files are what matters."""
-    one = {"kind": "MahalanobisDetector", "chosen": {}, "text": "each record for itself", "finds": "", "size": 1.0}
+    one = {"kind": "MahalanobisDetector", "compensator": {}, "text": "each record for itself", "finds": "", "size": 1.0}
     monkeypatch.setattr("skthermo.commands._proposal.Proposal.detectors", [SimpleNamespace(**one)])
 
 

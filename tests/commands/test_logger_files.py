@@ -16,7 +16,7 @@ from skthermo.commands._new_records import check_layout, read_baseline, read_col
 from skthermo.commands._settings import read_settings
 from skthermo.monitoring import load_monitor
 from skthermo.preprocessing import read_records
-from skthermo.preprocessing.loggers.files import look_at
+from skthermo.preprocessing.loggers.logger_files import look_at
 from tests.commands.folders import edit, run, write_day
 from tests.monitoring.nightly import FIRST as TWO_YEARS
 

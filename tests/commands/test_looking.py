@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from skthermo.preprocessing import read_records
-from skthermo.preprocessing.loggers.files import DAYS, CsvFormat, look_at, read_file
+from skthermo.preprocessing.loggers.logger_files import DAYS, CsvFormat, look_at, read_file
 from tests.commands.folders import run
 from tests.nights import by_day
 

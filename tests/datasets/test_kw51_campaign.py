@@ -8,8 +8,7 @@ from pandas.testing import assert_frame_equal
 
 from skthermo.datasets import kw51_structure, make_kw51, make_kw51_campaign
 from skthermo.datasets._kw51_campaign import (
-    BOX,
-    N_HOURS,
+    WEATHER_BOX,
     draw_weather,
     memory,
     missing_modes,
@@ -73,9 +72,9 @@ def test_one_seed_gives_one_campaign(campaign, unchanged):
 
 
 def test_longer_weather_begins_as_a_shorter_one():
-    weather = [draw_weather(n_hours, np.random.RandomState(4)) for n_hours in (100, N_HOURS, N_HOURS + 500)]
+    weather = [draw_weather(n_hours, np.random.RandomState(4)) for n_hours in (100, 11328, 11328 + 500)]
     assert_frame_equal(weather[0], weather[1][:100], check_exact=True)
-    assert_frame_equal(weather[1], weather[2][:N_HOURS], check_exact=True)
+    assert_frame_equal(weather[1], weather[2][:11328], check_exact=True)
     missing = [missing_modes(n_hours, np.random.RandomState(4)) for n_hours in (50, 70)]
     assert_array_equal(missing[0], missing[1][:50])
 
@@ -168,12 +167,12 @@ def test_frost_lifts_the_vertical_modes(unchanged):
 
 
 def test_gaps_cover_as_on_the_bridge():
-    missing = np.array([missing_modes(N_HOURS, np.random.RandomState(seed)) for seed in range(8)])
+    missing = np.array([missing_modes(11328, np.random.RandomState(seed)) for seed in range(8)])
     assert_allclose(1 - missing.mean(axis=(0, 1))[1:], COVERAGE, atol=0.02)
     assert (~missing).all(axis=2).mean() == pytest.approx(0.13, abs=0.02)
     begins = (missing[:, 1:] & ~missing[:, :-1]).sum(axis=(0, 1))
     assert (missing.sum(axis=(0, 1)) / begins > 3).all()  # hours in one block
-    index = pd.date_range("2018-10-01", periods=N_HOURS, freq="h")
+    index = pd.date_range("2018-10-01", periods=11328, freq="h")
     hours = np.array([missing_temperatures(index, np.random.RandomState(seed)) for seed in range(8)])
     assert 1 - hours.mean() == pytest.approx(0.88, abs=0.01)
     assert hours[:, :4000].mean() == pytest.approx(0.31, abs=0.015)
@@ -182,7 +181,7 @@ def test_gaps_cover_as_on_the_bridge():
 
 def test_weather_is_that_of_the_region():
     for seed in range(8):
-        weather = draw_weather(N_HOURS, np.random.RandomState(seed))
+        weather = draw_weather(11328, np.random.RandomState(seed))
         steel = weather["steel"]
         assert steel["2019-01"].min() == pytest.approx(-2.9, abs=1.0)
         assert -8 < steel.min() < -2
@@ -228,10 +227,10 @@ def test_shapes_are_those_of_the_model():
 
 
 def test_weather_stays_within_the_bounds_of_reduction():
-    bounds = np.array([(1 - b, 1 + b) if isinstance(b, float) else b for b in BOX.values()])
+    bounds = np.array([(1 - b, 1 + b) if isinstance(b, float) else b for b in WEATHER_BOX.values()])
     for seed in range(20):
-        theta = thermal_multipliers(draw_weather(N_HOURS, np.random.RandomState(seed)))
-        theta = theta[list(BOX)]
+        theta = thermal_multipliers(draw_weather(11328, np.random.RandomState(seed)))
+        theta = theta[list(WEATHER_BOX)]
         assert (theta.min() > bounds[:, 0]).all()
         assert (theta.max() < bounds[:, 1]).all()
 

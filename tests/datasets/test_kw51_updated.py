@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skthermo.datasets import make_kw51
-from skthermo.datasets._kw51_model import UPDATED as THETA
+from skthermo.datasets._kw51_model import KW51_UPDATED as THETA
 
 MEASURED = np.array([0.51, 1.24, 1.89, 2.45, 2.58, 2.92])
 AT_LOWER, AT_UPPER = ["E_arc", "E_br", "E_con", "I_22p"], ["E_bot", "A_c"]

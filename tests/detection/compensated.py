@@ -21,7 +21,7 @@ POSITIONS = [X.columns.get_loc(mode) for mode in MODES]
 
 def compensator(estimator=None, **options):
     estimator = KNeighborsRegressor(3) if estimator is None else estimator
-    return TemperatureCompensator(estimator, **({"targets": MODES, "whiten": None} | options))
+    return TemperatureCompensator(estimator, **({"targets": MODES} | options))
 
 
 def chain(mapper=None):

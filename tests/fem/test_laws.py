@@ -190,7 +190,7 @@ def test_a_sample_without_modes_is_nan_and_the_others_stay(mass, track):
     terms = {("elastic",): np.eye(2), ("force",): np.diag([-0.5, 0.0])}
     model = AffineModel(terms, mass, n_modes=1, track=track)
     for method in (model.frequencies, model.modes, model.jacobian):
-        with pytest.warns(UserWarning, match=r"1 of 3 .*\[1.0, 3.0\] \(row 1\).*no-solution"):
+        with pytest.warns(UserWarning, match="some rows of theta .*no-solution"):
             result = method([[1.0, 1.0], [1.0, 3.0], [1.0, 0.5]])
         values = result[0] if isinstance(result, tuple) else result
         assert np.isnan(values[1]).all()

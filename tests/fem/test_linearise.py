@@ -52,7 +52,7 @@ def test_differences_are_one_sided_beside_rows_without_frequencies():
         return np.where(theta > 1, np.nan, np.sqrt(theta))
 
     program = CallableModel(buckles_above_one, ["k"], 1, vectorized=True)
-    with pytest.warns(UserWarning, match="1 of 2 .*no-solution"):
+    with pytest.warns(UserWarning, match="no-solution"):
         jacobian = linearise(program, [[1.0]], step=1e-4)[1]
     np.testing.assert_allclose(jacobian, 0.5, rtol=1e-4)
 

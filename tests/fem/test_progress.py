@@ -14,7 +14,7 @@ import joblib
 import numpy as np
 import pytest
 
-from skthermo._core.parallel import bars_of, run_jobs
+from skthermo._core.parallel import run_jobs
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, evaluate, sample
 
@@ -37,35 +37,38 @@ def test_a_bar_on_request_counts_every_sample(capsys):
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
-def test_only_a_terminal_sees_a_bar_unasked_and_only_after_a_while(monkeypatch, n_jobs):
-    for stderr, silence, progress, seen in (
-        (io.StringIO(), 0.0, None, False),
-        (Terminal(), 0.0, None, True),
-        (Terminal(), 0.0, False, False),
-        (Terminal(), 3600.0, None, False),
+def test_only_a_terminal_sees_a_bar_unasked_and_only_after_a_second(monkeypatch, n_jobs):
+    slow = CallableModel(slow_square_root, ["E"], 1)
+    for stderr, model, progress, seen in (
+        (io.StringIO(), slow, None, False),
+        (Terminal(), slow, None, True),
+        (Terminal(), slow, False, False),
+        (Terminal(), TRUSS, None, False),
     ):
-        monkeypatch.setattr("skthermo._core.parallel.SILENT_SECONDS", silence)
         monkeypatch.setattr(sys, "stderr", stderr)
-        sample(TRUSS, 0.2, 300, n_jobs=n_jobs, progress=progress, random_state=0)
+        sample(model, 0.2, 128, n_jobs=n_jobs, progress=progress, random_state=0)
         assert bool(stderr.getvalue()) == seen
 
 
-def test_a_notebook_sees_a_bar_that_names_the_stage_and_the_work_around_it_alone(monkeypatch):
+def slow_square_root(row):
+    time.sleep(0.03)
+    return np.sqrt(row)
+
+
+def test_a_notebook_sees_a_bar_of_jobs(monkeypatch):
     class Output(io.StringIO):
         __module__ = "ipykernel.iostream"
 
     def repeat(number):
-        return number, sample(TRUSS, 0.2, 300, random_state=0)
+        time.sleep(0.6)
+        return number
 
-    monkeypatch.setattr("skthermo._core.parallel.SILENT_SECONDS", 0.0)
     for output in (Output(), Terminal(), io.StringIO()):
         monkeypatch.setattr(sys, "stderr", output)
-        with bars_of("other repeats"):
-            found = run_jobs((joblib.delayed(repeat)(number) for number in range(3)), 3, unit="repeats", n_jobs=1)
-        assert [number for number, _ in found] == [0, 1, 2]
+        assert run_jobs((joblib.delayed(repeat)(n) for n in range(3)), 3, unit="repeats", n_jobs=1) == [0, 1, 2]
         lines = [line for line in output.getvalue().split("\r") if line]
         assert bool(lines) == (type(output) is not io.StringIO)
-        assert all(line.startswith("other repeats: ") and " of 3 repeats in " in line for line in lines)
+        assert all(" of 3 repeats in " in line for line in lines)
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on
@@ -78,21 +81,19 @@ def test_every_backend_gives_the_same_bits(backend):
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
-def test_many_chunks_without_modes_are_one_warning_by_row(n_jobs):
+def test_many_chunks_without_modes_are_one_warning(n_jobs):
     model = AffineModel({("k",): np.eye(3), ("force",): -0.5 * np.eye(3)}, np.eye(3), n_modes=2)
-    with pytest.warns(UserWarning, match="of 2000 .*no-solution") as caught:
+    with pytest.warns(UserWarning, match="no-solution") as caught:
         drawn = sample(model, [[0.1, 1.0], [0.9, 1.1]], 2000, n_jobs=n_jobs, random_state=0)
-    failed = np.isnan(drawn.frequencies).any(axis=1)
+    assert 0 < np.isnan(drawn.frequencies).any(axis=1).sum() < 2000
     assert len(caught) == 1
-    assert str(caught[0].message).startswith(f"{failed.sum()} of 2000")
-    assert f"(row {np.argmax(failed)})" in str(caught[0].message)
     assert caught[0].filename == __file__
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_a_reduced_model_says_once_that_it_is_left(n_jobs):
     reduced = TRUSS.reduced(0.1, random_state=0)
-    with pytest.warns(UserWarning, match=r"\d+ of 600 .*outside-reduced-bounds") as caught:
+    with pytest.warns(UserWarning, match="outside-reduced-bounds") as caught:
         sample(reduced, 0.2, 600, n_jobs=n_jobs, random_state=0)
     assert len(caught) == 1
     assert caught[0].filename == __file__

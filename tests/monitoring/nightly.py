@@ -2,10 +2,9 @@
 
 import pandas as pd
 from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.detection import TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
 
 FIRST = 730  # row of the first record after the baseline, 2027-01-01
@@ -19,8 +18,9 @@ def truss_records():
 
 def fitted_monitor(records, regressor=None, **parameters):
     targets = [name for name in records if name.startswith("f")]
-    compensator = TemperatureCompensator(regressor or LinearRegression(), targets=targets)
-    return Monitor(make_pipeline(compensator, WindowedAlarm("5D")), **parameters).fit(records[:FIRST])
+    regressor = regressor or LinearRegression()
+    detector = CompensatedDetector(MahalanobisDetector(), regressor, targets=targets, window="5D")
+    return Monitor(detector, **parameters).fit(records[:FIRST])
 
 
 def assert_same_history(one, other):

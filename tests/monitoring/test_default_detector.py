@@ -5,12 +5,11 @@ import warnings
 
 import pandas as pd
 import pytest
-from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, DirectionalDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM
 
 MODES = [f"f{mode}" for mode in range(1, 7)]
 
@@ -29,11 +28,11 @@ def fitted(**options):
 
 def test_frequencies_have_directions_and_other_responses_have_none():
     by_unit = {unit: fitted(targets=MODES, units=unit).detector_ for unit in ("Hz", "mm")}
-    assert all(isinstance(one[0], TemperatureCompensator) for one in by_unit.values())
-    assert by_unit["Hz"][-1].directions == "softening"
-    assert type(by_unit["mm"][-1]) is MahalanobisDetector
+    assert all(isinstance(one, CompensatedDetector) for one in by_unit.values())
+    assert by_unit["Hz"].detector.directions == "softening"
+    assert type(by_unit["mm"].detector) is MahalanobisDetector
     mixed = fitted(targets=MODES, units=dict.fromkeys(MODES, "Hz") | {"f6": "mm"}).detector_
-    assert type(mixed[-1]) is MahalanobisDetector
+    assert type(mixed.detector) is MahalanobisDetector
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +53,8 @@ LOSSES = {"bottom": 0.15, "top": 0.15, "diagonal": 0.1, "bottom ": -0.2}
     ],
 )
 def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_loss(fem, window, groups):
-    last = DirectionalDetector(fem)
-    last = last if window is None else WindowedAlarm(window, detector=last)
-    compensator = TemperatureCompensator(TemperatureMapper(), targets=MODES)
-    fresh = fitted(detector=make_pipeline(compensator, last), fem=fem)
+    detector = CompensatedDetector(DirectionalDetector(fem), targets=MODES, window=window)
+    fresh = fitted(detector=detector, fem=fem)
     for group in groups:
         loss = LOSSES[group]
         changed = records({group.strip(): loss}, 1, "2026-01-01")[:30]
@@ -77,7 +74,7 @@ def clone_fitted(monitor):
 
 def test_a_chain_gives_the_directions_of_its_groups(fem):
     monitor = fitted(fem=fem)
-    last = monitor.detector_[-1]
+    last = monitor.detector_.detectors_[0]
     assert isinstance(last, DirectionalDetector)
     assert last.directions is fem
     assert list(last.directions_.index) == ["bottom", "top", "diagonal", "vertical"]

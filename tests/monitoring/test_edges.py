@@ -14,7 +14,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, DirectionalDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing.checks import Plausible
 from tests.nights import by_day
@@ -37,9 +37,9 @@ def truss():
 MODES = ["f1", "f2", "f3", "f4", "f5", "f6"]
 
 
-def detector(targets, last=None):
-    compensator = TemperatureCompensator(LinearRegression(), targets=targets)
-    return make_pipeline(compensator, MahalanobisDetector() if last is None else last)
+def detector(targets, last=None, window=None):
+    last = MahalanobisDetector() if last is None else last
+    return CompensatedDetector(last, LinearRegression(), targets=targets, window=window)
 
 
 TESTS = {
@@ -58,8 +58,7 @@ def saved(window=None, test="any direction", **options):
     """A monitor of the truss after its baseline."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        last = TESTS[test]() if window is None else WindowedAlarm(window, detector=TESTS[test]())
-        return pickle.dumps(Monitor(detector(MODES, last), **options).fit(truss()[:N_BASELINE]))
+        return pickle.dumps(Monitor(detector(MODES, TESTS[test](), window), **options).fit(truss()[:N_BASELINE]))
 
 
 def fitted(window=None, test="any direction", **options):
@@ -221,7 +220,7 @@ class Bounded(MahalanobisDetector):
 
 
 def test_a_detector_that_drops_large_changes_is_refused_and_a_blind_one_is_reported():
-    drops = make_pipeline(DropsOutliers(), *(step for _, step in detector(MODES).steps))
+    drops = make_pipeline(DropsOutliers(), detector(MODES))
     with pytest.raises(ValueError, match="drops or fills large changes"):
         Monitor(drops, sensors=False).fit(truss()[:N_BASELINE])
     blind = Monitor(detector(MODES, Bounded()), sensors=False, persistence=1, false_alarms_per_year=0.5)

@@ -16,11 +16,10 @@ from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import (
-    FusedDetector,
+    CompensatedDetector,
     MahalanobisDetector,
     OutlierDetector,
     TemperatureCompensator,
-    WindowedAlarm,
 )
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
@@ -73,6 +72,10 @@ def compensator(regressor=None, **options):
     return TemperatureCompensator(regressor or LinearRegression(), targets=MODES, **options)
 
 
+def whole(regressor, window):
+    return CompensatedDetector(MahalanobisDetector(), regressor, targets=MODES, window=window)
+
+
 def lagged(regressor=None):
     return make_pipeline(LagFeatures([0, 2, 4], freq="6h", tolerance="6h"), regressor or LinearRegression())
 
@@ -82,20 +85,11 @@ FOREST = OutlierDetector(IsolationForest(n_estimators=20, random_state=0), block
 DETECTORS = {
     "raw": (MahalanobisDetector(), "nothing"),
     "lags": (make_pipeline(compensator(lagged()), MahalanobisDetector()), "30 h"),
-    "whitened, mean by time": (make_pipeline(compensator(lagged(), whiten="local"), WindowedAlarm("36h")), "66 h"),
-    "mean by number": (make_pipeline(compensator(lagged()), WindowedAlarm(5)), "4 records and 30 h"),
-    "m of n": (make_pipeline(compensator(KNeighborsRegressor(20)), WindowedAlarm(6, rule="m-of-n")), "5 records"),
-    "m of n by time": (make_pipeline(compensator(HINGES), WindowedAlarm("2D", rule="m-of-n")), "48 h"),
+    "mean by time": (whole(lagged(), "36h"), "66 h"),
+    "mean by number": (whole(lagged(), 5), "4 records and 30 h"),
+    "neighbours, mean by number": (whole(KNeighborsRegressor(20), 6), "5 records"),
+    "hinges, mean by time": (whole(HINGES, "2D"), "48 h"),
     "forest": (make_pipeline(compensator(lagged()), FOREST), "30 h"),
-    "fused": (
-        FusedDetector(
-            [
-                ("lags", make_pipeline(compensator(lagged()), MahalanobisDetector())),
-                ("window", make_pipeline(compensator(), WindowedAlarm("2D"))),
-            ]
-        ),
-        "48 h",
-    ),
 }
 SETTINGS = settings(
     max_examples=2,
@@ -157,14 +151,14 @@ def test_any_division_into_batches_gives_the_history_of_one_pass(name, data):
 @pytest.mark.nightly
 def test_hour_by_hour_and_day_by_day():
     for batches in ([SERVICE.iloc[[n]] for n in range(24)], [day for _, day in SERVICE[:24].resample("D") if len(day)]):
-        monitor, answers, _ = fitted("whitened, mean by time")
+        monitor, answers, _ = fitted("mean by time")
         parts = [monitor.update(batch) for batch in batches]
         pd.testing.assert_frame_equal(pd.concat(parts)[ANSWER], answers[:24][ANSWER], check_exact=True)
         assert not any(part["revised"].any() for part in parts)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("name", ["raw", "lags", "mean by number", "m of n by time", "fused"])
+@pytest.mark.parametrize("name", ["raw", "lags", "mean by number", "hinges, mean by time"])
 def test_indices_are_those_of_the_detector_on_all_records(name):
     monitor, _, _ = fitted(name, sensors=False)
     service = ALL[N_BASELINE:].drop(ALL.index[-50:-40])
@@ -188,7 +182,7 @@ def test_memory_is_what_lags_and_windows_need(name):
 
 
 def test_days_summarise_their_records():
-    _, answers, after = fitted("whitened, mean by time")
+    _, answers, after = fitted("mean by time")
     by_day = answers.groupby(answers.index.normalize())
     assert after.days_["n_records"].tolist() == by_day.size().tolist()
     assert (
@@ -212,14 +206,14 @@ def test_reasons_say_why_a_record_is_not_evaluated():
     assert (answers["state"] == "not evaluated").equals(answers["index"].isna() | held)
     assert after.counts_["n_left_out"] >= 3
     for name, reason in (
-        ("mean by number", "its window holds fewer than"),
+        ("mean by number", "its window holds too few records"),
         ("forest", "missing, and the detector needs every mode"),
     ):
         _, answers, _ = fitted(name)
         assert answers.loc[answers["index"].isna(), "reason"].str.contains(reason).any() or name == "mean by number"
 
 
-@pytest.mark.parametrize("name", ["whitened, mean by time", "m of n"])
+@pytest.mark.parametrize("name", ["mean by time", "neighbours, mean by number"])
 def test_records_without_values_that_their_window_evaluates_are_named(name):
     _, answers, _ = fitted(name, sensors=False)
     seen = SERVICE.mask(SERVICE == -999)

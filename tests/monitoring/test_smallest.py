@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.monitoring import Monitor
 
@@ -36,8 +35,9 @@ def bridge(n_days=500, noise=0.003, slope=1e-3, seed=0):
 
 
 def fitted(records, last=None, **options):
-    compensator = TemperatureCompensator(LinearRegression(), targets=MODES)
-    return Monitor(make_pipeline(compensator, last or WindowedAlarm("1D")), **options).fit(records)
+    window = "1D" if last is None else None
+    detector = CompensatedDetector(last or MahalanobisDetector(), LinearRegression(), targets=MODES, window=window)
+    return Monitor(detector, **options).fit(records)
 
 
 @cache

@@ -6,7 +6,7 @@ import pytest
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.preprocessing import LagFeatures, check_records, residual_trend, set_aside
-from skthermo.preprocessing.checks._columns import stuck_runs
+from skthermo.preprocessing.checks._stuck import stuck_runs
 
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
@@ -280,3 +280,17 @@ def test_each_kind_gives_one_warning_and_the_tables_stay_as_they_are():
     assert len(findings.table) == sum(": " in line for line in str(findings).splitlines()) == 4
     for table, copy in zip((stuck, spoiled), before, strict=True):
         pd.testing.assert_frame_equal(table, copy)
+
+
+def test_the_cleaned_tables_are_those_of_set_aside():
+    stuck, spoiled = T.copy(), F.copy()
+    stuck.loc["2025-12", "T2"] = 20.0
+    stuck.iloc[[3, 9], 0], stuck["T3"] = -999.0, 4.0
+    spoiled.iloc[7, 1] = 0.0
+    found = check_records(stuck, spoiled)
+    with pytest.warns(UserWarning, match="set-aside|left-out"):
+        expected = set_aside(stuck, spoiled)
+    assert found.temperatures["T1"].isna().sum() == 2
+    assert found.left_out == expected.left_out == {"T3": found.left_out["T3"]}
+    pd.testing.assert_frame_equal(found.temperatures, expected.temperatures)
+    pd.testing.assert_frame_equal(found.frequencies, expected.frequencies)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.preprocessing import LagFeatures, check_records
-from skthermo.preprocessing.checks._findings import ARE_MEANINGLESS, WARNINGS
+from skthermo.preprocessing.checks._record_findings import ARE_MEANINGLESS, WARNINGS
 
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies

@@ -15,7 +15,7 @@ from sklearn.utils import Bunch
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
-from skthermo.preprocessing._poles import MISSED, assign, shape_agreement
+from skthermo.preprocessing._poles import MISSED_MODE, assign, shape_agreement
 from tests.benchmarks.mode_tracker import right, simulated_poles, ways
 
 RNG = np.random.default_rng(0)
@@ -117,7 +117,7 @@ def brute_force(cost):
     n_modes, n_poles = cost.shape
     choices = itertools.product(range(-1, n_poles), repeat=n_modes)
     return min(
-        sum(MISSED if pole < 0 else cost[mode, pole] for mode, pole in enumerate(choice))
+        sum(MISSED_MODE if pole < 0 else cost[mode, pole] for mode, pole in enumerate(choice))
         for choice in choices
         if len({pole for pole in choice if pole >= 0}) == sum(pole >= 0 for pole in choice)
     )
@@ -136,7 +136,7 @@ def test_the_assignment_is_optimal_and_one_to_one(seed, n_modes, n_poles, densit
     for i in range(5):
         own = chosen[record[chosen] == i]
         assert len(set(mode[own])) == len(set(pole[own])) == len(own)
-        total = cost[own].sum() + MISSED * (n_modes - len(own))
+        total = cost[own].sum() + MISSED_MODE * (n_modes - len(own))
         assert total == pytest.approx(brute_force(costs[i]))
 
 
@@ -261,8 +261,8 @@ def test_modes_never_found_and_modes_found_elsewhere_give_one_warning():
     with pytest.warns(UnevaluatedRowsWarning, match="modes-not-found") as caught:
         ModeTracker((F0, PHI)).fit_transform(raw)
     assert len(caught) == 1
-    assert "['f2', 'f3'] are found in none of 50" in str(caught[0].message)
-    assert "50 of 50 records without 'f2' have a pole of its shape at about 1.3 times" in str(caught[0].message)
+    assert "['f2', 'f3'] are found in no record" in str(caught[0].message)
+    assert "records without 'f2' have a pole of its shape at about 1.3 times" in str(caught[0].message)
 
 
 def test_clean_records_give_no_warning():
@@ -276,7 +276,7 @@ def test_poles_without_shape_are_left_over_with_a_warning():
     raw = padded()
     raw.shapes[:5, 0] = np.nan
     raw.shapes[5:7, 1] = 0
-    with pytest.warns(UnevaluatedRowsWarning, match="7 of 150"):
+    with pytest.warns(UnevaluatedRowsWarning, match="poles have no shape"):
         modes = ModeTracker((F0, PHI)).fit_transform(raw)
     assert modes.left_over.sum() == 7
 
@@ -284,13 +284,11 @@ def test_poles_without_shape_are_left_over_with_a_warning():
 GOOD = padded(n_records=12)
 
 
-@pytest.mark.filterwarnings("ignore:.*modes-not-found")
 @pytest.mark.parametrize("change", [np.flip, lambda S: S * np.array([1, 1, 1, -1, -1, 1])], ids=["order", "sign"])
 def test_modes_lost_by_their_shapes_are_named(change):
     raw = padded()
     raw.shapes = change(raw.shapes)
-    message = r"50 of 50 records without 'f\d' .* 2% .* MAC .* 0\.\d+.*other-shapes"
-    with pytest.warns(UserWarning, match=message):
+    with pytest.warns(UserWarning, match=r"records without \['f1'.* have a pole of another shape.*signs"):
         ModeTracker((F0, PHI)).fit_transform(raw)
 
 
@@ -300,4 +298,4 @@ def test_missing_modes_and_spurious_poles_are_no_wrong_shapes():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         ModeTracker((F0, PHI)).fit_transform(raw)
-    assert not any("MAC with the reference" in str(one.message) for one in caught)
+    assert not any("another shape" in str(one.message) for one in caught)

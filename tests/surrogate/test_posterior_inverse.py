@@ -79,7 +79,7 @@ def test_tracked_modes_that_swap_come_back():
     np.testing.assert_allclose(posterior(model).transform(solved), theta, rtol=1e-7)
 
 
-@pytest.mark.filterwarnings("ignore:.*modes-cross")
+@pytest.mark.filterwarnings("ignore:.*mode-order")
 def test_sorted_modes_that_cross_give_one_of_both_solutions():
     stiffness = np.array([400.0, 420.0])
     solved = oscillators(*stiffness, track=False).frequencies(drawn(200, 2))
@@ -89,7 +89,7 @@ def test_sorted_modes_that_cross_give_one_of_both_solutions():
     np.testing.assert_allclose((np.abs(theta / both - 1).max(axis=2)).min(axis=0), 0, atol=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore:.*modes-cross")
+@pytest.mark.filterwarnings("ignore:.*mode-order")
 def test_sorted_modes_beyond_a_crossing_come_back():
     """A third mode tells the order of two that cross: steps from the other side of the crossing must get past it."""
     terms = {("k0",): np.diag([400.0, 0.0, 900.0]), ("k1",): np.diag([0.0, 420.0, 300.0])}

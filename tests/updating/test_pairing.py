@@ -10,7 +10,7 @@ from skthermo.fem import AffineModel, CallableModel, mac
 from skthermo.updating import ModelUpdater, identifiability
 from tests.updating.test_updater import TRUSS, TRUTH, measured
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*at-bounds")
+pytestmark = pytest.mark.filterwarnings("ignore:.*poor-fit")
 
 
 def oscillators(track, n_modes=3):
@@ -32,7 +32,7 @@ def test_a_false_match_of_swapped_modes_is_refused():
     bounds, F = [[0.9, 1.6], [0.6, 1.01], [0.5, 1.5]], np.sqrt([[1.3, 1.5, 9.0]]) / (2 * np.pi)
     honest = ModelUpdater(tracked, bounds=bounds, n_starts=8, random_state=0).fit(F)
     np.testing.assert_allclose(honest.theta_, [1.3, 1.01, 1.0], atol=1e-4)
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*modes-cross"):
+    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*mode-order"):
         false = ModelUpdater(sorted_, bounds=bounds, n_starts=8, random_state=0).fit(F)
     assert false.starts_["objective"].min() < 1e-9 < honest.starts_["objective"].min()
     with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*mode-order"):
@@ -139,5 +139,5 @@ class OnlyModes(CallableModel):
 )
 def test_swapped_modes_of_a_third_partys_sorted_model_are_named(model):
     bounds = [[1, 1.6], [0.5, 1.05], [0.5, 1.5]]
-    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*modes-cross"):
+    with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*mode-order"):
         ModelUpdater(model, bounds=bounds, n_starts=8, random_state=0).fit(model.frequencies([[1.5, 0.9, 1.0]]))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from copy import copy
 from functools import partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from skthermo._core.arrays import (
     Array,
@@ -29,8 +29,8 @@ from skthermo._core.arrays import (
     shape_array,
 )
 from skthermo._core.parallel import map_on_blas_threads
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import ModelWarning
+from skthermo._core.warnings import warn_each
+from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._terms import (
     AffineTerms,
     DenseTerms,
@@ -38,32 +38,21 @@ from skthermo.fem._terms import (
     SparseTerms,
     check_different,
     check_severities,
+    failures,
     read_matrix,
     read_terms,
-    warn_of_failures,
 )
 from skthermo.fem.affine._basis import Basis, grow_basis
+from skthermo.fem.damage import damage_directions
 from skthermo.fem.modal import AffineCore, LocalModes, check_supported, count_modes
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Terms = Mapping[tuple[str, ...], MatrixLike] | Sequence[tuple[tuple[str, ...], MatrixLike]]
 Content = tuple[Hashable, tuple[str, ...]]
 Names = tuple[str, ...] | None
 Groups = dict[str, tuple[int, ...]] | None
-
-DENSE_DOFS = 200  # degrees of freedom up to which dense batches are faster
-DENSE_SHARE = 0.3  # share of nonzero entries above which a matrix counts as dense
-
-FULL_DENSE, FULL_SPARSE = (0.05, 1.6e-4), (6.0, 0.008)
-"""Milliseconds of frequencies and derivatives: of a dense model, in all and per squared degree of freedom; of a sparse
-one, in all and per degree of freedom."""
-
-USUAL_MODES = 6  # as few as vibration tests of bridges usually identify
-VECTORS_PER_PARAMETER = 12  # a basis has about as many vectors for each parameter, and for one more
-REDUCED = (0.06, 5e-5)  # milliseconds of a reduced solve, in all and per squared number of basis vectors
-BASIS_SOLVES, BASIS_PER_VECTOR = (20, 4), 2.0
-"""A basis takes so many full solves, in all and per parameter, and so many milliseconds per vector."""
-
-LARGEST_SHARE = 0.5  # largest share of the full model's time that a reduced model may take
 
 
 class AffineModel:
@@ -159,7 +148,7 @@ class AffineModel:
         mass_keys, mass_matrices = read_terms(mass, "mass", n_dof=n_dof)
         self.parameter_names = check_names(parameter_names, stiffness_keys + mass_keys)
         self._groups = check_groups(groups, self.parameter_names, stiffness_keys)
-        wanted = USUAL_MODES if n_modes is None else positive_integer(n_modes, "n_modes")
+        wanted = 6 if n_modes is None else positive_integer(n_modes, "n_modes")
         if contents and len(contents) != len(stiffness_keys):
             raise ValueError(f"contents are of {len(contents)} terms; expected {len(stiffness_keys)}, as of stiffness")
         self.contents = tuple(map(tuple, contents))
@@ -176,14 +165,8 @@ class AffineModel:
         check_supported(stiffness_terms.assemble(nominal)[0], self.dofs)
         available = count_modes(mass_terms.assemble(nominal)[0], at_least=1 if n_modes is None else wanted)
         solvable = n_dof - 1 if terms is SparseTerms else n_dof
-        if n_modes is None and available < wanted:
-            warn_user(
-                f"of the {wanted} modes that models give by default this one has only {available}. It gives these; say "
-                f"so by n_modes={available}",
-                ModelWarning,
-                "fewer-modes",
-            )
-            wanted = available
+        if n_modes is None:
+            wanted = min(wanted, available)
         self._core = self._whole = AffineCore.from_terms(
             stiffness_terms,
             mass_terms,
@@ -416,6 +399,35 @@ class AffineModel:
             factors[list(self._groups[group])] *= 1 - severity
         return self._with_core(self._whole.with_scaled_stiffness(factors))
 
+    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+
+        Returns
+        -------
+        DataFrame of shape (n_groups, n_modes)
+            Derivatives of ln f by the severity, at the model's nominal state. Groups that move no frequency are left
+            out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or none moves a frequency.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> make_truss().damage_directions(["bottom", "top"]).round(3)
+                    0      1      2      3      4      5
+        bottom -0.233 -0.225 -0.159 -0.070 -0.022 -0.031
+        top    -0.212 -0.127 -0.098 -0.053 -0.140 -0.029
+        """
+        return damage_directions(self, groups)
+
     def with_modes(self, modes: Sequence[int]) -> Self:
         """A new model with other modes as its columns.
 
@@ -643,16 +655,20 @@ class AffineModel:
         """
         return self._twin(_is_quiet=True)
 
-    def warn_of(self, theta: Array, frequencies: NDArray) -> None:
-        """Give the model's warnings about a whole table and its solution.
+    def findings(self, theta: Array, frequencies: Array) -> list[SkthermoWarning]:
+        """Warnings about a whole table of theta and its solution, for the caller to give.
 
         Parameters
         ----------
         theta, frequencies : ndarray of shape (n_samples, n_parameters) and (n_samples, n_modes)
             The table, and its solution in Hz.
+
+        Returns
+        -------
+        list of SkthermoWarning
+            Empty for a model that is `quiet`.
         """
-        if not self._is_quiet:
-            warn_of_failures(theta, frequencies)
+        return [] if self._is_quiet else failures(theta, frequencies)
 
     def __sklearn_clone__(self) -> Self:
         return self
@@ -723,12 +739,12 @@ class AffineModel:
         (False, True)
         """
         n_parameters = len(self.parameter_names)
-        size = min(self.n_dof, VECTORS_PER_PARAMETER * (n_parameters + 1))
-        fixed, growing = FULL_DENSE if self._core.stiffness.is_dense else FULL_SPARSE
-        full = fixed + growing * self.n_dof ** (2 if self._core.stiffness.is_dense else 1)
-        basis = (BASIS_SOLVES[0] + BASIS_SOLVES[1] * n_parameters) * full + BASIS_PER_VECTOR * size
-        reduced = REDUCED[0] + REDUCED[1] * size**2
-        return bool(basis + n_solves * reduced < LARGEST_SHARE * n_solves * full)
+        size = min(self.n_dof, 12 * (n_parameters + 1))  # vectors of a basis
+        is_dense = self._core.stiffness.is_dense
+        full = 0.05 + 1.6e-4 * self.n_dof**2 if is_dense else 6.0 + 0.008 * self.n_dof  # milliseconds of a solve
+        basis = (20 + 4 * n_parameters) * full + 2.0 * size
+        reduced = 0.06 + 5e-5 * size**2
+        return bool(basis + n_solves * reduced < 0.5 * n_solves * full)
 
     def __repr__(self) -> str:
         counts = ((len(self.parameter_names), "parameter"), (self.n_dof, "degree"), (self.n_modes, "mode"))
@@ -754,7 +770,7 @@ class AffineModel:
         size = self.rows_per_chunk
         parts = map_on_blas_threads(solve, np.split(rows, range(size, len(rows), size)))
         results = tuple(map(np.concatenate, zip(*parts, strict=True)))
-        self.warn_of(rows, results[0])
+        warn_each(self.findings(rows, results[0]))
         return results
 
 
@@ -863,12 +879,12 @@ class ReducedModel(AffineModel):
         return f"ReducedModel({self._full!r}, {self.basis_size_} basis vectors, error {self.error_:.1e})"
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
-        self._warn_of_bounds(check_theta(theta, self.parameter_names, one_row=True))
-        return super().local_modes(theta, follow=follow)
+        modes = super().local_modes(theta, follow=follow)
+        warn_each(self._beyond_bounds(check_theta(theta, self.parameter_names, one_row=True)))
+        return modes
 
-    def warn_of(self, theta: Array, frequencies: NDArray) -> None:
-        self._warn_of_bounds(theta)
-        super().warn_of(theta, frequencies)
+    def findings(self, theta: Array, frequencies: Array) -> list[SkthermoWarning]:
+        return [*self._beyond_bounds(theta), *super().findings(theta, frequencies)]
 
     def _with_core(
         self, core: AffineCore, names: Names = None, bounds: Array | None = None, groups: Groups = None
@@ -887,17 +903,17 @@ class ReducedModel(AffineModel):
         self._core, self._basis = basis.core, basis.vectors
         self.error_, self.check_points_, self.snapshot_points_ = basis.error, basis.check_points, basis.snapshot_points
 
-    def _warn_of_bounds(self, theta: Array) -> None:
+    def _beyond_bounds(self, theta: Array) -> list[SkthermoWarning]:
         lowest, highest = self._bounds.T * [[1 - 1e-9], [1 + 1e-9]]
-        outside = ((theta < lowest) | (theta > highest)).any(axis=1)
-        if outside.any() and not self._is_quiet:
-            warn_user(
-                f"{outside.sum()} of {len(theta)} theta are outside the bounds for which the model was reduced, row "
-                f"{np.flatnonzero(outside)[0]} the first. Frequencies there may be wrong by more than {self._tol:g}. "
-                "Reduce the model for wider bounds, or use the full one",
-                ModelWarning,
-                "outside-reduced-bounds",
-            )
+        outside = ((theta < lowest) | (theta > highest)).any(axis=0)
+        if self._is_quiet or not outside.any():
+            return []
+        names = ", ".join(repr(name) for name, is_so in zip(self.parameter_names, outside, strict=True) if is_so)
+        text = (
+            f"theta of {names} is outside the bounds for which the model was reduced. Frequencies there may be wrong "
+            f"by more than {self._tol:g}. Reduce the model for wider bounds, or use the full one"
+        )
+        return [ModelWarning(text, "outside-reduced-bounds")]
 
 
 def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:
@@ -958,7 +974,7 @@ def are_sparse(matrices: Sequence[Matrix], n_modes: int) -> bool:
     """Whether shift-invert is faster than dense batches for this many modes."""
     n_dof = matrices[0].shape[0]
     entries = sum(np.count_nonzero(m) if isinstance(m, np.ndarray) else m.nnz for m in matrices)
-    return n_dof > max(DENSE_DOFS, 4 * n_modes) and entries < DENSE_SHARE * n_dof**2
+    return n_dof > max(200, 4 * n_modes) and entries < 0.3 * n_dof**2
 
 
 def read_mass(mass: MatrixLike, what: str, n_dof: int) -> Matrix:

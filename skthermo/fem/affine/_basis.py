@@ -16,22 +16,6 @@ from skthermo.fem._factors import Solve, factorise
 from skthermo.fem._terms import SparseTerms
 from skthermo.fem.modal import AffineCore, ShiftInvertSolver, may_be_missed, pair_modes
 
-FIRST_SNAPSHOTS = 16
-UNGUIDED = 2  # snapshots, beside which all others start from the modes of a basis
-SNAPSHOT_SHARE = 10.0  # largest error of an eigenvalue of a snapshot, as a share of the basis's tolerance
-CHECK_SHARE = 1e-2  # the same at a check point
-NEAR = 10  # estimated errors, in units of ``tol``, up to which a step towards the modes replaces them
-SNAPSHOTS_PER_ROUND = 12
-CANDIDATES_PER_ROUND = 64
-CHECK_POINTS = 20
-MAX_ROUNDS = 40
-HOPELESS, HOPELESS_ROUNDS = 1000, 3
-"""Estimated errors, in units of ``tol``, that are given up if so many further rounds have not halved them: points where
-the modes that are followed have dissolved among others, far from the nominal state."""
-
-LEAST_ENERGY = 1e-13  # share of strain energy below which a direction is rounding error
-LEAST_SHARE = 1e-3  # of the tolerance, the energy below which a direction is forgotten in further rounds
-
 
 class Basis(NamedTuple):
     """Basis vectors (n_dof, n), the core on them, and its largest relative error of a frequency at the check points."""
@@ -64,40 +48,41 @@ def grow_basis(
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
     solve: Any = factorise(stiffness)
     if start is None:
-        used = np.vstack([nominal, *drawn(bounds, random, FIRST_SNAPSHOTS)])
-        start, points = snapshots_at(full, used[:UNGUIDED]), used[UNGUIDED:]
+        used = np.vstack([nominal, *drawn(bounds, random, 16)])
+        start, points = snapshots_at(full, used[:2]), used[2:]  # the others start from the modes of a basis
     else:
         used = points = nominal[:0]
-    directions = principal_directions(of_unit_energy(start, stiffness), stiffness, LEAST_SHARE * tol)
+    forgotten, error_of_snapshot = 1e-3 * tol, 10 * tol  # an energy, and an error of an eigenvalue
+    directions = principal_directions(of_unit_energy(start, stiffness), stiffness, forgotten)
     vectors, core = basis_of(directions, full, tol)
-    new = of_unit_energy(snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), points), stiffness)
+    new = of_unit_energy(snapshots_at(guided(full, core, vectors, error_of_snapshot), points), stiffness)
     largest: list[float] = []
-    for _ in range(MAX_ROUNDS):
+    for _ in range(40):
         if new.shape[1]:
             known = directions.vectors * np.sqrt(directions.energies)
-            directions = principal_directions(np.hstack([known, new]), stiffness, LEAST_SHARE * tol)
+            directions = principal_directions(np.hstack([known, new]), stiffness, forgotten)
             vectors, core = basis_of(directions, full, tol)
-        for candidates in drawn(bounds, random, CANDIDATES_PER_ROUND)[::-1]:  # errors are largest at corners
+        for candidates in drawn(bounds, random, 64)[::-1]:  # errors are largest at corners
             estimates, steps = estimated_errors(full, core, vectors, candidates, solve)
-            errors, is_near = estimates.max(axis=1), estimates.max() < NEAR * tol
+            errors, is_near = estimates.max(axis=1), estimates.max() < 10 * tol
             if errors.max() >= tol / 2:
                 break
         else:
-            candidates, is_near = np.vstack(drawn(bounds, random, CHECK_POINTS)), False
+            candidates, is_near = np.vstack(drawn(bounds, random, 20)), False
             candidates = candidates[~(candidates[:, np.newaxis] == used).all(axis=2).any(axis=1)]
-            errors = true_errors(guided(full, core, vectors, CHECK_SHARE * tol), core, candidates)
+            errors = true_errors(guided(full, core, vectors, 1e-2 * tol), core, candidates)
             if errors.max() < tol / 2:
                 return Basis(vectors, core, float(errors.max()), candidates, used)
         largest.append(float(errors.max()))
-        before = largest[-1 - HOPELESS_ROUNDS] if len(largest) > HOPELESS_ROUNDS else np.inf
-        if largest[-1] > max(before / 2, HOPELESS * tol):
+        before = largest[-4] if len(largest) > 3 else np.inf
+        if largest[-1] > max(before / 2, 1000 * tol):  # modes that are followed have dissolved among others
             break
-        worst = np.argsort(-errors)[:SNAPSHOTS_PER_ROUND]
+        worst = np.argsort(-errors)[:12]
         used = np.vstack([used, candidates[worst]])
         if is_near:
             new = np.hstack([steps[row][:, estimates[row] >= tol / 4] for row in worst])
         else:
-            snapshots = snapshots_at(guided(full, core, vectors, SNAPSHOT_SHARE * tol), candidates[worst])
+            snapshots = snapshots_at(guided(full, core, vectors, error_of_snapshot), candidates[worst])
             new = of_unit_energy(snapshots, stiffness)
     raise RuntimeError(
         f"after {len(largest)} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
@@ -181,5 +166,5 @@ def of_unit_energy(vectors: Array, stiffness: csc_array) -> Array:
 def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> Directions:
     """Principal directions of vectors in the inner product of a stiffness, without those of less than some energy."""
     energies, turns = scipy.linalg.eigh(vectors.T @ (stiffness @ vectors))
-    kept = energies > max(least, LEAST_ENERGY * energies[-1])
+    kept = energies > max(least, 1e-13 * energies[-1])  # less is rounding error
     return Directions(vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept])

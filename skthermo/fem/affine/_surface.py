@@ -14,22 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._core.arrays import Array, Bounds, check_theta, spread_evenly
 from skthermo._core.parallel import single_blas_thread
 
-FIRST_DEGREE = 3
-MOST_TERMS = 500
-POINTS_PER_TERM = 2
-CHECK_POINTS = 100
-ENOUGH, LEAST_SERVED = 0.9, 0.5  # shares of the check points near rows: with less, the degree is raised; is refused
-MARGIN, LEAST_MARGIN = 0.25, 0.02  # around the rows: shares of their half-width, and of ln theta
-ANYWHERE = 4  # one of so many points is anywhere in the box, the others are near rows
-MOST_ROWS = 1000  # rows, spread evenly, that the box is made of
 CLOSE = 0.01  # relative distance of two modes in which the order of their columns is not known
-PAIRED = 0.05  # relative distance below which two modes are fitted together
-SAFETY = 0.5  # share of the smallest estimate at a check point of too large an error
-
-MOST_TERMS_OF_RECORDS, MOST_DEGREE_OF_RECORDS = 150, 3  # of a polynomial through solutions with derivatives
-KEPT = 0.01  # weight by which coefficients stay small that solutions hardly determine
-LEAST_SCALE = 0.01  # of ln theta
-ROWS_PER_CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +35,13 @@ class PrincipalBox:
     @classmethod
     def around(cls, theta: Array, bounds: Array | None = None) -> PrincipalBox:
         """The box around rows of theta, of which those with NaN do not count."""
-        logs = np.log(theta[spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), MOST_ROWS)])
+        logs = np.log(theta[spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), 1000)])
         middle = logs.mean(axis=0)
         directions = np.linalg.svd(logs - middle, full_matrices=True)[2]
         places = (logs - middle) @ directions.T
         lowest, highest = places.min(axis=0), places.max(axis=0)
         own = (highest - lowest) / 2
-        half_widths = own + np.maximum(MARGIN * own, LEAST_MARGIN)
+        half_widths = own + np.maximum(0.25 * own, 0.02)
         centre = middle + (lowest + highest) / 2 @ directions
         everywhere = np.tile([0.0, np.inf], (theta.shape[1], 1))
         rows = (logs - centre) @ directions.T / half_widths
@@ -75,11 +60,16 @@ class PrincipalBox:
     def drawn(self, number: int, random: np.random.RandomState) -> Array:
         """Random points near rows, and some anywhere in the box, as rows of theta."""
         places = random.uniform(-1, 1, size=(number, len(self.centre)))
-        near = np.arange(number) % ANYWHERE > 0
+        near = are_near_rows(number)
         around = self.rows[random.randint(len(self.rows), size=number)]
         places[near] = (around + places * self.jitter)[near]
         theta = np.exp(self.centre + np.clip(places, -1, 1) * self.half_widths @ self.directions)
         return np.clip(theta, *self.bounds.T)
+
+
+def are_near_rows(number: int) -> NDArray[np.bool_]:
+    """Which of some drawn points are near rows: all but every fourth, which is anywhere in the box."""
+    return np.arange(number) % 4 > 0
 
 
 @dataclass(frozen=True)
@@ -98,12 +88,12 @@ class SmoothCoordinates:
         logs, pairs, left = np.log(frequencies), [], set(range(frequencies.shape[1]))
         gaps = {(i, j): np.nanmin(np.abs(logs[:, i] - logs[:, j])) for i, j in combinations(sorted(left), 2)}
         for pair in sorted(gaps, key=gaps.__getitem__):
-            if gaps[pair] < PAIRED and left.issuperset(pair):
+            if gaps[pair] < 0.05 and left.issuperset(pair):
                 pairs.append(pair)
                 left.difference_update(pair)
         return cls(tuple(pairs))
 
-    def of(self, frequencies: Array) -> tuple[Array, Array]:
+    def values(self, frequencies: Array) -> tuple[Array, Array]:
         """Coordinates, (n_samples, n_modes), and halves of the differences with their sign, (n_samples, n_pairs)."""
         found, halves = np.log(frequencies), np.empty((len(frequencies), len(self.pairs)))
         for number, (i, j) in enumerate(self.pairs):
@@ -136,19 +126,20 @@ class ResponseSurface:
     coefficients: Array
 
     @classmethod
-    def of(cls, x: Array, frequencies: Array, sensitivity: Array | None = None) -> ResponseSurface:
+    def fitted(cls, x: Array, frequencies: Array, sensitivity: Array | None = None) -> ResponseSurface:
         """The surface through frequencies at rows of ln theta = x and, where they are known, d ln f / d ln theta."""
         solved = np.isfinite(frequencies).all(axis=1)
         x, log_f, n_parameters = x[solved], np.log(frequencies[solved]), x.shape[1]
-        most = MOST_TERMS_OF_RECORDS if sensitivity is not None else len(x) // 2
+        most = 150 if sensitivity is not None else len(x) // 2
         degree = 1
-        while degree < MOST_DEGREE_OF_RECORDS and n_terms(n_parameters, degree + 1) <= most:
+        while degree < 3 and n_terms(n_parameters, degree + 1) <= most:
             degree += 1
-        middle, scale = x.mean(axis=0), np.maximum(x.std(axis=0), LEAST_SCALE)
+        middle, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 0.01)  # of ln theta
         z = (x - middle) / scale
         equations, results = [terms(z, degree)], [log_f]
         if sensitivity is not None:
-            small = KEPT * np.sqrt(len(x)) * np.eye(n_terms(n_parameters, degree))[1 + n_parameters :]
+            # Coefficients that solutions hardly determine stay small.
+            small = 0.01 * np.sqrt(len(x)) * np.eye(n_terms(n_parameters, degree))[1 + n_parameters :]
             equations += [slopes_of_terms(z, degree).reshape(-1, small.shape[1]), small]
             results.append((sensitivity[solved] * scale).swapaxes(1, 2).reshape(-1, log_f.shape[1]))
             results.append(np.zeros((len(small), log_f.shape[1])))
@@ -161,8 +152,8 @@ class ResponseSurface:
         z = (np.log(theta) - self.middle) / self.scale
         log_f = np.empty((len(z), self.coefficients.shape[1]))
         slopes = np.empty((*log_f.shape, z.shape[1]))
-        for first in range(0, len(z), ROWS_PER_CHUNK):
-            rows = slice(first, first + ROWS_PER_CHUNK)
+        for first in range(0, len(z), 1024):
+            rows = slice(first, first + 1024)
             log_f[rows] = terms(z[rows], self.degree) @ self.coefficients
             slopes[rows] = (slopes_of_terms(z[rows], self.degree) @ self.coefficients).swapaxes(1, 2)
         return np.exp(log_f), slopes / self.scale
@@ -269,9 +260,9 @@ class FrequencySurface:
         rows = np.asarray(theta, dtype=float)
         self._box = PrincipalBox.around(rows, None if bounds is None else np.asarray(bounds, dtype=float))
         self.n_solves_, self.share_ = 0, 0.0
-        if highest_degree >= FIRST_DEGREE:
+        if highest_degree >= 3:
             self._learn(solve, highest_degree, tol)
-        if self.share_ < LEAST_SERVED:
+        if self.share_ < 0.5:
             raise RuntimeError(
                 f"polynomials of degree {highest_degree} give frequencies to {tol:g} at {self.share_:.0%} of the check "
                 "points near rows of theta; expected rows in a narrower region, in which no modes cross, a larger tol "
@@ -294,9 +285,9 @@ class FrequencySurface:
         int
             Of polynomials with at most 500 terms.
         """
-        degree = FIRST_DEGREE - 1
-        while (number := n_terms(n_parameters, degree + 1)) <= MOST_TERMS:
-            if POINTS_PER_TERM * number + CHECK_POINTS > n_solves:
+        degree = 2
+        while (number := n_terms(n_parameters, degree + 1)) <= 500:
+            if 2 * number + 100 > n_solves:  # points to learn from, and to check
                 break
             degree += 1
         return degree
@@ -330,25 +321,25 @@ class FrequencySurface:
     def _learn(self, solve: Callable[[Array], Array], highest_degree: int, tol: float) -> None:
         """Raise the degree until polynomials serve enough check points, or no higher one is allowed."""
         random = np.random.RandomState(0)
-        checks = self._box.drawn(CHECK_POINTS, random)
-        exact, near = solve(checks), np.arange(CHECK_POINTS) % ANYWHERE > 0
+        checks = self._box.drawn(100, random)
+        exact, near = solve(checks), are_near_rows(100)
         points, values = checks[:0], exact[:0]
         self._coordinates = SmoothCoordinates.of_modes(exact)
-        may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= LEAST_SERVED
-        for degree in range(FIRST_DEGREE, may_serve * highest_degree + 1):
-            n_more = POINTS_PER_TERM * n_terms(checks.shape[1], degree) - len(points)
+        may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= 0.5
+        for degree in range(3, may_serve * highest_degree + 1):
+            n_more = 2 * n_terms(checks.shape[1], degree) - len(points)
             more = self._box.drawn(n_more, random)
             points, values = np.vstack([points, more]), np.vstack([values, solve(more)])
             self._fit(points, values, degree)
             self._check(checks, exact, near, tol)
-            if self.share_ >= ENOUGH:
+            if self.share_ >= 0.9:
                 break
         self.n_solves_ = len(points) + len(checks)
 
     def _fit(self, points: Array, values: Array, degree: int) -> None:
         self.degree_, features = degree, terms(self._box.places(points), degree)
         n_lower = n_terms(points.shape[1], degree - 1)
-        smooth, halves = self._coordinates.of(values)
+        smooth, halves = self._coordinates.values(values)
         whole, lower = (np.linalg.lstsq(part, smooth, rcond=None)[0] for part in (features, features[:, :n_lower]))
         difference = whole.copy()
         difference[:n_lower] -= lower
@@ -364,7 +355,7 @@ class FrequencySurface:
         errors = np.nan_to_num(np.abs(frequencies / exact - 1), nan=np.inf).max(axis=1)
         known = np.isfinite(estimates)
         wrong = estimates[known & (errors > tol)]
-        self._limit = SAFETY * wrong.min() if len(wrong) else estimates[known].max(initial=0.0)
+        self._limit = 0.5 * wrong.min() if len(wrong) else estimates[known].max(initial=0.0)
         served = estimates <= self._limit
         self.error_, self.share_ = float(errors[served].max(initial=0.0)), float(served[near].mean())
 
@@ -387,7 +378,7 @@ class FrequencySurface:
 
     def _in_order(self, frequencies: Array, halves: Array) -> NDArray[np.bool_]:
         """Rows in which the polynomials of differences, with their sign, agree with the others to a half."""
-        found = self._coordinates.of(frequencies)[1]
+        found = self._coordinates.values(frequencies)[1]
         agreed: NDArray[np.bool_] = np.abs(halves - found) < np.abs(found) / 2
         return np.asarray(agreed.all(axis=1))
 

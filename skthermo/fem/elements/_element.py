@@ -16,11 +16,6 @@ ByProperties = dict[tuple[str, ...], Array]
 
 TRANSLATIONS = ("x", "y", "z")
 ROTATIONS = ("rx", "ry", "rz")
-INTERFACE = ("nodes", "dofs", "properties", "ends", "stiffness", "mass")
-
-LARGEST = 1e40  # of a property in SI units: products of larger ones are infinite
-SHORTEST_MEMBER = 1e-6
-"""Length of a member, as a share of the structure's extent, below which its ends count as the same point."""
 
 
 class Element(Protocol):
@@ -148,9 +143,10 @@ def check_matrices(name: Hashable, element: Element, matrices: ByProperties, n_d
 
 def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashable, Array], extent: float) -> None:
     """Raise an error if an element has unknown nodes, is too short, or has a property that is not positive."""
-    missing = [member for member in INTERFACE if not hasattr(element, member)]
+    interface = ("nodes", "dofs", "properties", "ends", "stiffness", "mass")
+    missing = [member for member in interface if not hasattr(element, member)]
     if isinstance(element, type) or missing:
-        lacks = f", which has no {missing[0]!r}" if missing and len(missing) < len(INTERFACE) else ""
+        lacks = f", which has no {missing[0]!r}" if missing and len(missing) < len(interface) else ""
         raise ValueError(f"member {name!r} is {element!r}{lacks}; expected an element such as Bar(...)")
     for node in element.nodes:
         if not isinstance(node, Hashable) or node not in coordinates:
@@ -163,12 +159,13 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
         first, last = element.nodes
         raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
     sides = np.linalg.norm(ends - np.roll(ends, 1, axis=0), axis=1)
-    if len(ends) > 1 and sides.min() < SHORTEST_MEMBER * extent:
+    shortest = 1e-6 * extent
+    if len(ends) > 1 and sides.min() < shortest:
         raise ValueError(
-            f"member {name!r} has a length of {sides.min():.3g} m; expected at least {SHORTEST_MEMBER * extent:.3g} m, "
+            f"member {name!r} has a length of {sides.min():.3g} m; expected at least {shortest:.3g} m, "
             f"a millionth of the structure's extent of {extent:.6g} m: are two of its nodes the same?"
         )
     for symbol, value, may_be_zero in element.properties():
         expected = "zero or more" if may_be_zero else "a positive number"
-        if not (is_real(value) and value < LARGEST and (value > 0 or (may_be_zero and value == 0))):
+        if not (is_real(value) and value < 1e40 and (value > 0 or (may_be_zero and value == 0))):  # products are finite
             raise ValueError(f"member {name!r} has {symbol} = {value!r}; expected {expected}")

@@ -1,100 +1,32 @@
-"""Models of any function, and the file that keeps what it has solved."""
+"""Models of any function."""
 
 from __future__ import annotations
 
 import copy
-import json
-import sqlite3
-import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from joblib import Memory
 from numpy.typing import ArrayLike
 
 from skthermo._core.arrays import Array, check_flag, check_path, check_theta, positive_integer, real_array
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import ModelWarning
+from skthermo._core.warnings import warn_each
+from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._terms import (
     ROWS_PER_CHUNK,
     by_name,
     check_different,
     check_severities,
+    failures,
     failures_named,
-    warn_of_failures,
 )
+from skthermo.fem.damage import damage_directions
 
-SECONDS = 600  # a process waits so long while others write
-
-
-class SampleCache:
-    """An SQLite database of frequencies by the bytes of their theta, to which several processes may add.
-
-    The file and its folder are created when the first sample is solved. A folder, or a file that belongs to other
-    parameters, another number of modes or something else, is an error.
-    """
-
-    def __init__(self, path: str | PathLike, parameter_names: Sequence[str], n_modes: int):
-        self.path = check_path(path, "cache").absolute()
-        self._describes = {"parameter_names": list(parameter_names), "n_modes": int(n_modes)}
-        self.read([])
-
-    def read(self, keys: Sequence[bytes]) -> dict[bytes, Array]:
-        """Frequencies of the keys that are known; a record that was damaged on the disk is not."""
-        if self.path.is_dir():
-            raise ValueError(f"{self.path}: the cache is a folder; expected a file, such as {self.path / 'solved'}")
-        if not self.path.exists():
-            return {}
-        with self._opened() as database:
-            if not self._is_begun(database):
-                return {}
-            query = "SELECT frequencies, checksum FROM solved WHERE theta = ?"
-            found = ((key, row) for key in keys if (row := database.execute(query, [key]).fetchone()))
-            return {key: np.frombuffer(f, "<f8") for key, (f, checksum) in found if checksum == zlib.crc32(key + f)}
-
-    def add(self, solved: Mapping[bytes, Array]) -> None:
-        """Write frequencies by their key; other processes wait meanwhile."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self._opened() as database:
-            database.execute("BEGIN IMMEDIATE")
-            if not self._is_begun(database):
-                database.execute("CREATE TABLE about (columns TEXT)")
-                columns = "theta BLOB PRIMARY KEY, frequencies BLOB, checksum INTEGER"
-                database.execute(f"CREATE TABLE solved ({columns}) WITHOUT ROWID")
-                database.execute("INSERT INTO about VALUES (?)", [json.dumps(self._describes)])
-            records = ((key, frequencies.astype("<f8").tobytes()) for key, frequencies in solved.items())
-            rows = ((key, f, zlib.crc32(key + f)) for key, f in records)
-            database.executemany("INSERT OR REPLACE INTO solved VALUES (?, ?, ?)", rows)
-
-    @contextmanager
-    def _opened(self) -> Iterator[sqlite3.Connection]:
-        """The database; what is written is kept if nothing fails."""
-        try:
-            with closing(sqlite3.connect(self.path, timeout=SECONDS, isolation_level=None)) as database, database:
-                # A killed process loses nothing; a power failure may cost the file, which only saves time.
-                database.execute("PRAGMA synchronous = OFF")
-                yield database
-        except sqlite3.DatabaseError as error:
-            if isinstance(error, sqlite3.OperationalError):
-                raise
-            raise self._refusal(f"something that is not a cache of solved samples ({error})") from None
-
-    def _is_begun(self, database: sqlite3.Connection) -> bool:
-        """Whether the tables are there; those of another file are an error."""
-        tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-        if not tables:
-            return False
-        if tables != {"about", "solved"}:
-            raise self._refusal("something that is not a cache of solved samples")
-        got = json.loads(database.execute("SELECT columns FROM about").fetchone()[0])
-        if got != self._describes:
-            raise self._refusal(got)
-        return True
-
-    def _refusal(self, got: object) -> ValueError:
-        return ValueError(f"{self.path}: the file holds {got}; expected {self._describes}, or a path of its own")
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def read_parameter_groups(
@@ -113,8 +45,19 @@ def read_parameter_groups(
     return found
 
 
-ROWS_PER_TASK = 32
-"""Rows per task for a function that solves row by row: few, so that all workers are busy and progress is visible."""
+def memory_in(folder: str | PathLike) -> Memory:
+    """The memory that keeps results in a folder, wherever the process goes."""
+    path = check_path(folder, "cache").absolute()
+    if path.is_file():
+        raise ValueError(f"{path}: the cache is a file; expected a folder")
+    return Memory(path, verbose=0)
+
+
+def frequencies_of_row(
+    parameter_names: tuple[str, ...], n_modes: int, theta: bytes, solve: Callable[[], Array]
+) -> Array:
+    """What ``solve`` gives; the memory keeps it by the other arguments."""
+    return solve()
 
 
 class CallableModel:
@@ -133,7 +76,7 @@ class CallableModel:
     vectorized : bool, default=False
         Whether the function takes many rows at once.
     cache : str or path-like, optional
-        A file, an SQLite database, that stores every solved row of theta, so that no row is solved twice, neither
+        A folder in which a `joblib.Memory` keeps every solved row of theta, so that no row is solved twice, neither
         after a crash nor in a later process.
     groups : mapping of str to str or sequence of str, optional
         Damage group -> the parameters that its damage multiplies by 1 - severity, which should be of stiffness alone.
@@ -142,15 +85,14 @@ class CallableModel:
     Attributes
     ----------
     cache : Path or None
-        The file, as an absolute path.
+        The folder, as an absolute path.
     groups : dict of str to tuple of str
         Damage groups and their parameters.
 
     Raises
     ------
     ValueError
-        If the cache is a folder or belongs to other parameters or another number of modes, or a group names unknown
-        parameters.
+        If the cache is a file, or a group names unknown parameters.
 
     See Also
     --------
@@ -158,9 +100,9 @@ class CallableModel:
 
     Notes
     -----
-    A row is recognised by the exact bits of its theta and is written as soon as it is solved; with
-    ``vectorized=True``, all rows of a call are written together. Several processes may share a cache. It cannot know
-    whether the function is still the same: delete the file when the function changes.
+    A row is recognised by the names of the parameters, the number of modes and the exact bits of its theta, and is
+    written as soon as it is solved. Several processes may share a cache. It cannot know whether the function is still
+    the same: delete the folder when the function changes.
 
     Examples
     --------
@@ -193,17 +135,17 @@ class CallableModel:
         self.groups = read_parameter_groups(groups, self.parameter_names)
         self._factors = np.ones(len(self.parameter_names))
         self._is_quiet = False
-        self._samples = None if cache is None else SampleCache(cache, self.parameter_names, self.n_modes)
+        self._memory = None if cache is None else memory_in(cache)
 
     @property
     def cache(self) -> Path | None:
-        """The file that keeps solved rows."""
-        return None if self._samples is None else self._samples.path
+        """The folder that keeps solved rows."""
+        return None if self._memory is None else Path(self._memory.location)
 
     @property
     def rows_per_chunk(self) -> int:
-        """Number of samples in one parallel task."""
-        return ROWS_PER_CHUNK if self.vectorized else ROWS_PER_TASK
+        """Number of samples in one parallel task: few for a slow function, so that all workers are busy."""
+        return ROWS_PER_CHUNK if self.vectorized else 32
 
     def frequencies(self, theta: ArrayLike) -> Array:
         """Natural frequencies.
@@ -229,40 +171,53 @@ class CallableModel:
         """
         rows = check_theta(theta, self.parameter_names) * self._factors
         keys = [row.tobytes() for row in rows.astype("<f8")]
-        known = {} if self._samples is None else self._samples.read(keys)
-        missing = {key: row for key, row in zip(keys, rows, strict=True) if key not in known}
-        batches = [list(missing)] if self.vectorized and missing else [[key] for key in missing]
-        solved: dict[bytes, Array] = {}
-        failures: dict[bytes, RuntimeError] = {}
-        whole_batch_fails = False
-        for batch in batches:
-            asked = np.array([missing[key] for key in batch])
-            try:
-                frequencies = self._solve(asked)
-            except RuntimeError as failure:
-                failures |= dict.fromkeys(batch, failure)
-                whole_batch_fails = len(batch) > 1
-                continue
-            impossible = self._impossible(asked, frequencies)
-            failures |= {batch[row]: failure for row, failure in impossible.items()}
-            good = {key: frequencies[row] for row, key in enumerate(batch) if row not in impossible}
-            if self._samples is not None and good:
-                self._samples.add(good)
-            solved |= good
-        if failures:
-            first = next(iter(failures.values()))
-            everywhere = whole_batch_fails or len(failures) == len(set(keys))
-            if len(failures) > 1 and everywhere and not self._is_quiet:
+        different = dict(zip(keys, rows, strict=True))
+        found = {key: self._kept(key, row) for key, row in different.items() if self._is_kept(key)}
+        solved, failed = self._solve_each({key: row for key, row in different.items() if key not in found})
+        first = next(iter(failed.values()), None)
+        if first is not None and not self._is_quiet:
+            are_one = all(failure is first for failure in failed.values())  # an error for many rows at once
+            if len(failed) > 1 and (len(failed) == len(different) or are_one):
                 raise first
-            if not self._is_quiet:
-                warn_user(
-                    f"{len(failures)} of {len(rows)} rows are NaN, because the model failed: {first}",
-                    ModelWarning,
-                    "failing-program",
-                )
-            solved |= dict.fromkeys(failures, np.full(self.n_modes, np.nan))
-        found = [solved[key] if key in solved else known[key] for key in keys]
-        return np.array(found).reshape(len(rows), self.n_modes)
+            warn_each([ModelWarning(f"some rows are NaN, because the model failed: {first}", "no-solution")])
+        found |= solved | dict.fromkeys(failed, np.full(self.n_modes, np.nan))
+        return np.array([found[key] for key in keys]).reshape(len(rows), self.n_modes)
+
+    def _solve_each(self, missing: Mapping[bytes, Array]) -> tuple[dict[bytes, Array], dict[bytes, RuntimeError]]:
+        """Frequencies of rows, which are kept, and the errors of rows at which the function fails."""
+        solved: dict[bytes, Array] = {}
+        failed: dict[bytes, RuntimeError] = {}
+        for batch in [list(missing)] if self.vectorized and missing else [[key] for key in missing]:
+            rows = np.array([missing[key] for key in batch])
+            try:
+                frequencies = self._solve(rows)
+            except RuntimeError as failure:
+                failed |= dict.fromkeys(batch, failure)
+                continue
+            impossible = self._impossible(rows, frequencies)
+            failed |= {batch[row]: failure for row, failure in impossible.items()}
+            good = {key: frequencies[row] for row, key in enumerate(batch) if row not in impossible}
+            for key, own in good.items():
+                self._keep(key, own)
+            solved |= good
+        return solved, failed
+
+    def _is_kept(self, key: bytes) -> bool:
+        return self._memory is not None and self._remembering().check_call_in_cache(*self._asked(key), None)
+
+    def _kept(self, key: bytes, row: Array) -> Array:
+        return self._remembering()(*self._asked(key), lambda: self._solve(np.atleast_2d(row))[0])
+
+    def _keep(self, key: bytes, frequencies: Array) -> None:
+        if self._memory is not None:
+            self._remembering()(*self._asked(key), lambda: frequencies)
+
+    def _asked(self, key: bytes) -> tuple[tuple[str, ...], int, bytes]:
+        """What a kept row is recognised by."""
+        return self.parameter_names, self.n_modes, key
+
+    def _remembering(self) -> Any:
+        return self._memory.cache(frequencies_of_row, ignore=["solve"])  # type: ignore[union-attr]
 
     def _solve(self, rows: Array) -> Array:
         argument, shape = (rows, (len(rows), self.n_modes)) if self.vectorized else (rows[0], (self.n_modes,))
@@ -313,6 +268,27 @@ class CallableModel:
             twin._factors[[self.parameter_names.index(name) for name in self.groups[group]]] *= 1 - severity
         return twin
 
+    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+
+        Returns
+        -------
+        DataFrame of shape (n_groups, n_modes)
+            Central differences of ln f by the severity, at the model's nominal state. Groups that move no frequency
+            are left out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or none moves a frequency.
+        """
+        return damage_directions(self, groups)
+
     def quiet(self) -> CallableModel:
         """The same model, but without warnings and errors: it gives NaN where the function fails.
 
@@ -325,16 +301,20 @@ class CallableModel:
         twin._is_quiet = True
         return twin
 
-    def warn_of(self, theta: Array, frequencies: Array) -> None:
-        """Warn of rows without frequencies.
+    def findings(self, theta: Array, frequencies: Array) -> list[SkthermoWarning]:
+        """Warnings about a whole table of theta and its solution, for the caller to give.
 
         Parameters
         ----------
         theta, frequencies : ndarray of shape (n_samples, n_parameters) and (n_samples, n_modes)
             A table and its solution.
+
+        Returns
+        -------
+        list of SkthermoWarning
+            Empty for a model that is `quiet`.
         """
-        if not self._is_quiet:
-            warn_of_failures(theta, frequencies)
+        return [] if self._is_quiet else failures(theta, frequencies)
 
     def __sklearn_clone__(self) -> CallableModel:
         return self

@@ -11,8 +11,8 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import Array, MatrixLike, RandomState, as_random_state, is_real
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import ModelWarning
+from skthermo._core.warnings import warn_each
+from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._factors import factorise
 from skthermo.fem._terms import by_name, check_different, failures_named, read_matrix, read_terms
 from skthermo.fem.affine import AffineModel
@@ -21,8 +21,7 @@ Key = tuple[str, ...]
 Terms = dict[Key, scipy.sparse.csc_array]
 Pairs = list[tuple[Key, scipy.sparse.csc_array]]
 
-SAME = 1e-6
-ROUNDING = 16 * np.finfo(float).eps
+SAME_ENTRIES = 1e-6  # largest difference, relative to the diagonal, of entries that count as the same
 
 
 def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
@@ -35,7 +34,7 @@ def split(
     base: scipy.sparse.csc_array, changed: Mapping[str, scipy.sparse.csc_array], factors: Mapping[str, float]
 ) -> Terms:
     """The term of each parameter that changes the matrix when it is multiplied, and the constant part that remains."""
-    diagonal, rounding = base.diagonal(), ROUNDING * (len(changed) + 1)
+    diagonal, rounding = base.diagonal(), 16 * np.finfo(float).eps * (len(changed) + 1)
     terms: Terms = {
         (name,): _without(rounding, matrix - base, diagonal) / (factors[name] - 1) for name, matrix in changed.items()
     }
@@ -117,6 +116,23 @@ def difference_terms(
     >>> AffineModel(terms, np.eye(2), n_modes=2).frequencies([[1.0, 1.0]]).round(2)
     array([[2.13, 5.33]])
     """
+    terms, doubts = read_differences(nominal, changed, factor, check)
+    warn_each(doubtful_matrices(doubts))
+    return terms
+
+
+def doubtful_matrices(doubts: Sequence[str]) -> list[SkthermoWarning]:
+    """One warning for all doubts about matrices."""
+    return [ModelWarning(". ".join(doubts), "doubtful-matrices")] if doubts else []
+
+
+def read_differences(
+    nominal: MatrixLike,
+    changed: Mapping[str, MatrixLike],
+    factor: float | Mapping[str, float],
+    check: tuple[Mapping[str, float], MatrixLike] | None = None,
+) -> tuple[Terms, list[str]]:
+    """The terms of `difference_terms`, and doubts about the factors."""
     if not isinstance(changed, Mapping) or not changed:
         raise ValueError(f"changed is {changed!r:.200}; expected a mapping of parameters to stiffness matrices")
     names = check_different(list(changed))
@@ -132,10 +148,11 @@ def difference_terms(
                 f"multiplied by {factors[name]:g}, parameter {name!r} takes stiffness away; expected a stiffness that "
                 "grows with it: is that the factor, and was nothing else changed?"
             )
-    _check_rest(base, terms, factors)
+    if () in terms:
+        _check_rest(base, terms, factors)
     if check is not None:
         _check_sum(base, terms, check)
-    return terms
+    return terms, _doubtful_factors(terms, factors)
 
 
 def _read_factors(factor: float | Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
@@ -143,7 +160,7 @@ def _read_factors(factor: float | Mapping[str, float], names: Sequence[str]) -> 
     if set(factors) != set(names):
         raise ValueError(f"factor names {list(factors)}; expected {list(names)}, as changed does")
     for name, value in factors.items():
-        if not is_real(value) or not np.isfinite(value) or value <= 0 or abs(value - 1) < SAME:
+        if not is_real(value) or not np.isfinite(value) or value <= 0 or abs(value - 1) < SAME_ENTRIES:
             raise ValueError(f"factor of {name!r} is {value!r}; expected a positive number other than 1, such as 2.0")
     return {name: float(factors[name]) for name in names}
 
@@ -160,44 +177,51 @@ def _is_nonnegative(matrix: scipy.sparse.csc_array, base: scipy.sparse.csc_array
         return False
     scale = scipy.sparse.diags_array(1 / np.sqrt(diagonal), format="csc")
     scaled = scale @ matrix[rows][:, rows] @ scale
-    return factorise(scipy.sparse.csc_array(scaled + SAME * scipy.sparse.eye_array(len(rows)))) is not None
+    return factorise(scipy.sparse.csc_array(scaled + SAME_ENTRIES * scipy.sparse.eye_array(len(rows)))) is not None
 
 
 def _check_rest(base: scipy.sparse.csc_array, terms: Terms, factors: Mapping[str, float]) -> None:
-    """Refuse terms that are together more than the whole, and warn of one that seems to be less than its part."""
-    rest = terms.get(())
-    parts = {key[0]: term for key, term in terms.items() if key}
-    if rest is None:
+    """Refuse terms that are together more than the whole."""
+    rest, parts = terms[()], {key[0]: term for key, term in terms.items() if key}
+    if _is_nonnegative(rest, base):
         return
-    if not _is_nonnegative(rest, base):
-        for name, part in parts.items():
-            if not _is_nonnegative(base - part, base):
-                raise ValueError(
-                    f"the term of parameter {name!r} is more than the whole stiffness if its factor was "
-                    f"{factors[name]:g}; expected the factor by which it was multiplied, and a parameter in which "
-                    "stiffness is linear, such as a modulus and not a thickness"
-                )
-        lacking = rest.diagonal() / np.where(base.diagonal() > 0, base.diagonal(), np.inf)
-        row = int(np.argmin(lacking))
-        sharing = [name for name, part in parts.items() if part.diagonal()[row] > 0]
-        raise ValueError(
-            f"the terms of parameters {sharing} are together more than the whole stiffness, in row {row} by "
-            f"{-lacking[row]:.2%}; expected groups that share no members, and the factors by which they were multiplied"
-        )
     for name, part in parts.items():
+        if not _is_nonnegative(base - part, base):
+            raise ValueError(
+                f"the term of parameter {name!r} is more than the whole stiffness if its factor was "
+                f"{factors[name]:g}; expected the factor by which it was multiplied, and a parameter in which "
+                "stiffness is linear, such as a modulus and not a thickness"
+            )
+    lacking = rest.diagonal() / np.where(base.diagonal() > 0, base.diagonal(), np.inf)
+    row = int(np.argmin(lacking))
+    sharing = [name for name, part in parts.items() if part.diagonal()[row] > 0]
+    raise ValueError(
+        f"the terms of parameters {sharing} are together more than the whole stiffness, in row {row} by "
+        f"{-lacking[row]:.2%}; expected groups that share no members, and the factors by which they were multiplied"
+    )
+
+
+def _doubtful_factors(terms: Terms, factors: Mapping[str, float]) -> list[str]:
+    """Sentences about terms that seem to be less than their part of the whole."""
+    doubts: list[str] = []
+    rest, parts = terms.get(()), {key[0]: term for key, term in terms.items() if key}
+    for name, part in parts.items() if rest is not None else ():
         others = [abs(other) for key, other in terms.items() if key and key != (name,)]
-        shared = reduce(add, others).sum(axis=0) if others else np.zeros(len(base.diagonal()))
+        shared = reduce(add, others).sum(axis=0) if others else np.zeros(part.shape[0])
         rows = np.flatnonzero((abs(part).sum(axis=0) > 0) & (shared == 0))
         alone, beside = part[rows], rest[rows]
         ratio = float((alone * beside).sum() / max((alone * alone).sum(), np.finfo(float).tiny))
-        if alone.nnz > len(rows) and ratio > SAME and abs(beside - ratio * alone).max() < SAME * abs(beside).max():
-            warn_user(
+        if (
+            alone.nnz > len(rows)
+            and ratio > SAME_ENTRIES
+            and abs(beside - ratio * alone).max() < SAME_ENTRIES * abs(beside).max()
+        ):
+            doubts.append(
                 f"where parameter {name!r} is the only one, the constant rest of the stiffness is {ratio:.4g} times "
                 "its term. The term is too small if its factor is not the one that was used. Give the factor "
-                f"{1 + (factors[name] - 1) / (1 + ratio):.4g} in place of {factors[name]:g}, unless that rest is meant",
-                ModelWarning,
-                "doubtful-factor",
+                f"{1 + (factors[name] - 1) / (1 + ratio):.4g} in place of {factors[name]:g}, unless that rest is meant"
             )
+    return doubts
 
 
 def _check_sum(base: scipy.sparse.csc_array, terms: Terms, check: tuple[Mapping[str, float], MatrixLike]) -> None:
@@ -213,7 +237,7 @@ def _check_sum(base: scipy.sparse.csc_array, terms: Terms, check: tuple[Mapping[
     changes = ((multipliers[name] - 1) * terms[name,] for name in multipliers)
     entries = (whole - reduce(add, changes, base)).tocoo()
     share = relative(entries, base.diagonal())
-    if share.size and share.max() > SAME:
+    if share.size and share.max() > SAME_ENTRIES:
         row = int(entries.row[np.argmax(share)])
         involved = [name for name in multipliers if terms[name,].diagonal()[row] > 0]
         raise ValueError(
@@ -221,9 +245,6 @@ def _check_sum(base: scipy.sparse.csc_array, terms: Terms, check: tuple[Mapping[
             f"{share.max():.2%} of the diagonal; expected a stiffness that is linear in "
             f"{involved or list(multipliers)}, each of which acts alone"
         )
-
-
-MATRICES = ("stiffness", "mass")
 
 
 class Program:
@@ -241,7 +262,7 @@ class Program:
         if not isinstance(result, tuple | list) or len(result) != 2:
             raise ValueError(f"the program returned a {type(result).__name__} {where}; expected (stiffness, mass)")
         matrices = []
-        for matrix, what in zip(result, MATRICES, strict=True):
+        for matrix, what in zip(result, ("stiffness", "mass"), strict=True):
             try:
                 _, (read,) = read_terms(matrix, what, self.n_dof)
             except ValueError as error:
@@ -272,11 +293,11 @@ def check_affine(program: Program, terms: tuple[Pairs, Pairs], row: Array) -> No
 def _difference(program: Program, terms: tuple[Pairs, Pairs], row: Array) -> tuple[str, float] | None:
     """Which matrix of a program differs from the affine one, and by which share of the diagonal."""
     theta = by_name(row, program.parameter_names)
-    for what, matrix, pairs in zip(MATRICES, program(row), terms, strict=True):
+    for what, matrix, pairs in zip(("stiffness", "mass"), program(row), terms, strict=True):
         affine = reduce(add, (np.prod([theta[name] for name in key]) * term for key, term in pairs))
         entries = (matrix - affine).tocoo()
         share = relative(entries, matrix.diagonal())
-        if share.size and share.max() > SAME:
+        if share.size and share.max() > SAME_ENTRIES:
             return what, float(share.max())
     return None
 

@@ -14,11 +14,10 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import Matrix, check_names, check_path
-from skthermo._core.matrix_files import MASS, read_half, read_named_matrices
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import ModelWarning
+from skthermo._core.matrix_files import MASS_OF, read_half, read_named_matrices
+from skthermo._core.warnings import warn_each
 from skthermo.fem.affine import AffineModel
-from skthermo.fem.external._differences import SAME, difference_terms, relative
+from skthermo.fem.external._differences import SAME_ENTRIES, doubtful_matrices, read_differences, relative
 
 
 def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
@@ -82,7 +81,6 @@ Total = str | Literal[False] | None
 
 MASS_NAMES = ("m", "m0", "mass", "maax", "maa", "mgg")
 TOTAL_NAMES = ("k", "k0", "stiffness", "nominal", "kaax", "kaa", "kgg")
-EXACTLY_SAME = 1e-8
 
 
 def load_affine(
@@ -200,10 +198,11 @@ def load_affine(
 
     def is_used(name: str) -> bool:
         is_named = keys is None or name in (*keys, mass, total)
-        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS))
+        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS_OF))
 
     matrices, dofs = read_named_matrices(file, is_used)
     exports = Exports(file, matrices)
+    doubts: list[str] = []
     mass = mass or exports.mass()
     mass_matrix = exports.matrix(mass)
     others = exports.beside(mass, mass_matrix.shape) if keys is None else {}
@@ -215,22 +214,36 @@ def load_affine(
             total = exports.usual(exports.square, TOTAL_NAMES, "total")
     if keys is None:
         changed = [name for name in others if name != total]
-        keys = _keys(changed if factor is not None else exports.terms(others, total, mass))
+        if factor is None:
+            changed, doubts = exports.terms(others, total, mass)
+        keys = _keys(changed)
     if not keys:
         raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
     terms = {name: exports.matrix(name, mass_matrix.shape) for name in keys}
     pairs = [(keys[name], term) for name, term in terms.items()]
-    pairs += exports.rest(total, terms, says_total) if total and factor is None else []
+    if total and factor is None and (rest := exports.rest(total, terms)) is not None:
+        pairs.append(((), rest))
+        doubts += [] if says_total else [more_than_the_sum(total, terms)]
     nominal = None if factor is None else exports.nominal(total, mass_matrix.shape)
     try:
         if nominal is not None and factor is not None:
-            differences = difference_terms(nominal, terms, factor=factor)
+            differences, doubts = read_differences(nominal, terms, factor)
             pairs = [(keys[key[0]] if key else (), term) for key, term in differences.items()]
-        return AffineModel(
+        model = AffineModel(
             pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track, dofs=dofs
         )
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
+    warn_each(doubtful_matrices([f"{file}: {doubt}" for doubt in doubts]))
+    return model
+
+
+def more_than_the_sum(total: str, terms: Collection[str]) -> str:
+    """The doubt about a total that nobody has named."""
+    return (
+        f"{total!r} is more than the sum of {list(terms)}: the rest is used as a constant part of the stiffness. "
+        "Confirm it by total=..., or give total=False if the terms are all, or name the terms by stiffness=[...]"
+    )
 
 
 @dataclass(frozen=True)
@@ -278,17 +291,17 @@ class Exports:
     def mass(self) -> str:
         """The mass matrix: the one with a usual name, or that of all exports."""
         found = self.usual(self.square, MASS_NAMES, "mass")
-        masses = [name for name in self.square if name.endswith(MASS)]
+        masses = [name for name in self.square if name.endswith(MASS_OF)]
         if found is None and not masses:
             raise ValueError(f"{self.file}: {self._no_mass()}; say mass=..., one of {self.square or [*self.matrices]}")
         if found is not None:
             return found
-        nominal = [name for name in masses if name.removesuffix(MASS).lower() in TOTAL_NAMES]
+        nominal = [name for name in masses if name.removesuffix(MASS_OF).lower() in TOTAL_NAMES]
         chosen = (nominal or masses)[0]
         reference = self.matrix(chosen)
         for name in masses:
-            if not _same(self.matrix(name, reference.shape), reference, SAME):
-                both = f"{name.removesuffix(MASS)!r} differs from that of {chosen.removesuffix(MASS)!r}"
+            if not _same(self.matrix(name, reference.shape), reference, SAME_ENTRIES):
+                both = f"{name.removesuffix(MASS_OF)!r} differs from that of {chosen.removesuffix(MASS_OF)!r}"
                 raise ValueError(
                     f"{self.file}: the mass of {both}; expected exports of the same mass, or mass=..., one of them"
                 )
@@ -309,7 +322,7 @@ class Exports:
             name: self.matrix(name, shape)
             for name, one in self.matrices.items()
             if name != mass
-            and not (name in self.square and name.endswith(MASS))
+            and not (name in self.square and name.endswith(MASS_OF))
             and (name in self.square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
         }
 
@@ -318,8 +331,9 @@ class Exports:
         found = {name: self.matrices[name] for name in self.square if name not in named}
         return [name for name, one in found.items() if one is not None and one.shape == shape and _is_finite(one)]
 
-    def terms(self, others: Mapping[str, Matrix], total: Total, mass: str) -> list[str]:
-        """Names of the stiffness terms; warns of matrices that look like a total or like mass."""
+    def terms(self, others: Mapping[str, Matrix], total: Total, mass: str) -> tuple[list[str], list[str]]:
+        """Names of the stiffness terms, and doubts about matrices that look like a total or like mass."""
+        doubts = []
         found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
         for name, term in found.items():
             if term.nnz and not (term + term.T).count_nonzero():
@@ -334,10 +348,10 @@ class Exports:
         springs = {name: term for name, term in found.items() if name not in similar}
         if total is None and len(springs) > 2:
             whole = reduce(add, springs.values())
-            sums = [name for name, term in springs.items() if _same(term, whole - term, EXACTLY_SAME)]
+            sums = [name for name, term in springs.items() if _same(term, whole - term, 1e-8)]
             if len(sums) == 1:
                 del springs[sums[0]], found[sums[0]]
-                self._warn(
+                doubts.append(
                     f"{sums[0]!r} is the sum of {list(springs)} and used as the total, not as a term. Confirm it by "
                     f"total={sums[0]!r}, or name the terms by stiffness=[...]"
                 )
@@ -347,11 +361,11 @@ class Exports:
                 if ratio := _ratio(term, whole - term):
                     similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
         for name, what in similar.items():
-            self._warn(
+            doubts.append(
                 f"{name!r} is {what}, and used as a stiffness term. If it is none, frequencies are wrong. Name the "
                 "terms by stiffness=[...]"
             )
-        return list(found)
+        return list(found), doubts
 
     def nominal(self, total: Total, shape: tuple[int, ...]) -> Matrix:
         """The stiffness as built, beside those with one parameter multiplied."""
@@ -362,13 +376,13 @@ class Exports:
             )
         return self.matrix(total, shape)
 
-    def rest(self, total: str, terms: Mapping[str, Matrix], is_meant: bool) -> list[tuple[Key, Matrix]]:
-        """The total minus all terms, as a constant term; nothing if nothing is left."""
+    def rest(self, total: str, terms: Mapping[str, Matrix]) -> Matrix | None:
+        """The total minus all terms; None if nothing is left."""
         whole, summed = self.matrix(total, next(iter(terms.values())).shape), reduce(add, terms.values())
-        if _same(summed, whole, SAME):
-            return []
+        if _same(summed, whole, SAME_ENTRIES):
+            return None
         rest = scipy.sparse.csc_array(whole - summed)
-        less = rest.diagonal() < -SAME * np.abs(whole.diagonal())
+        less = rest.diagonal() < -SAME_ENTRIES * np.abs(whole.diagonal())
         if less.any():
             row = int(np.argmax(less))
             raise ValueError(
@@ -376,16 +390,7 @@ class Exports:
                 f"{list(terms)}; expected a total of the stiffness, factor=2.0 if each of these is the whole with one "
                 "modulus doubled, stiffness=... that says which matrices are terms, or total=False if none is the total"
             )
-        if not is_meant:
-            self._warn(
-                f"{total!r} is more than the sum of {list(terms)}: the rest is used as a constant part of the "
-                "stiffness. Confirm it by total=..., or give total=False if the terms are all, or name the terms by "
-                "stiffness=[...]"
-            )
-        return [((), rest)]
-
-    def _warn(self, text: str) -> None:
-        warn_user(f"{self.file}: {text}", ModelWarning, "doubtful-matrices")
+        return rest
 
 
 def _is_finite(matrix: Matrix) -> bool:
@@ -396,7 +401,7 @@ def _ratio(term: Matrix, reference: Matrix) -> float:
     """The factor by which a term is a multiple of the reference; 0 if it is not."""
     reference = scipy.sparse.csc_array(reference)
     ratio = float((term * reference).sum() / max((reference * reference).sum(), np.finfo(float).tiny))
-    return ratio if ratio and _same(term, ratio * reference, SAME) else 0.0
+    return ratio if ratio and _same(term, ratio * reference, SAME_ENTRIES) else 0.0
 
 
 def _same(matrix: Matrix, expected: Matrix, tolerance: float) -> bool:

@@ -27,25 +27,6 @@ class EigenSolver(Protocol):
         """The solver of the same structure with its stiffness terms multiplied."""
 
 
-ROWS_TOGETHER = 32  # whose matrices stay in the processor's cache
-
-FEWEST_DOFS = 40
-"""Size of the matrices below which LAPACK finds all modes sooner."""
-
-SEPARATION = 1.7
-"""Ratio to the highest wanted eigenvalue that the first one beyond the masters has at least at theta = 1."""
-
-GUARD_MASTERS = 2  # fewest masters beyond the wanted modes
-
-STEPS = (3, 5, 5, 5)
-"""Steps of conjugate gradients between one Rayleigh-Ritz step and the next. Rows that need more go to LAPACK."""
-
-TOL_OF_SHAPES = 1e-12
-"""Largest relative error of an eigenvalue whose shape is wanted: that of the shape is about its square root."""
-
-LEAST_MASS = 1e-12  # share of the largest mu below which a coordinate is massless
-
-
 class Ritz(NamedTuple):
     """Eigenvalues (n_samples, m) and shapes x (n_samples, m, n) on a subspace, M x, and the residuals."""
 
@@ -55,8 +36,8 @@ class Ritz(NamedTuple):
     residuals: Array
 
     @classmethod
-    def of(cls, eigenvalues: Array, x: Array, Kx: Array, mu: Array) -> "Ritz":
-        """From Kx and the diagonal of M."""
+    def with_residuals(cls, eigenvalues: Array, x: Array, Kx: Array, mu: Array) -> "Ritz":
+        """Residuals from Kx and the diagonal of M."""
         inertia = x * mu
         return cls(eigenvalues, x, inertia, Kx - eigenvalues[:, :, np.newaxis] * inertia)
 
@@ -88,6 +69,7 @@ class CondensationSolver:
         self._basis = basis
         self._lapack = lapack
         self._tol = tol
+        self._tol_of_shapes = min(tol, 1e-12)  # the error of a shape is about the square root
         terms = stiffness.matrices * stiffness.factors[:, np.newaxis, np.newaxis]
         self._floors = np.minimum(np.linalg.eigvalsh(terms)[:, 0], 0.0)
 
@@ -98,7 +80,7 @@ class CondensationSolver:
         return eigenvalues
 
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
-        eigenvalues, coordinates, certified = self._iterate(theta, n_modes, min(self._tol, TOL_OF_SHAPES))
+        eigenvalues, coordinates, certified = self._iterate(theta, n_modes, self._tol_of_shapes)
         shapes = (coordinates @ self._basis.T).swapaxes(1, 2)
         if not certified.all():
             eigenvalues[~certified], shapes[~certified] = self._lapack.modes(theta[~certified], n_modes)
@@ -112,7 +94,7 @@ class CondensationSolver:
 
     def certified(self, theta: Array, n_modes: int) -> NDArray[np.bool_]:
         """Rows whose modes are found by iteration and certified. The others are solved by LAPACK."""
-        return self._iterate(theta, n_modes, min(self._tol, TOL_OF_SHAPES))[2]
+        return self._iterate(theta, n_modes, self._tol_of_shapes)[2]
 
     def _iterate(self, theta: Array, n_modes: int, tol: float) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Eigenvalues (n_samples, n_modes), shapes (n_samples, n_modes, n), and which rows are certified."""
@@ -121,17 +103,17 @@ class CondensationSolver:
         certified = np.zeros(len(theta), dtype=bool)
         n_masters = self._n_masters(n_modes)
         if n_masters:
-            for first in range(0, len(theta), ROWS_TOGETHER):
-                part = slice(first, first + ROWS_TOGETHER)
+            for first in range(0, len(theta), 32):  # rows whose matrices stay in the processor's cache
+                part = slice(first, first + 32)
                 results = eigenvalues[part], shapes[part], certified[part]
                 self._iterate_together(theta[part], n_masters, tol, *results)
         return eigenvalues, shapes, certified
 
     def _n_masters(self, n_modes: int) -> int:
         """Number of master coordinates; 0 where LAPACK is faster or the modes are not far enough from the others."""
-        apart = np.flatnonzero(SEPARATION * self._mu < self._mu[n_modes - 1])
-        apart = apart[apart >= n_modes + GUARD_MASTERS]
-        most = min(len(self._mu) // 3, np.count_nonzero(self._mu > LEAST_MASS * self._mu[0]))
+        apart = np.flatnonzero(1.7 * self._mu < self._mu[n_modes - 1])
+        apart = apart[apart >= n_modes + 2]  # fewest masters beyond the wanted modes
+        most = min(len(self._mu) // 3, np.count_nonzero(self._mu > 1e-12 * self._mu[0]))  # others are massless
         return int(apart[0]) if apart.size and apart[0] <= most else 0
 
     def _iterate_together(
@@ -146,7 +128,7 @@ class CondensationSolver:
         bounds, K = bounds[rows], self._stiffness.assemble(theta[rows])
         ritz = masters_alone(K, mu, m)
         K_ss = K[:, m:, m:].astype(np.float32)
-        for n_steps in STEPS:
+        for n_steps in (3, 5, 5, 5):  # of conjugate gradients, between Rayleigh-Ritz steps
             solvable = bounds > ritz.eigenvalues[:, n_modes - 1] * mu[m]
             rows, K, K_ss, bounds, ritz = _take(solvable, rows, K, K_ss, bounds, ritz)
             if not rows.size:
@@ -176,7 +158,7 @@ def batch_solver(
 
     It is LAPACK for small matrices, and where the mass varies.
     """
-    if stiffness.n_dof < FEWEST_DOFS or not mass.is_constant:
+    if stiffness.n_dof < 40 or not mass.is_constant:
         return lapack
     try:
         lower = np.linalg.cholesky(stiffness.assemble(nominal)[0])
@@ -213,7 +195,7 @@ def masters_alone(K: Array, mu: Array, m: int) -> Ritz:
     eigenvalues, vectors = np.linalg.eigh(to_unit[:, np.newaxis] * K[:, :m, :m] * to_unit)
     x = np.zeros((len(K), m, len(mu)))
     x[:, :, :m] = vectors.swapaxes(1, 2) * to_unit
-    return Ritz.of(eigenvalues, x, x[:, :, :m] @ K[:, :m], mu)
+    return Ritz.with_residuals(eigenvalues, x, x[:, :, :m] @ K[:, :m], mu)
 
 
 def rayleigh_ritz(x: Array, Kx: Array, mu: Array) -> Ritz:
@@ -221,7 +203,7 @@ def rayleigh_ritz(x: Array, Kx: Array, mu: Array) -> Ritz:
     to_unit = np.linalg.inv(np.linalg.cholesky((x * mu) @ x.swapaxes(1, 2)))
     eigenvalues, vectors = np.linalg.eigh(to_unit @ (Kx @ x.swapaxes(1, 2)) @ to_unit.swapaxes(1, 2))
     turned = vectors.swapaxes(1, 2) @ to_unit
-    return Ritz.of(eigenvalues, turned @ x, turned @ Kx, mu)
+    return Ritz.with_residuals(eigenvalues, turned @ x, turned @ Kx, mu)
 
 
 def certificate(ritz: Ritz, mu: Array, bounds: Array, m: int, n_modes: int, tol: float) -> NDArray[np.bool_]:

@@ -16,23 +16,7 @@ from skthermo.fem.modal._condensation import CondensationSolver, EigenSolver, ba
 from skthermo.fem.modal._modes import REPEATED, LocalModes, linearised_by_row
 from skthermo.fem.modal._sparse import ShiftInvertSolver, count_modes
 
-GUARD_MODES = 4
-"""Largest number of modes above the tracked ones that are examined first: modes that swap move up by a few ranks
-only."""
-
-MAX_CANDIDATES_PER_MODE = 8  # how many times as many candidates as modes are examined before a mode counts as dissolved
-CHUNK_BYTES = 2**25
-
-WIDEST_SPECTRUM = 1e6
-"""Largest ratio of eigenvalues at which the standard form still gives the lowest one to 1e-9 of its value."""
-
-WIDEST_ON_BASIS = 1e13
-"""The same on a basis, as a multiple of its ``tol``, at which the standard form is accurate enough."""
-
-ITERATION_SHARE = 0.02
-"""Error of an eigenvalue by iteration, as a share of ``tol``. The error of its frequency is half of it."""
-
-LEAST_TOL = 1e-12
+GUARD_MODES = 4  # examined first above those that are followed: modes that swap move up by a few ranks only
 
 
 class NominalModes(NamedTuple):
@@ -95,11 +79,11 @@ class AffineCore:
 
     def __post_init__(self) -> None:
         self.n_lowest = int(self.ranks.max()) + 1
-        self.max_candidates = min(self.available, MAX_CANDIDATES_PER_MODE * self.n_lowest)
+        self.max_candidates = min(self.available, 8 * self.n_lowest)  # beyond them a mode counts as dissolved
         self.first_candidates = min(self.n_lowest + GUARD_MODES, self.max_candidates)
         self.n_solved = min(self.n_lowest + self.guards, self.max_candidates) if self.track else self.n_lowest
         numbers = max(self.stiffness.n_entries, 2 * self.stiffness.n_dof * self.n_lowest)
-        self.rows_per_chunk = max(1, min(self.stiffness.max_rows, CHUNK_BYTES // (8 * numbers)))
+        self.rows_per_chunk = max(1, min(self.stiffness.max_rows, 2**25 // (8 * numbers)))
 
     def with_scaled_stiffness(self, factors: Array) -> "AffineCore":
         """The core with its stiffness terms multiplied; its columns stay the same nominal modes."""
@@ -175,8 +159,8 @@ class AffineCore:
         stiffness, mass = self.stiffness.projected(basis), self.mass.projected(basis)
         nominal = self.nominal._replace(weighted_shapes=basis.T @ self.nominal.weighted_shapes)
         nominal_row = np.ones((1, stiffness.exponents.shape[1]))
-        lapack = dense_solver(stiffness, mass, nominal_row, tol * WIDEST_ON_BASIS)
-        solver = batch_solver(stiffness, mass, nominal_row, lapack, max(ITERATION_SHARE * tol, LEAST_TOL))
+        lapack = dense_solver(stiffness, mass, nominal_row, widest=1e13 * tol)
+        solver = batch_solver(stiffness, mass, nominal_row, lapack, max(0.02 * tol, 1e-12))
         available = min(self.max_candidates, basis.shape[1])
         projected = replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
         # Few modes swap across the widest gap between nominal eigenvalues: guards up to it are enough.
@@ -401,10 +385,11 @@ class FlexibilitySolver:
         return inverse @ self._mass.assemble(theta) @ transposed, transposed, ones
 
 
-def dense_solver(
-    stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = WIDEST_SPECTRUM
-) -> EigenSolver:
-    """The standard form, which is the fastest, where it is accurate enough; else the flexibility form."""
+def dense_solver(stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = 1e6) -> EigenSolver:
+    """The standard form, which is the fastest, where it is accurate enough; else the flexibility form.
+
+    Up to the ``widest`` ratio of eigenvalues, the standard form gives the lowest one to 1e-9 of its value.
+    """
     if mass.is_constant:
         matrix = mass.assemble(nominal)[0]
         lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]]
@@ -439,9 +424,6 @@ def _cholesky(matrices: Array) -> tuple[Array, Array]:
             return np.eye(matrices.shape[1])[np.newaxis], np.full((1, 1), np.nan)
         factors, ones = zip(*(_cholesky(matrix[np.newaxis]) for matrix in matrices), strict=True)
         return np.concatenate(factors), np.concatenate(ones)
-
-
-NUDGE = 1e-9  # share of the stiffness that is added where a repeated eigenvalue makes the equations singular
 
 
 def shape_derivatives(
@@ -485,6 +467,7 @@ def _solve_bordered(matrices: Array, borders: Array, right: Array, scale: Array)
     try:
         found = np.linalg.solve(bordered, right)
     except np.linalg.LinAlgError:
-        bordered[:, :n, :n] += NUDGE * largest[:, np.newaxis, np.newaxis] * np.eye(n)
+        # A repeated eigenvalue makes the equations singular.
+        bordered[:, :n, :n] += 1e-9 * largest[:, np.newaxis, np.newaxis] * np.eye(n)
         found = np.linalg.solve(bordered, right)
     return np.asarray(found, dtype=float)[:, :n]

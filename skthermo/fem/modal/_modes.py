@@ -30,12 +30,6 @@ REPEATED = 1e-6
 """Relative distance of eigenvalues below which they count as repeated: rounding then decides their shapes."""
 
 
-CONVERGED = 1e-5
-"""Residual, as a share of the derivative, at which the iteration stops. The error of the result is smaller."""
-
-MAX_ITERATIONS = 200
-
-
 def solve_beside_modes(
     solve: Callable[[Array], Array], mass: Matrix, shapes: Array, forces: Array, shifts: Array, known: Array
 ) -> Array:
@@ -58,8 +52,8 @@ def solve_beside_modes(
     x, searches, found = np.zeros_like(residuals), np.zeros_like(residuals), np.empty_like(residuals)
     inertia = mass @ residuals
     squares, previous = np.einsum("ic,ic->c", residuals, inertia), np.full(len(shifts), np.inf)
-    enough, columns = CONVERGED**2 * (known + squares), np.arange(len(shifts))
-    for _ in range(MAX_ITERATIONS):
+    enough, columns = 1e-5**2 * (known + squares), np.arange(len(shifts))  # the errors of the results are smaller
+    for _ in range(200):
         going = squares > enough
         if not going.all():
             found[:, columns[~going]] = (x + residuals)[:, ~going]
@@ -285,10 +279,6 @@ def _columns(phi: ArrayLike, name: str) -> NDArray:
     return array * np.ldexp(1.0, -half) * np.ldexp(1.0, half - exponents)
 
 
-OFFSET_LIKE_MAC_0 = 0.15
-"""Relative distance of two frequencies that weighs as much as a MAC of 0."""
-
-
 def match_modes(
     model: FEModel, frequencies: ArrayLike, *, shapes: ArrayLike | None = None, dofs: ArrayLike | None = None
 ) -> pd.DataFrame:
@@ -355,7 +345,8 @@ def match_modes(
     candidates = np.asarray(model.frequencies(nominal))[0] if local is None else local.frequencies
     if len(measured) > len(candidates):
         raise ValueError(f"{len(measured)} modes were measured; expected at most {len(candidates)}, as the model has")
-    cost = (np.log(candidates / measured[:, np.newaxis]) / np.log1p(OFFSET_LIKE_MAC_0)) ** 2
+    # A distance of 15 % weighs as much as a MAC of 0.
+    cost = (np.log(candidates / measured[:, np.newaxis]) / np.log1p(0.15)) ** 2
     macs = None
     if shapes is not None and dofs is not None:
         if local is None:

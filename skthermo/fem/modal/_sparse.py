@@ -11,11 +11,6 @@ from skthermo._core.arrays import Array, Label, Matrix, as_dense
 from skthermo.fem._factors import Solve, factorise
 from skthermo.fem._terms import SparseTerms
 
-MAX_STEPS = 6
-RANDOM_COLUMNS, RANDOM_STEPS = 2, 3
-CLUSTER = 0.01  # relative distance of eigenvalues that are evaluated together
-DEPENDENT = 1e-14  # share of modal mass below which a direction is rounding error
-
 
 def modes_near(
     stiffness: scipy.sparse.csc_array,
@@ -38,13 +33,13 @@ def modes_near(
         return None
     nothing = guesses[:, :0]
     known = orthonormal(guesses, mass, nothing, nothing)
-    random = np.random.default_rng(0).standard_normal((len(guesses), RANDOM_COLUMNS))
-    for _ in range(RANDOM_STEPS):  # towards the lowest modes beside those
+    random = np.random.default_rng(0).standard_normal((len(guesses), 2))
+    for _ in range(3):  # towards the lowest modes beside those
         random = solve(orthonormal(random, mass, *known)[1])
     basis, weighted = (np.hstack(both) for both in zip(known, orthonormal(random, mass, *known), strict=True))
     n_followed = basis.shape[1]
     images, block = nothing, weighted
-    for _ in range(MAX_STEPS):
+    for _ in range(6):
         if not block.shape[1] or basis.shape[1] < n_modes:
             return None
         images = np.hstack([images, solve(block)])
@@ -65,7 +60,7 @@ def modes_near(
 def are_found(values: Array, distances: Array, n_modes: int, tol: float) -> bool:
     """Whether all eigenvalues that may be among the largest ``n_modes`` have converged to ``tol``."""
     apart = np.abs(values / values[:, np.newaxis] - 1)
-    together = apart < CLUSTER
+    together = apart < 0.01  # relative distance of eigenvalues that are evaluated together
     gaps = np.where(together, np.inf, apart).min(axis=1)
     errors = together @ (distances / values) ** 2 / gaps
     wanted = values + distances >= values[n_modes - 1]
@@ -79,14 +74,12 @@ def orthonormal(columns: Array, mass: scipy.sparse.csc_array, basis: Array, weig
     products = columns.T @ (mass @ columns)
     scale = np.sqrt(np.maximum(products.diagonal(), np.finfo(float).tiny))
     shares, directions = np.linalg.eigh(products / scale / scale[:, np.newaxis])
-    kept = shares > DEPENDENT
+    kept = shares > 1e-14  # share of modal mass below which a direction is rounding error
     vectors = (columns / scale) @ (directions[:, kept] / np.sqrt(shares[kept]))
     return vectors, mass @ vectors
 
 
 GUARD_VECTORS = 2  # eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together
-FEW_MASSES = 20
-"""Fewest degrees of freedom with mass, beyond three for each eigenpair, for a Lanczos iteration to converge."""
 
 
 class ShiftInvertSolver:
@@ -160,7 +153,7 @@ def lowest_modes(
         return nothing
     massive = np.flatnonzero(mass.diagonal())
     wanted = min(n_modes + GUARD_VECTORS, n_dof - 1)
-    if len(massive) < FEW_MASSES + 3 * wanted:
+    if len(massive) < 20 + 3 * wanted:  # a Lanczos iteration does not converge
         vectors = modes_of_few_masses(solve, mass, massive, n_modes)
     else:
         inverse = scipy.sparse.linalg.LinearOperator((n_dof, n_dof), matvec=solve, dtype=float)
@@ -192,12 +185,6 @@ def seeded_start(n_dof: int) -> Array:
     return np.random.default_rng(0).standard_normal(n_dof)
 
 
-EPS = np.finfo(float).eps
-
-FEW_DOFS = 500  # degrees of freedom up to which a mass matrix is examined as a dense one
-SMALL_SHIFT = 1e-10  # multiple of the identity that makes a semidefinite matrix of unit diagonal positive definite
-
-
 def check_supported(stiffness: Matrix, dofs: Sequence[Label] = ()) -> None:
     """Refuse a stiffness that is not positive definite within rounding, and name where the motion is largest.
 
@@ -210,11 +197,11 @@ def check_supported(stiffness: Matrix, dofs: Sequence[Label] = ()) -> None:
     scale = 1 / np.sqrt(diagonal)
     if isinstance(stiffness, np.ndarray):
         eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
-        lowest, vector, rounding = eigenvalues[0], vectors[:, 0], 50 * EPS * eigenvalues[-1]
+        lowest, vector, rounding = eigenvalues[0], vectors[:, 0], 50 * np.finfo(float).eps * eigenvalues[-1]
     else:
         scaled = _scaled(stiffness, scale)
         lowest, vector = _lowest(scaled)
-        rounding = 10 * EPS * (np.abs(vector) @ (abs(scaled) @ np.abs(vector)))
+        rounding = 10 * np.finfo(float).eps * (np.abs(vector) @ (abs(scaled) @ np.abs(vector)))
     if lowest <= rounding:
         motion = np.abs(scale * vector)
         largest = np.argsort(-motion, kind="stable")
@@ -227,17 +214,17 @@ def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> i
     For a sparse matrix with many masses this is the number of degrees of freedom with mass.
     """
     diagonal = mass.diagonal()
-    if isinstance(mass, np.ndarray) or np.count_nonzero(diagonal) <= FEW_DOFS:
+    if isinstance(mass, np.ndarray) or np.count_nonzero(diagonal) <= 500:
         kept = np.flatnonzero(diagonal) if isinstance(mass, scipy.sparse.csc_array) else slice(None)
         part = mass[kept][:, kept]
         eigenvalues = np.linalg.eigvalsh(as_dense(part))
-        tolerance = 10 * len(eigenvalues) * EPS * abs(eigenvalues[-1])
+        tolerance = 10 * len(eigenvalues) * np.finfo(float).eps * abs(eigenvalues[-1])
         outside = abs(mass).sum() > (1 + 1e-12) * abs(part).sum()  # beside a diagonal of zero
         negative, count = outside or eigenvalues[0] < -tolerance, int((eigenvalues > tolerance).sum())
     else:
         massive = diagonal > 0
         scale = 1 / np.sqrt(np.where(massive, diagonal, 1.0))
-        shifted = _scaled(mass, scale) + SMALL_SHIFT * scipy.sparse.eye_array(len(diagonal), format="csc")
+        shifted = _scaled(mass, scale) + 1e-10 * scipy.sparse.eye_array(len(diagonal), format="csc")
         negative, count = factorise(shifted) is None, int(massive.sum())
     if negative:
         raise ValueError(f"the {what} has a negative eigenvalue; expected none below zero")
@@ -258,7 +245,7 @@ def _scaled(matrix: scipy.sparse.csc_array, scale: Array) -> scipy.sparse.csc_ar
 def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
     """Lowest eigenvalue and its eigenvector, by shift-invert with a shift below it."""
     identity = scipy.sparse.eye_array(matrix.shape[0], format="csc")
-    shift = SMALL_SHIFT
+    shift = 1e-10
     while (solve := factorise(matrix + shift * identity)) is None:
         shift *= 10
     inverse = scipy.sparse.linalg.LinearOperator(matrix.shape, matvec=solve, dtype=float)

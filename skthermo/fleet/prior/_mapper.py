@@ -20,13 +20,14 @@ from skthermo._core.frames import (
     like_targets,
     row_weights,
 )
+from skthermo._core.warnings import warn_each
 from skthermo.fleet.prior._families import CoefficientFamily, Covariates, Member
 from skthermo.fleet.prior._information import FleetBasis, FleetNoise, Information
 from skthermo.fleet.prior._posterior import Mixture, OwnPrior, mixture
 from skthermo.fleet.prior._records import BridgeRecords, Link, days_of, families_by_name, usable_rows
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import set_aside
-from skthermo.residuals.weather import TrainingRange, parts, warn_of_implausible
+from skthermo.residuals.weather import TrainingRange, implausible, parts
 
 ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
@@ -220,7 +221,7 @@ class FleetMapper(RegressorMixin, Estimator):
             If inputs are no temperatures of any weather, such as kelvin or -999.
         """
         values, covariance = self._posterior_at(X, check_flag(return_std, "return_std"))
-        warn_of_implausible(self.reach_, X)
+        warn_each(implausible(self.reach_, X))
         if not return_std:
             return self._as_targets(X, values)
         std = np.sqrt(np.einsum("tii->ti", covariance))

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from skthermo._core.arrays import Array
-from skthermo._core.effects import ALL_GROUPS
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import DAY, YEAR, as_index, days_later, midnights_between
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import warnings_once, without_warnings
+from skthermo.fem.damage import ALL_GROUPS
 from skthermo.monitoring._records import Memory
 from skthermo.monitoring.drift._explanations import SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, DayShown, State, absorb

@@ -11,10 +11,10 @@ import pandas as pd
 from scipy import stats
 
 from skthermo._core.arrays import Array, as_floats, is_real
-from skthermo._core.effects import ALL_GROUPS
 from skthermo._core.frames import YEAR, frame_like, has_stamps
 from skthermo._core.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
 from skthermo._core.warnings import warn_each
+from skthermo.fem.damage import ALL_GROUPS
 from skthermo.monitoring._records import OF_TRAINING
 from skthermo.monitoring.drift._explanations import SIGNIFICANT
 from skthermo.preprocessing import set_aside

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -13,13 +13,16 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo._core.arrays import Array, as_floats, refuse_no_table, spread_evenly
-from skthermo._core.effects import ALL_GROUPS, FrequencyEffects, StructuralChanges, healthy_frequencies, read_groups
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import DAY, YEAR, frame_like, has_stamps, midnight, midnights_between
 from skthermo._core.warnings import warn_each, warnings_once, without_warnings
+from skthermo.fem.damage import ALL_GROUPS, read_groups
 from skthermo.monitoring.drift._kalman import DailyNoise, DayShown
 from skthermo.preprocessing import ExponentialMeans, set_aside
 from skthermo.residuals.weather import WeatherFunctions
+
+if TYPE_CHECKING:
+    from skthermo.surrogate.effects import FrequencyEffects
 
 SMALL = 0.003  # change of ln stiffness whose effect counts as linear
 MIRRORED = 1e-6  # difference of the cosine of two effects from 1, below which they are the same
@@ -149,6 +152,8 @@ class QuadraticFrequencies:
             values[inside] = self.terms(theta[inside]) @ self.coefficients
         others = ~inside & ~np.isnan(theta).any(axis=1)
         if others.any():
+            from skthermo.surrogate.effects import healthy_frequencies  # what a job without a drift has no need to load
+
             values[others] = np.log(healthy_frequencies(self.fem, theta[others]))
         return values
 
@@ -229,11 +234,13 @@ class GroupEffects:
 
         Those of the groups, then those of an even change of all groups.
         """
+        from skthermo.surrogate.effects import FrequencyEffects, StructuralChanges
+
         members = dict(read_groups(fem.model, groups))
         if len(members) > 1:
             members[ALL_GROUPS] = list(dict.fromkeys(name for joined in members.values() for name in joined))
         of_model = list(dict.fromkeys(name for joined in members.values() for name in joined))
-        frequencies = FrequencyEffects.of(
+        frequencies = FrequencyEffects.averaged(
             fem, parameters(fem, T), as_floats(F), StructuralChanges.of_damage(fem.model, of_model)
         )
         incidence = np.array([[float(name in joined) for joined in members.values()] for name in of_model])

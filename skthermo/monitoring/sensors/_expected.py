@@ -250,12 +250,12 @@ class Thermometers:
         gaussian = Gaussian(np.empty(0), np.empty((0, 0)))
         bare = cls(usual, periods, gaussian, least, 0, np.empty(0), np.empty(0), (), gaussian)
         means = bare.daily_means(stamps, temperatures)
-        found = Gaussian.of(means[~np.isnan(means).all(axis=1)])
+        found = Gaussian.fitted(means[~np.isnan(means).all(axis=1)])
         own = np.diag(JITTER * np.diag(found.covariance) + LEAST_DEVIATION**2)
         lowest, highest = np.fmin.reduce(means), np.fmax.reduce(means)
         gaussian = Gaussian(found.mean, found.covariance + own)
         anomalies = temperatures - inputs @ usual
-        together = Gaussian.of(anomalies[~np.isnan(anomalies).all(axis=1)])
+        together = Gaussian.fitted(anomalies[~np.isnan(anomalies).all(axis=1)])
         together = Gaussian(together.mean, together.covariance + own)
         return cls(usual, periods, gaussian, least, len(means), lowest, highest, (), together)
 
@@ -315,7 +315,7 @@ class Responses:
         least = np.where(scatter > 0, LEAST * scatter, np.where(centre != 0, LEAST * np.abs(centre), LEAST))
         scatter = np.maximum(np.nan_to_num(scatter), np.nan_to_num(least, nan=LEAST))
         rows = np.hstack([temperatures, (values - centre) / scatter])
-        together = Gaussian.of(rows[~np.isnan(rows).all(axis=1)])
+        together = Gaussian.fitted(rows[~np.isnan(rows).all(axis=1)])
         own = np.diag(JITTER * np.maximum(np.diag(together.covariance), LEAST**2))
         together = Gaussian(together.mean, together.covariance + own)
         sizes = (np.maximum(np.abs(centre), scatter), scatter)

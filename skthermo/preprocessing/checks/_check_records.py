@@ -1,4 +1,4 @@
-"""What the weather shows: modes exchanged, outliers, temperatures of another time, steps and trends of frequencies."""
+"""Checks of frequencies beside the weather: exchanged modes, outliers, temperatures of another time, steps, trends."""
 
 from __future__ import annotations
 
@@ -19,46 +19,20 @@ from skthermo._core.arrays import (
     median,
     range_sums,
     robust_deviation,
+    rows_by_pattern,
     spread_evenly,
 )
 from skthermo._core.estimators import check_array
 from skthermo._core.frames import YEAR, column_names, columns_by_sensor, correlation_time, has_stamps, row_times
-from skthermo.preprocessing._past import WEEKS, MemoryFindings, find_memory, lines_of, trailing_means
-from skthermo.preprocessing.checks._columns import stuck_columns
-from skthermo.preprocessing.checks._findings import Finding, RecordFindings, findings_table, period_of
-from skthermo.preprocessing.checks._set_aside import FEW_WRONG, CleanedRecords
-from skthermo.preprocessing.folds import BlockedKFold, WeatherBasis, distances_from_neighbours, predicted_by_weather
+from skthermo.preprocessing._find_memory import MemoryFindings, find_memory, is_of_weeks, lines_of
+from skthermo.preprocessing._past import trailing_means
+from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, predicted_by_weather
+from skthermo.preprocessing.checks._record_findings import RecordFinding, RecordFindings, findings_table, period_of
+from skthermo.preprocessing.checks._set_aside import CleanedRecords
+from skthermo.preprocessing.checks._stuck import stuck_columns
+from skthermo.preprocessing.folds import BlockedKFold, out_of_fold
 
 Rows = NDArray[np.intp]
-LEAST_ROWS = 50  # with temperatures and frequencies, below which only runs of equal values are looked for
-MOST_FITTED = 20_000  # rows, evenly spread, that a trend is fitted to
-NOTHING = 0.02  # share of a mode's variance that counts as explained by chance
-WINDOW = 25  # rows that are neighbours of a value
-OUTLYING = 8.0  # robust deviations from the neighbours, and from what the weather explains, of an outlier
-INERTIA = 24  # rows by which a structure may follow the weather late, where their times are not known
-SHORTEST_TREND = pd.Timedelta(days=90)  # of records; in fewer it may be the season
-CERTAIN = 5.0  # standard errors of a trend
-LEAST_CHANGE = 0.5  # standard deviations of the residuals by which a trend that matters changes them
-LEAST_OF_ALL = 0.1  # the same, in standard deviations of the frequency
-IMPLAUSIBLE = 2.0  # times the median of its mode, or its inverse, of an outlier among few records
-PREDICTABLE = 0.1  # standard deviation of a residual over that of the frequency, at least, in what is outlying
-LEAST_EXCHANGED = 3  # rows
-LEAST_SHARE = 0.002  # of the records that have both modes
-FAR = 5.0  # robust deviations that a value is away from its column's prediction, and nearer to the other's
-IN_ORDER = 0.5  # ratio of the mean squares with the modes in order and as given, below which they were exchanged
-MOST_ROWS = 4000  # that are predicted for each shift
-FARTHEST = 1 / 4  # of the records, by which they may be shifted
-N_PEAKS = 3  # shifts that each kind of correlation proposes
-PAST = (6, 24, 168)  # rows of means of the past: a structure follows the weather late
-LEAST_MEANS = 10  # times that such a period must fit into the records
-SHIFTED = 0.9  # ratio of what shifted temperatures leave to what those of the row leave, below which they are better
-LEAST_GAIN = 0.01  # share of the variance that shifted temperatures explain beyond those of the row
-LEAST_EXPLAINED = 0.1  # share of the variance that shifted temperatures explain
-PARTS = 5  # into which the records are divided, to compare the first with the last
-LEAST_RECORDS = 10
-N_PLACES = 100  # at which a step is sought
-SHARPER = 0.9  # ratio of what a step leaves to what a line leaves, below which the change is a step
-ESTIMATES = ["change", "standard_error", "first", "last", "n_independent"]
 
 
 def check_records(
@@ -66,12 +40,12 @@ def check_records(
 ) -> RecordFindings:
     """Look at temperatures and frequencies for faults that would otherwise be learned.
 
-    It looks for gross errors first: what is no table of numbers, wrong times, numbers that stand for missing values,
-    other units, empty, constant or equal columns, tables that are exchanged or have different rows. Whatever it is
-    given as a table, it does not fail. Such values are then left out, and it looks for sensors and modes that are
-    stuck, weather that explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory,
-    steps and trends. Of one table alone, it tells the gross errors, within milliseconds for a year of hourly records. A
-    finding is a reason to look at the records, no proof of a fault.
+    It looks for gross errors first: arguments that are no tables of numbers, wrong times, numbers that stand for
+    missing values, other units, empty, constant or equal columns, tables that are exchanged or have different rows. No
+    argument makes it fail. Such values are then left out, and it looks for stuck sensors and modes, weather that
+    explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory, steps and trends.
+    One table alone is checked for gross errors only, which takes milliseconds for a year of hourly records. A finding
+    is a reason to look at the records, no proof of a fault.
 
     Parameters
     ----------
@@ -88,7 +62,8 @@ def check_records(
     Returns
     -------
     RecordFindings
-        Its ``table`` has a row for each finding, ``summary()`` a line; ``refuse_meaningless`` raises an error.
+        Its ``table`` has a row for each finding, ``summary()`` a line; ``temperatures`` and ``frequencies`` are the
+        cleaned tables; ``refuse_meaningless`` raises an error.
 
     Raises
     ------
@@ -98,13 +73,13 @@ def check_records(
     See Also
     --------
     HampelFilter : Puts NaN in place of outliers.
-    find_memory : Means of earlier temperatures that explain the frequencies, also those of hours.
+    find_memory : Means of earlier temperatures, also over hours, that explain the frequencies.
     residual_trend : The trend of residuals of any regression.
 
     Notes
     -----
-    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` what its findings mean. The ``severity`` of a
-    gross error is "meaningless" if results of a fit would be.
+    :doc:`/guide/records_theory` states each test, :doc:`/guide/warnings` explains its findings. The ``severity`` of a
+    gross error is "meaningless" if results of a fit would be meaningless.
 
     Examples
     --------
@@ -125,17 +100,19 @@ def check_records(
     cleaned = CleanedRecords(temperatures, frequencies, unit=unit, model=model)
     far, findings, memory = cleaned.outliers(), cleaned.findings, None
     if cleaned.belong_together:
-        records = _Records(cleaned, unit)
+        records = RecordsInOrder(cleaned, unit)
         findings = [*findings, *records.findings()]
         far.iloc[records.order] |= records.are_outliers
         memory = records.memory
-    return RecordFindings(findings_table(findings), cleaned.n_rows, far, memory)
+    table = findings_table(findings)
+    cleaned.set_stuck_aside()
+    return RecordFindings(table, cleaned.n_rows, far, memory, **cleaned.tables(), left_out=cleaned.left_out())
 
 
-class _Records:
-    """Records in order of time; what is found to be wrong becomes NaN.
+class RecordsInOrder:
+    """Records in order of time, in which values with a finding become NaN.
 
-    Of every sensor they are what it shows at that time, and of rows with one time the first.
+    Each sensor has its present value, without lags; of several rows with one time, the first counts.
     """
 
     def __init__(self, cleaned: CleanedRecords, unit: str):
@@ -156,24 +133,24 @@ class _Records:
         self.are_outliers = np.zeros(self.F.shape, dtype=bool)
         self.memory: MemoryFindings | None = None
         is_useless = np.isnan(useful) & (T.were_known | np.isnan(T.values).all(axis=0))
-        self.has_faulty_sensors = bool(is_useless.mean(axis=0).max() > FEW_WRONG)
+        self.has_faulty_sensors = bool(is_useless.mean(axis=0).max() > 0.01)
         self.has_wrong_times = cleaned.have_wrong_times
         self.hours: float | None = None  # between records
-        self.inertia = INERTIA  # rows by which a structure may follow the weather late: a day, at least one
+        self.inertia = 24  # rows by which a structure may follow the weather late: a day, at least one
         if isinstance(self.index, pd.DatetimeIndex) and len(self.index) > 1:
             self.hours = max(pd.Series(self.index).diff().median().total_seconds() / 3600, 1e-6)
             self.inertia = max(int(24 / self.hours), 1)
 
-    def findings(self) -> Iterator[Finding]:
-        """What is found, one after the other; each search passes over what was found before."""
+    def findings(self) -> Iterator[RecordFinding]:
+        """Findings one after the other; each search passes over the values of earlier findings."""
         yield from self._stuck("stuck-sensor", self.T, self.sensors, " °C")
         yield from self._stuck("stuck-mode", self.F, self.modes, self.unit)
-        if np.count_nonzero(~np.isnan(self.T).all(axis=1) & ~np.isnan(self.F).all(axis=1)) < LEAST_ROWS:
+        if np.count_nonzero(~np.isnan(self.T).all(axis=1) & ~np.isnan(self.F).all(axis=1)) < 50:
             yield from self._outliers(_are_implausible(self.F))
             return
-        basis = WeatherBasis.of(self.T)
-        places = basis.coordinates(self.T)
-        lines, past = basis.lines(places), with_past(places)
+        weather = WeatherLines.learned(self.T)
+        places = weather.coordinates(self.T)
+        lines, past = weather.inputs(places), with_past(places)
         is_timed = isinstance(self.index, pd.DatetimeIndex)
         folds = BlockedKFold().fold_of(pd.DataFrame(index=self.index) if is_timed else self.T)
         yield from self._exchanged_modes(lines, folds)
@@ -186,30 +163,30 @@ class _Records:
             yield shift
             return
         share = explained(lines, F, folds)
-        if len(share) and (share < NOTHING).all() and not self.has_faulty_sensors:
+        if len(share) and (share < 0.02).all() and not self.has_faulty_sensors:
             usable = np.flatnonzero(~np.isnan(F).all(axis=1) & ~np.isnan(places).any(axis=1))
             detail = (
                 f"at most {max(share.max(), 0.0):.1%} of the variance of a mode, in periods held out, in {len(usable)} "
                 "rows"
             )
-            yield Finding.of(self.index, "no-thermal-effect", "", usable, detail)
+            yield RecordFinding.in_rows(self.index, "no-thermal-effect", "", usable, detail)
             return
         for finding, _ in slow:
             yield finding
         yield from changes
 
-    def _stuck(self, what: str, table: Array, names: list[Hashable], unit: str) -> Iterator[Finding]:
+    def _stuck(self, what: str, table: Array, names: list[Hashable], unit: str) -> Iterator[RecordFinding]:
         for place, rows in stuck_columns(table):
             name, value = names[place], table[rows[0], place]
             detail = f"{name!r} is {value:.6g}{unit} in {len(rows)} rows, {period_of(self.index, rows)}"
-            yield Finding.of(self.index, what, name, rows, detail)
+            yield RecordFinding.in_rows(self.index, what, name, rows, detail)
             table[rows, place] = np.nan
             self.has_faulty_sensors |= table is self.T
 
-    def _exchanged_modes(self, lines: Array, folds: Rows) -> Iterator[Finding]:
+    def _exchanged_modes(self, lines: Array, folds: Rows) -> Iterator[RecordFinding]:
         """Pairs of modes that the weather explains much better with their values exchanged in some rows.
 
-        Rows with one value of two count if it is far from what its own column should be and near to the other's.
+        A row with one value of two counts if the value is far from its own column's prediction and near to the other's.
         """
         found = []
         for first, second in combinations(range(len(self.modes)), 2):
@@ -217,7 +194,7 @@ class _Records:
             difference = pair[:, 1] - pair[:, 0]
             known = ~np.isnan(difference)
             n_known = np.count_nonzero(known)
-            least = max(LEAST_EXCHANGED, LEAST_SHARE * n_known)
+            least = max(3, 0.002 * n_known)
             sign = 1.0 if np.count_nonzero(difference > 0) >= np.count_nonzero(difference < 0) else -1.0
             turned = known & (sign * difference < 0)
             if np.count_nonzero(turned) < least:
@@ -228,37 +205,38 @@ class _Records:
             rest = ordered - predicted
             deviation = robust_deviation(rest)
             with np.errstate(invalid="ignore"):
-                is_near = (np.abs(rest) < FAR * deviation).all(axis=1)
-                is_far = np.abs(pair - predicted) > FAR * deviation
-                is_near_to_other = np.abs(pair - predicted[:, ::-1]) < FAR * deviation[::-1]
+                is_near = (np.abs(rest) < 5 * deviation).all(axis=1)
+                is_far = np.abs(pair - predicted) > 5 * deviation
+                is_near_to_other = np.abs(pair - predicted[:, ::-1]) < 5 * deviation[::-1]
             rows = np.flatnonzero(turned & is_near & is_far.any(axis=1))
             if len(rows) < least:
                 continue
             kept = np.flatnonzero(is_near)
             before = given[kept] - predicted_by_weather(lines[kept], given[kept], folds[kept], trim=False)
             ratio = np.nanmean(rest[kept] ** 2, axis=0) / np.nanmean(before**2, axis=0)
-            if np.sqrt(ratio.prod()) < IN_ORDER:
+            if np.sqrt(ratio.prod()) < 0.5:
                 alone = (is_far & is_near_to_other).any(axis=1) & (np.isnan(pair).sum(axis=1) == 1)
                 found.append(([first, second], n_known, np.union1d(rows, np.flatnonzero(alone))))
         for both, n_known, rows in found:
             names = " and ".join(repr(self.modes[mode]) for mode in both)
             detail = f"{names} in {len(rows)} of {n_known} rows, {period_of(self.index, rows)}"
-            yield Finding.of(self.index, "exchanged-modes", names, rows, detail)
+            yield RecordFinding.in_rows(self.index, "exchanged-modes", names, rows, detail)
             self.F[np.ix_(rows, both)] = self.F[np.ix_(rows, both[::-1])]
 
     def _far_from_neighbours(self, lines: Array, folds: Rows) -> NDArray[np.bool_]:
-        """Values far from their neighbours and from what the weather explains or, without weather, implausible ones."""
+        """Values far from their neighbours and from a regression on the weather or, without weather, implausible
+        ones."""
         F, has_weather = self.F, ~np.isnan(lines).any(axis=1)[:, np.newaxis]
         rest = F - np.where(has_weather, predicted_by_weather(lines, F, folds), median(F))
-        distances, local = distances_from_neighbours(rest, np.arange(len(F)), WINDOW)
-        floor = PREDICTABLE * robust_deviation(F)
+        distances, local = distances_from_neighbours(rest, np.arange(len(F)), 25)
+        floor = 0.1 * robust_deviation(F)
         deviation = np.fmax(robust_deviation(rest), floor)
         local = np.fmax(np.fmax(local, robust_deviation(distances)), floor)
         with np.errstate(invalid="ignore"):
-            far = (np.abs(distances) > OUTLYING * local) & (np.abs(rest - median(rest)) > OUTLYING * deviation)
+            far = (np.abs(distances) > 8 * local) & (np.abs(rest - median(rest)) > 8 * deviation)
         return far & (deviation > 0) & (has_weather | _are_implausible(F))
 
-    def _outliers(self, far: NDArray[np.bool_]) -> Iterator[Finding]:
+    def _outliers(self, far: NDArray[np.bool_]) -> Iterator[RecordFinding]:
         for name, column, is_far in zip(self.modes, self.F.T, far.T, strict=True):
             rows = np.flatnonzero(is_far)
             if len(rows):
@@ -266,11 +244,11 @@ class _Records:
                     f"{name!r} in {len(rows)} of {np.count_nonzero(~np.isnan(column))} rows, the first "
                     f"{column[rows[0]]:.4g}{self.unit} in {period_of(self.index, rows[:1])}"
                 )
-                yield Finding.of(self.index, "frequency-outliers", name, rows, detail)
+                yield RecordFinding.in_rows(self.index, "frequency-outliers", name, rows, detail)
         self.F[far] = np.nan
         self.are_outliers |= far
 
-    def _slow_means(self) -> Iterator[tuple[Finding, Array]]:
+    def _slow_means(self) -> Iterator[tuple[RecordFinding, Array]]:
         """Findings of memory of weeks, each with piecewise-linear functions of the mean that explains it."""
         types = set(map(type, (*self.sensors, *self.modes)))
         are_named = types == {str} and len(set(self.modes)) == len(self.modes)
@@ -283,7 +261,7 @@ class _Records:
         usable = np.flatnonzero(~np.isnan(self.F).all(axis=1))
         for (constant, sensor), part in chosen.groupby(["time_constant", "sensor"], sort=False):
             duration = pd.Timedelta(constant)
-            if duration >= WEEKS:
+            if is_of_weeks(duration):
                 times, length = self.index.as_unit("ns").asi8, duration.as_unit("ns").value
                 mean = trailing_means(times, self.T[:, [self.sensors.index(sensor)]], length)
                 before = np.exp(-(times - times[0]) / length)[:, np.newaxis]  # weight of the weather before the records
@@ -293,13 +271,13 @@ class _Records:
                     f"ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
                 )
                 inputs = np.hstack([lines_of(mean[:, 0]), before, before * mean])
-                yield Finding.of(self.index, "slow-temperatures", sensor, usable, detail), inputs
+                yield RecordFinding.in_rows(self.index, "slow-temperatures", sensor, usable, detail), inputs
 
-    def _shift(self, lines: Array, past: Array, places: Array, F: Array, folds: Rows) -> Finding | None:
-        """Temperatures of other rows, if they explain clearly more than those of the row and its past."""
+    def _shift(self, lines: Array, past: Array, places: Array, F: Array, folds: Rows) -> RecordFinding | None:
+        """A finding where temperatures of other rows explain clearly more than the row's own and its past."""
         n_rows, inputs, found = len(F), np.hstack([lines, past]), []
         for shift in proposed_shifts(places, F, self.inertia):
-            rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), MOST_ROWS)
+            rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
             own = unexplained(inputs[rows], F[rows], folds[rows])
             other = unexplained(inputs[rows - shift], F[rows], folds[rows])
             varying = ~np.isnan(own) & ~np.isnan(other) & (own > 0)
@@ -309,12 +287,12 @@ class _Records:
         if not found:
             return None
         ratio, shift, shifted, unshifted = min(found)
-        if ratio > SHIFTED or shifted < max(LEAST_EXPLAINED, unshifted + LEAST_GAIN):
+        if ratio > 0.9 or shifted < max(0.1, unshifted + 0.01):
             return None
         rows = np.arange(max(shift, 0), n_rows + min(shift, 0))  # means of the past may follow a season by chance
         own = explained(lines[rows], F[rows], folds[rows])
         other = explained(lines[rows - shift], F[rows], folds[rows])
-        if other.sum() <= max(own.sum(), len(other) * LEAST_EXPLAINED / 2):
+        if other.sum() <= max(own.sum(), len(other) * 0.05):
             return None
         length, direction = "", "before" if shift > 0 else "after"
         if self.hours is not None:
@@ -324,34 +302,36 @@ class _Records:
             f"those of {abs(shift)} rows {direction}{length} explain {shifted:.0%} of the variance in periods held "
             f"out, those of the same rows {max(unshifted, 0.0):.0%}"
         )
-        return Finding.of(self.index, "time-shift", "", rows, detail)
+        return RecordFinding.in_rows(self.index, "time-shift", "", rows, detail)
 
-    def _changes(self, inputs: Array) -> tuple[list[Finding], Array]:
-        """Steps and trends that are found beside the weather, and what they add to each frequency."""
+    def _changes(self, inputs: Array) -> tuple[list[RecordFinding], Array]:
+        """Steps and trends beside the weather, and their share in each frequency."""
         level = np.zeros(self.F.shape)
-        found: list[Finding] = []
-        rows = spread_evenly(np.arange(len(inputs)), MOST_FITTED)
+        found: list[RecordFinding] = []
+        rows = spread_evenly(np.arange(len(inputs)), 20_000)
         F, index = self.F[rows], self.index[rows]
         is_timed = isinstance(index, pd.DatetimeIndex)
-        if self.has_faulty_sensors or self.has_wrong_times or (is_timed and index[-1] - index[0] < SHORTEST_TREND):
+        is_short = is_timed and index[-1] - index[0] < pd.Timedelta(days=90)  # a trend may be the season
+        if self.has_faulty_sensors or self.has_wrong_times or is_short:
             return found, level
         times = row_times(pd.DataFrame(index=self.index))
-        span = np.ptp(times[rows])
-        beside, deviations = Inputs(inputs[rows]), robust_deviation(F)
-        for mode, name in enumerate(self.modes):
-            known = np.flatnonzero(~np.isnan(self.F[:, mode]))
-            of_frequency = LEAST_OF_ALL * deviations[mode]
-            row, change, error = largest_step(beside, F[:, mode])
-            if abs(change) > max(CERTAIN * error, of_frequency):
+        span, deviations = np.ptp(times[rows]), robust_deviation(F)
+        for known, basis, mode in bases_of(inputs[rows], F):
+            name, n_inputs = self.modes[mode], inputs.shape[1]
+            all_known = np.flatnonzero(~np.isnan(self.F[:, mode]))
+            of_frequency = 0.1 * deviations[mode]
+            row, change, error = largest_step(basis, known, F[:, mode], n_inputs)
+            if abs(change) > max(5 * error, of_frequency):
                 level[rows[row] :, mode] = change
                 detail = (
                     f"{name!r} changes by {change:+.2g}{self.unit} about {period_of(self.index, rows[[row]])}, "
                     f"standard error {error:.1g}"
                 )
-                found.append(Finding.of(self.index, "sudden-change", name, known, detail))
+                found.append(RecordFinding.in_rows(self.index, "sudden-change", name, all_known, detail))
                 continue
-            change, error, first, last, number = trend_of(beside, (times[rows] - times[rows[0]]) / span, F[:, mode])
-            least = max(CERTAIN * error, LEAST_CHANGE * error * np.sqrt(number / 12), of_frequency)
+            places = (times[rows] - times[rows[0]]) / span
+            change, error, first, last, number = trend_of(basis, known, places, F[:, mode], n_inputs)
+            least = max(5 * error, 0.5 * error * np.sqrt(number / 12), of_frequency)  # half of the residuals' deviation
             if abs(change) > least:
                 level[:, mode] = change * (times - times[0]) / np.ptp(times)
                 a_year = f" ({change * YEAR.value / span:+.2g}{self.unit} a year)" if is_timed else ""
@@ -359,36 +339,32 @@ class _Records:
                     f"{name!r} changes by {change:+.2g}{self.unit}, standard error {error:.1g}{a_year}; first fifth "
                     f"{first:+.2g}{self.unit}, last fifth {last:+.2g}{self.unit}"
                 )
-                found.append(Finding.of(self.index, "trend", name, known, detail))
-        return found, level
+                found.append(RecordFinding.in_rows(self.index, "trend", name, all_known, detail))
+        return sorted(found, key=lambda one: self.modes.index(one.column)), level
 
 
 def _are_implausible(F: Array) -> NDArray[np.bool_]:
     """Values of twice or half the median of their mode, which need no weather to be doubtful."""
     middle, deviation = median(F), robust_deviation(F)
     with np.errstate(invalid="ignore"):
-        far = (IMPLAUSIBLE * middle < F) | (middle / IMPLAUSIBLE > F)
-        return far & (middle > 0) & (np.abs(F - middle) > OUTLYING * deviation)
+        far = (2 * middle < F) | (middle / 2 > F)
+        return far & (middle > 0) & (np.abs(F - middle) > 8 * deviation)
 
 
 def explained(inputs: Array, frequencies: Array, folds: Rows) -> Array:
     """Share of the variance of each mode that varies, which inputs explain out of fold; at most zero for nothing."""
-    rows = spread_evenly(np.arange(len(inputs)), MOST_ROWS)
+    rows = spread_evenly(np.arange(len(inputs)), 4000)
     left = unexplained(inputs[rows], frequencies[rows], folds[rows])
     return 1 - left[~np.isnan(left)]
 
 
 def unexplained(inputs: Array, frequencies: Array, folds: Rows) -> Array:
-    """Mean square that inputs leave of each mode out of fold, over that which the mean of the other folds leaves."""
+    """Mean square of each mode's residuals out of fold by the inputs, over that by the mean of the other folds."""
     values = np.where(np.isnan(inputs).any(axis=1)[:, np.newaxis], np.nan, frequencies)
-    known = ~np.isnan(values)
-    in_fold = np.arange(folds.max() + 1)[:, np.newaxis] == folds
-    sums, counts = in_fold @ np.where(known, values, 0.0), in_fold @ known.astype(float)
-    means = np.broadcast_to(median(values), sums.shape).copy()  # medians where the other folds have no value
-    others = counts.sum(axis=0) - counts
-    np.divide(sums.sum(axis=0) - sums, others, out=means, where=others > 0)
+    means = out_of_fold(lambda train: lambda test: np.tile(means_of_known(values[train]), (len(test), 1)), folds)
+    means = np.where(np.isnan(means), median(values), means)  # where the other folds have no value
     left = np.nansum((values - predicted_by_weather(inputs, values, folds, trim=False)) ** 2, axis=0)
-    whole = np.nansum((values - means[folds]) ** 2, axis=0)
+    whole = np.nansum((values - means) ** 2, axis=0)
     return np.divide(left, whole, out=np.full(len(whole), np.nan), where=whole > 0)
 
 
@@ -396,8 +372,8 @@ def with_past(places: Array) -> Array:
     """Coordinates of the weather a row before, and their means over more of the past, side by side."""
     n_rows, filled = len(places), np.nan_to_num(places)
     ends, columns = np.arange(1, n_rows + 1), [np.vstack([filled[:1], filled[:-1]])]
-    for period in PAST:
-        if period * LEAST_MEANS <= n_rows:
+    for period in (6, 24, 168):
+        if 10 * period <= n_rows:
             starts = np.maximum(ends - period, 0)
             columns.append(range_sums(filled, starts, ends) / (ends - starts)[:, np.newaxis])
     return np.hstack(columns)
@@ -406,7 +382,7 @@ def with_past(places: Array) -> Array:
 def proposed_shifts(places: Array, frequencies: Array, inertia: int) -> list[int]:
     """Shifts at which coordinates of the weather and frequencies, or their changes, are most correlated."""
     n_rows = len(places)
-    farthest, found = int(FARTHEST * n_rows), set()
+    farthest, found = n_rows // 4, set()
     for of in (np.asarray, partial(np.diff, axis=0), partial(_changes_of_means, length=inertia)):
         weather, modes = _spectra(of(places), 2 * n_rows), _spectra(of(frequencies), 2 * n_rows)
         strength = np.zeros(2 * n_rows)
@@ -414,7 +390,7 @@ def proposed_shifts(places: Array, frequencies: Array, inertia: int) -> list[int
             strength += (scipy.fft.irfft(modes * row.conj(), 2 * n_rows, axis=1) ** 2).sum(axis=0)
         strength = np.concatenate([strength[-farthest:], strength[: farthest + 1]])
         strength[farthest - 1 : farthest + inertia + 1] = 0
-        for _ in range(N_PEAKS):
+        for _ in range(3):
             peak = int(strength.argmax())
             found.add(peak - farthest)
             strength[max(peak - 2, 0) : peak + 3] = 0
@@ -460,8 +436,8 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
 
     Notes
     -----
-    The line is that of least squares. Its variance is that of independent records times the correlation time, 1 + 2 *
-    the sum of the autocorrelations, of what remains beside the line.
+    The line is fitted by least squares. Its variance is the variance for independent records times the correlation time
+    of the rest beside the line, 1 + 2 * the sum of its autocorrelations.
 
     Examples
     --------
@@ -478,60 +454,51 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
     order = np.argsort(times, kind="stable")
     span = np.ptp(times) if len(times) else 0.0
     places = (times[order] - times[order][:1]) / span if span > 0 else np.zeros(len(times))
-    beside = Inputs(np.ones((len(values), 1)))
-    rows = [trend_of(beside, places, column) for column in values[order].T]
-    table = pd.DataFrame(rows, index=list(names), columns=ESTIMATES)
+    rows = np.full((values.shape[1], 5), np.nan)
+    for known, basis, mode in bases_of(np.ones((len(values), 1)), values[order]):
+        rows[mode] = trend_of(basis, known, places, values[order, mode], 1)
+    estimates = ["change", "standard_error", "first", "last", "n_independent"]
+    table = pd.DataFrame(rows, index=list(names), columns=estimates)
     table.insert(2, "per_year", table["change"] * (YEAR.value / span if has_stamps(residuals) and span > 0 else np.nan))
     return table
 
 
-class Inputs:
-    """Inputs beside which trends and steps of columns are sought, (n_samples, n_inputs), in order of time.
-
-    Their orthonormal basis is found once for columns one after the other that have values in the same rows.
-    """
-
-    def __init__(self, values: Array):
-        self.values = values
-        self.are_known = ~np.isnan(values).any(axis=1)
-        self.least_known = LEAST_RECORDS + 2 * values.shape[1]
-        self._last: tuple[Rows, Array] | None = None
-
-    def known(self, column: Array) -> Rows:
-        """Rows in which the inputs and a column are known."""
-        return np.flatnonzero(self.are_known & ~np.isnan(column))
-
-    def basis(self, rows: Rows) -> Array:
-        """Orthonormal columns that span what the inputs do in some rows."""
-        if self._last is None or not np.array_equal(self._last[0], rows):
-            basis, triangle = np.linalg.qr(self.values[rows])
+def bases_of(inputs: Array, values: Array) -> Iterator[tuple[Rows, Array, int]]:
+    """For each mode that has enough values: the rows in which it and the inputs are known, orthonormal columns that
+    span what the inputs do there, and its position."""
+    usable = ~np.isnan(inputs).any(axis=1)
+    for is_known, modes in rows_by_pattern(~np.isnan(values.T) & usable):
+        known = np.flatnonzero(is_known)
+        if len(known) >= 10 + 2 * inputs.shape[1]:
+            basis, triangle = np.linalg.qr(inputs[known])
             directions, sizes, _ = np.linalg.svd(triangle)
-            self._last = rows, basis @ directions[:, sizes > 1e-8 * sizes.max()]
-        return self._last[1]
+            basis = basis @ directions[:, sizes > 1e-8 * sizes.max()]
+            yield from ((known, basis, int(mode)) for mode in modes)
 
 
-def trend_of(inputs: Inputs, places: Array, column: Array) -> tuple[float, float, float, float, float]:
-    """Change from place 0 to 1, its standard error, means of the first and last part, and the effective number."""
-    known = inputs.known(column)
+def trend_of(
+    basis: Array, known: Rows, places: Array, column: Array, n_inputs: int
+) -> tuple[float, float, float, float, float]:
+    """Change from place 0 to 1 beside inputs, its standard error, means of the first and last fifth, and the effective
+    number."""
     x, y = places[known], column[known]
-    if len(y) < inputs.least_known or np.ptp(x) == 0:
+    if np.ptp(x) == 0:
         return (np.nan,) * 5
-    basis = inputs.basis(known)
-    # Frisch-Waugh: the trend of what the inputs leave of values, over what they leave of time
+    # Frisch-Waugh: both the values and the times without their parts that the inputs explain
     both = np.column_stack([x, y])
     alone, rest = (both - basis @ (basis.T @ both)).T
     change = alone @ rest / (alone @ alone)
     scatter = rest - change * alone
-    error, time = _standard_error(scatter, known, len(column), alone @ alone, inputs.values.shape[1])
+    error, time = _standard_error(scatter, known, len(column), alone @ alone, n_inputs)
     at = scatter + change * (x - x.mean())
-    is_first, is_last = x <= 1 / PARTS, x >= 1 - 1 / PARTS
+    is_first, is_last = x <= 1 / 5, x >= 1 - 1 / 5
     first = at[is_first].mean() if is_first.any() else np.nan
     last = at[is_last].mean() if is_last.any() else np.nan
     return change, error, first, last, len(y) / time
 
 
 def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_inputs: int) -> tuple[float, float]:
-    """Of the coefficient of a regressor with this sum of squares, and the correlation time of what it leaves."""
+    """Standard error of the coefficient of a regressor with this sum of squares, and the scatter's correlation time."""
     in_time = np.full(n_rows, np.nan)
     in_time[known] = scatter
     time = min(correlation_time(in_time), len(known) / 2)
@@ -539,17 +506,15 @@ def _standard_error(scatter: Array, known: Rows, n_rows: int, square: float, n_i
     return float(np.sqrt(variance * time / square)), time
 
 
-def largest_step(inputs: Inputs, column: Array) -> tuple[int, float, float]:
+def largest_step(basis: Array, known: Rows, column: Array, n_inputs: int) -> tuple[int, float, float]:
     """The step that explains most of a column beside inputs: its row, the change and its standard error.
 
     The change is 0 where a straight line does nearly as well. Rows are in order of time. As for a trend, the standard
-    error holds if what remains depends on what was before.
+    error allows for correlation of the rest.
     """
-    known = inputs.known(column)
-    n_places = min(N_PLACES, len(known) // LEAST_RECORDS)
-    if len(known) < inputs.least_known or n_places < 2:
+    n_places = min(100, len(known) // 10)
+    if n_places < 2:
         return 0, 0.0, np.inf
-    basis = inputs.basis(known)
     at = np.arange(1, n_places) * len(known) // n_places
     line, y = np.arange(len(known)) / len(known), column[known]
     line, rest = line - basis @ (basis.T @ line), y - basis @ (basis.T @ y)
@@ -559,8 +524,8 @@ def largest_step(inputs: Inputs, column: Array) -> tuple[int, float, float]:
     explained_by_line = (line @ rest) ** 2 / max(line @ line, 1e-12 * len(known))
     best = int(np.argmax(products**2 / squares))
     change = products[best] / squares[best]
-    if rest @ rest - change * products[best] > SHARPER * (rest @ rest - explained_by_line):
+    if rest @ rest - change * products[best] > 0.9 * (rest @ rest - explained_by_line):
         return 0, 0.0, np.inf
     scatter = rest - change * ((np.arange(len(known)) >= at[best]) - basis @ within[best])
-    error, _ = _standard_error(scatter, known, len(column), squares[best], inputs.values.shape[1])
+    error, _ = _standard_error(scatter, known, len(column), squares[best], n_inputs)
     return int(known[at[best]]), float(change), error

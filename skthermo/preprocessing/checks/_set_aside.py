@@ -1,4 +1,5 @@
-"""What is set aside before anything is learned: values that cannot be, columns of which most are such, wrong rows."""
+"""The gate of records: values that cannot be measurements become NaN, columns without use are left out, wrong rows and
+tables are errors."""
 
 from __future__ import annotations
 
@@ -11,46 +12,35 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, check_model, spread_evenly
-from skthermo._core.frames import MARKERS, Table, as_stamps, frame_like
+from skthermo._core.frames import MISSING_CODES, Table, as_stamps, named_frame
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing.checks._columns import (
-    MOST_COMPARED,
+from skthermo.preprocessing.checks._column_checks import (
     Reading,
     compare_with_model,
     look_at_responses,
     look_at_temperatures,
-    stuck_columns,
 )
-from skthermo.preprocessing.checks._findings import (
+from skthermo.preprocessing.checks._record_findings import (
+    ASIDE_KINDS,
     IMPOSSIBLE,
-    LEFT_OUT,
-    SET_ASIDE,
-    Finding,
+    LEFT_OUT_KINDS,
+    RecordFinding,
     RecordFindings,
     findings_table,
     label_of,
     listed_details,
     period_of,
 )
+from skthermo.preprocessing.checks._stuck import stuck_columns
 
-MOST, MANY = 0.5, 0.2
-"""Shares of the values of a column, with more than which set aside the rest is not trusted: of any kind, and of values
-at another level, of which it is not certain which level is right."""
-NUMBERED = pd.Timestamp("1970-03-01")  # before which numbers that are read as nanoseconds fall
-SHORTEST_STEP = pd.Timedelta("1min")  # between records
-DATES = (19500101, 21001231)  # dates written as one integer
 WRONG_TIMES = {"missing-stamps", "equal-stamps", "stamps-from-numbers", "stamps-as-text"}
-FEW_WRONG = 0.01  # share of the rows in which a sensor may be wrong without a doubt on the others
-FEW_ROWS = 50
-STEADY, CHANGING = 0.1, 4.0  # quartile distance over the median of frequencies, and how often it is in temperatures
-NO_WEATHER = 30.0  # degrees, or the range of known ones, outside that range, which no weather gives
 
 
 @dataclass(frozen=True)
 class SetAside(SavesFrames):
-    """Tables of records without values that cannot be, and what has become of them.
+    """Tables with NaN in place of values that cannot be measurements, and a table of these values.
 
     Parameters
     ----------
@@ -87,7 +77,7 @@ class SetAside(SavesFrames):
         RecordsWarning
             Of kind "set-aside" or "left-out".
         """
-        values = self.table[self.table["what"].isin(SET_ASIDE) & ~self.table["column"].isin(list(self.left_out))]
+        values = self.table[self.table["what"].isin(ASIDE_KINDS) & ~self.table["column"].isin(list(self.left_out))]
         if len(values):
             n_values = values["n_rows"].sum()
             what = (
@@ -117,10 +107,10 @@ def set_aside(
     needs_all: bool = False,
     is_baseline: bool = True,
 ) -> SetAside:
-    """Records without values that cannot be.
+    """Put NaN in place of values that cannot be measurements.
 
-    Infinite values, numbers that loggers write for a missing one, frequencies that are not positive, values at another
-    level far from all others, and those of a sensor that is stuck become NaN. A column is left out if it has no value,
+    These are infinite values, numbers that loggers write for a missing value, frequencies that are not positive, values
+    at another level far from all others, and values of a stuck sensor. A column is left out if it has no value,
     a single one, if more than half of its values are set aside, or more than a fifth as another level.
 
     Parameters
@@ -176,52 +166,23 @@ def set_aside(
     """
     records = CleanedRecords(temperatures, frequencies, unit=unit, model=model)
     findings = findings_table(records.findings)
-    kinds = (SET_ASIDE if is_baseline else IMPOSSIBLE).difference(exclude)
-    harmless = SET_ASIDE | (set() if needs_all else LEFT_OUT) | set(exclude)
+    kinds = (ASIDE_KINDS if is_baseline else IMPOSSIBLE).difference(exclude)
+    harmless = ASIDE_KINDS | (set() if needs_all else LEFT_OUT_KINDS) | set(exclude)
     others = RecordFindings(findings[~findings["what"].isin(harmless)], records.n_rows)
     others.refuse_meaningless()
-    cleaned: dict[str, Table] = {}
-    left_out: dict[Hashable, str] = {}
-    found: list[Finding] = []
-    for reading, table in zip(records.readings, records.given, strict=True):
-        what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
-        for place, rows in () if what in exclude else stuck_columns(reading.values):
-            name, value = reading.columns[place], f"{reading.values[rows[0], place]:.6g}{reading.unit}"
-            reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
-            reading.set_aside(what, rows, place)
-        for kind, rows, place, before in reversed(reading.aside):
-            if kind not in kinds:  # these values are used as they are
-                reading.values[rows, place] = before
-        own = dict(_left_out(reading, exclude))
+    records.set_stuck_aside(exclude)
+    records.use(ASIDE_KINDS - kinds)
+    left_out = records.left_out(exclude)
+    for reading in records.readings:
+        own = [left_out[name] for name in reading.columns if name in left_out]
         if own and len(own) == len(reading.columns):
-            raise ValueError(
-                f"no column of the {reading.what} can be used: {'; '.join(own.values())}; expected measurements"
-            )
-        left_out |= own
-        found += [one for one in reading.findings if one.what in LEFT_OUT.union(kinds)]
-        values = np.empty_like(reading.values)
-        values[reading.order] = reading.values
-        cleaned[reading.what] = frame_like(table, values, reading.columns)
+            raise ValueError(f"no column of the {reading.what} can be used: {'; '.join(own)}; expected measurements")
     if needs_all and left_out:
         raise ValueError(f"columns cannot be used: {'; '.join(left_out.values())}; expected measurements in each")
-    result = SetAside(cleaned.get("temperatures"), cleaned.get("frequencies"), findings_table(found), left_out, others)
+    found = [one for reading in records.readings for one in reading.findings if one.what in LEFT_OUT_KINDS | kinds]
+    result = SetAside(**records.tables(), table=findings_table(found), left_out=left_out, others=others)
     warn_each(result.warnings())
     return result
-
-
-def _left_out(reading: Reading, exclude: Collection[str]) -> Iterator[tuple[Hashable, str]]:
-    """Columns that have no value or one, and those of which most values were set aside, each with a reason."""
-    known = np.count_nonzero(reading.were_known, axis=0)
-    n_aside = np.count_nonzero(reading.were_known & np.isnan(reading.values), axis=0)
-    for place, name in enumerate(reading.columns):
-        own: list[Finding] = [found for found in reading.findings if found.column == name]
-        elsewhere = sum(found.n_rows for found in own if found.what == "another-level")
-        if n_aside[place] > MOST * known[place] or elsewhere > MANY * known[place]:
-            yield name, "; ".join(found.detail for found in own if found.what in SET_ASIDE)
-        else:
-            useless = [found for found in own if found.what in LEFT_OUT and found.what not in exclude]
-            if useless:
-                yield name, f"{useless[0].detail} ({useless[0].what})"
 
 
 class CleanedRecords:
@@ -267,17 +228,59 @@ class CleanedRecords:
         far[F.order] = F.were_known & np.isnan(F.values)
         return pd.DataFrame(far, F.given_index if F.is_frame else None, pd.Index(F.columns, tupleize_cols=False))
 
+    def set_stuck_aside(self, exclude: Collection[str] = ()) -> None:
+        """Make values NaN in rows in which a sensor or a mode was stuck."""
+        for reading in self.readings:
+            what = "stuck-sensor" if reading.what == "temperatures" else "stuck-mode"
+            for place, rows in () if what in exclude else stuck_columns(reading.values):
+                name, value = reading.columns[place], f"{reading.values[rows[0], place]:.6g}{reading.unit}"
+                reading.found(what, name, rows, f"{name!r} is {value} in {reading.share(rows)}")
+                reading.set_aside(what, rows, place)
+
+    def use(self, kinds: Collection[str]) -> None:
+        """Values that were put aside for these kinds of findings are used as they were given."""
+        for reading in self.readings:
+            for kind, rows, place, before in reversed(reading.aside):
+                if kind in kinds:
+                    reading.values[rows, place] = before
+
+    def left_out(self, exclude: Collection[str] = ()) -> dict[Hashable, str]:
+        """Columns without a value or with one, and columns of which most values were set aside, with the reasons."""
+        reasons: dict[Hashable, str] = {}
+        for reading in self.readings:
+            known = np.count_nonzero(reading.were_known, axis=0)
+            n_aside = np.count_nonzero(reading.were_known & np.isnan(reading.values), axis=0)
+            for place, name in enumerate(reading.columns):
+                own: list[RecordFinding] = [found for found in reading.findings if found.column == name]
+                elsewhere = sum(found.n_rows for found in own if found.what == "another-level")
+                useless = [found for found in own if found.what in LEFT_OUT_KINDS and found.what not in exclude]
+                # of two levels, it is not certain which one is right
+                if n_aside[place] > 0.5 * known[place] or elsewhere > 0.2 * known[place]:
+                    reasons[name] = "; ".join(found.detail for found in own if found.what in ASIDE_KINDS)
+                elif useless:
+                    reasons[name] = f"{useless[0].detail} ({useless[0].what})"
+        return reasons
+
+    def tables(self) -> dict[str, Table | None]:
+        """Temperatures and frequencies in the order of rows that were given; None where they were not given."""
+        tables: dict[str, Table | None] = {"temperatures": None, "frequencies": None}
+        for reading, given in zip(self.readings, self.given, strict=True):
+            values = np.empty_like(reading.values)
+            values[reading.order] = reading.values
+            tables[reading.what] = named_frame(given, values)
+        return tables
+
     def useful_values(self, reading: Reading) -> Array:
         """Values, NaN in columns that are constant or have very few different values."""
         return np.where(np.isin(np.arange(len(reading.columns)), list(reading.useless)), np.nan, reading.values)
 
 
-def _different_rows(first: Reading, second: Reading) -> list[Finding]:
+def _different_rows(first: Reading, second: Reading) -> list[RecordFinding]:
     """Tables that differ in the number of rows or in their labels."""
     what, here, there = "different-rows", first.given_index, second.given_index
     if len(here) != len(there):
         detail = f"{len(here)} rows of {first.what} and {len(there)} of {second.what}"
-        return [Finding(what, "", abs(len(here) - len(there)), None, None, detail)]
+        return [RecordFinding(what, "", abs(len(here) - len(there)), None, None, detail)]
     if not (first.is_frame and second.is_frame) or here.equals(there):
         return []
     differ = np.flatnonzero([one != other for one, other in zip(here, there, strict=True)])
@@ -285,10 +288,10 @@ def _different_rows(first: Reading, second: Reading) -> list[Finding]:
     detail = (
         f"{len(differ)} of {len(here)} rows have different labels, the first row {row}: {here[row]} and {there[row]}"
     )
-    return [Finding(what, "", len(differ), here[row], here[differ[-1]], detail)]
+    return [RecordFinding(what, "", len(differ), here[row], here[differ[-1]], detail)]
 
 
-def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
+def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[RecordFinding]:
     """Columns that stand in both tables, or temperatures that are frequencies and frequencies that are none."""
     modes = {content: name for name, content in F.contents()}
     found, details = [], {}
@@ -296,19 +299,19 @@ def _exchanged(T: Reading, F: Reading, *, in_hertz: bool) -> list[Finding]:
         if content in modes:
             details[name] = f"{name!r} of the temperatures equals {modes[content]!r}"
     what = "temperatures-are-frequencies" if details else "exchanged-tables"
-    if not details and in_hertz and min(len(T.values), len(F.values)) >= FEW_ROWS:
+    if not details and in_hertz and min(len(T.values), len(F.values)) >= 50:
         (steady, is_positive), (changing, _) = _relative_change(T.values), _relative_change(F.values)
-        if is_positive and steady < min(STEADY, changing / CHANGING):
+        if is_positive and steady < min(0.1, changing / 4):
             part = f"{steady:.1%} of their median, of the frequencies within {changing:.0%}"
             details[""] = f"half of the temperatures lie within {part}"
     for name, detail in details.items():
-        found.append(Finding.of(T.index, what, name, T.whole, detail, period=True))
+        found.append(RecordFinding.in_rows(T.index, what, name, T.whole, detail, period=True))
     return found
 
 
 def _relative_change(values: Array) -> tuple[float, bool]:
     """Distance of the quartiles over the median of a typical column, and whether all columns are positive."""
-    some = values[spread_evenly(np.arange(len(values)), MOST_COMPARED)]
+    some = values[spread_evenly(np.arange(len(values)), 1000)]
     known = some[:, np.fmax.reduce(some) > np.fmin.reduce(some)]
     if not known.size:
         return np.nan, False
@@ -316,7 +319,7 @@ def _relative_change(values: Array) -> tuple[float, bool]:
     return float(np.median((high - low) / np.maximum(np.abs(middle), 1e-300))), bool((low > 0).all())
 
 
-def _rows_found(tables: list[Reading]) -> Iterator[Finding]:
+def _rows_found(tables: list[Reading]) -> Iterator[RecordFinding]:
     """What is wrong with the times of rows, and whether few rows have a value in each table."""
     indexes = [reading.given_index for reading in tables if reading.is_frame]
     if len(indexes) == 2 and indexes[0].equals(indexes[1]):
@@ -330,49 +333,50 @@ def _rows_found(tables: list[Reading]) -> Iterator[Finding]:
     for reading in tables:
         is_known &= ~np.isnan(reading.values[:n_rows]).all(axis=1)
     known = np.flatnonzero(is_known)
-    if len(known) < FEW_ROWS and (len(known) or not any(reading.findings for reading in tables)):
+    if len(known) < 50 and (len(known) or not any(reading.findings for reading in tables)):
         what, detail = "few-rows" if len(known) > 1 else "no-rows", f"{len(known)} of {n_rows} rows have values"
-        yield Finding.of(tables[0].index, what, "", known, detail, period=True)
+        yield RecordFinding.in_rows(tables[0].index, what, "", known, detail, period=True)
 
 
-def _stamps_found(index: pd.DatetimeIndex) -> Iterator[Finding]:
+def _stamps_found(index: pd.DatetimeIndex) -> Iterator[RecordFinding]:
     n_rows, everything = len(index), np.arange(len(index))
     missing = np.flatnonzero(index.isna())
     if len(missing):
         detail = f"{len(missing)} of {n_rows} rows, the first row {missing[0]}"
-        yield Finding.of(index, "missing-stamps", "", missing, detail)
+        yield RecordFinding.in_rows(index, "missing-stamps", "", missing, detail)
         return
     try:
         stamps = index.as_unit("ns").asi8
     except ValueError:  # beyond the years that nanoseconds reach
-        yield Finding.of(index, "stamps-from-numbers", "", everything, f"{index.min()} to {index.max()}")
+        yield RecordFinding.in_rows(index, "stamps-from-numbers", "", everything, f"{index.min()} to {index.max()}")
         return
     steps = np.diff(stamps)
     if n_rows > 1 and not steps.any():
         detail = f"{label_of(index[0])} in all {n_rows} rows"
-        yield Finding.of(index, "equal-stamps", "", everything, detail)
+        yield RecordFinding.in_rows(index, "equal-stamps", "", everything, detail)
         return
-    if n_rows > 1 and 0 <= stamps.max() < NUMBERED.value and np.median(np.abs(steps)) < SHORTEST_STEP.value:
+    is_early = 0 <= stamps.max() < pd.Timestamp("1970-03-01").value  # as other numbers are that count nanoseconds
+    if n_rows > 1 and is_early and np.median(np.abs(steps)) < pd.Timedelta("1min").value:
         detail = f"{index[0]} to {index[-1]} in {n_rows} rows, all at the beginning of 1970"
-        yield Finding.of(index, "stamps-from-numbers", "", everything, detail)
+        yield RecordFinding.in_rows(index, "stamps-from-numbers", "", everything, detail)
         return
     again = np.flatnonzero(index.duplicated())
     if len(again):
         again = again[np.argsort(stamps[again], kind="stable")]
         detail = f"{len(again)} of {n_rows} rows have the time of another, {period_of(index, again)}"
-        yield Finding.of(index, "repeated-stamps", "", again, detail)
+        yield RecordFinding.in_rows(index, "repeated-stamps", "", again, detail)
     late = 1 + np.flatnonzero(steps < 0)
     if len(late):
         detail = f"{len(late)} of {n_rows} rows are earlier than the row before, the first row {late[0]}"
-        yield Finding.of(index, "unsorted-stamps", "", late, f"{detail} ({label_of(index[late[0]])})")
+        yield RecordFinding.in_rows(index, "unsorted-stamps", "", late, f"{detail} ({label_of(index[late[0]])})")
 
 
-def _labels_found(index: pd.Index) -> Iterator[Finding]:
+def _labels_found(index: pd.Index) -> Iterator[RecordFinding]:
     """Labels that look like times although they are none."""
     detail = ""
     if len(index) > 1 and pd.api.types.is_integer_dtype(index.dtype) and not isinstance(index, pd.MultiIndex):
         months = index.to_numpy() // 100 % 100
-        if DATES[0] <= index.min() < index.max() <= DATES[1] and ((months >= 1) & (months <= 12)).all():
+        if 19500101 <= index.min() < index.max() <= 21001231 and ((months >= 1) & (months <= 12)).all():
             detail = f"the index holds dates as integers, such as {index[0]}"
     try:
         as_stamps(index)
@@ -380,7 +384,7 @@ def _labels_found(index: pd.Index) -> Iterator[Finding]:
         reason = str(error).partition(";")[0].replace("X has", "the index has").replace("of X ", "")
         detail = f"{reason:.150}"
     if detail:
-        yield Finding.of(index, "stamps-as-text", "", np.arange(len(index)), detail)
+        yield RecordFinding.in_rows(index, "stamps-as-text", "", np.arange(len(index)), detail)
 
 
 @dataclass(frozen=True)
@@ -396,7 +400,7 @@ class Plausible:
     most: Array
 
     @classmethod
-    def of(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
+    def learned(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
         """No temperature in kelvin, and none that is 100 degrees beyond the baseline; targets may have any value."""
         is_target = baseline.columns.isin(targets)
         found = cls.beside(*_range(baseline.to_numpy()))
@@ -412,16 +416,16 @@ class Plausible:
     def of_weather(cls, temperatures: Array) -> Plausible:
         """Temperatures that weather may bring where these are known."""
         least, most = _range(temperatures)
-        beyond = np.maximum(most - least, NO_WEATHER)
+        beyond = np.maximum(most - least, 30)
         return cls(least - beyond, most + beyond, least, most)
 
     def implausible(self, values: Array) -> NDArray[np.bool_]:
         """Which values no sensor measures."""
-        is_marker = np.isin(values, MARKERS) & ~((values >= self.least) & (values <= self.most))
+        is_marker = np.isin(values, MISSING_CODES) & ~((values >= self.least) & (values <= self.most))
         return is_marker | np.isinf(values) | (values < self.lowest) | (values > self.highest)
 
 
 def _range(values: Array) -> tuple[Array, Array]:
     """Least and most of each column, numbers that may stand for missing values left out."""
-    known = np.where(np.isin(values, MARKERS), np.nan, values)
+    known = np.where(np.isin(values, MISSING_CODES), np.nan, values)
     return np.fmin.reduce(known), np.fmax.reduce(known)

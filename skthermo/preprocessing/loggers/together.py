@@ -12,25 +12,20 @@ from zoneinfo import ZoneInfo
 import pandas as pd
 
 from skthermo._core.text import counted
-from skthermo.preprocessing.loggers.files import MOSTLY, Look, look_at
+from skthermo.preprocessing.loggers.logger_files import MOSTLY, FileLook, look_at
 
-ABSOLUTE_ZERO, FREEZING, FAHRENHEIT = 273.15, 32.0, 5 / 9
-TEMPERATURES, HZ = {"°C", "K", "°F"}, "Hz"
-LIKE_TEMPERATURE = re.compile(r"t\d*$|t[A-Z_]|temp|.*temp|air|.*luft", re.IGNORECASE)
-LIKE_FREQUENCY = re.compile(r"f_?\d*$|.*freq|(.*\W)?(mode|hz)", re.IGNORECASE)
-KELVIN = (200.0, 340.0)  # range of a temperature in kelvin
+HZ = "Hz"
 
 
 @dataclass(frozen=True)
 class LoggerRecords:
     """Records of files, in order of time and in degrees Celsius.
 
-    ``roles`` are names of columns by what they are: temperatures, reference and responses; ``units`` are those of the
-    responses, "" where unknown, ``convert`` those of temperatures that were in others. ``waiting`` are stamps that are
-    not in all files; ``ignored`` says why columns are not used.
-    """
+    ``roles`` are names of columns by role: temperatures, reference and responses; ``units`` are the units of the
+    responses, "" where unknown; ``convert`` has the units of temperatures that were not in degrees Celsius. ``waiting``
+    are stamps that are not in all files; ``ignored`` says why columns are not used."""
 
-    looks: Sequence[Look]
+    looks: Sequence[FileLook]
     table: pd.DataFrame
     roles: Mapping[str, list[str]]
     units: Mapping[str, str]
@@ -39,7 +34,7 @@ class LoggerRecords:
     ignored: Mapping[str, str]
 
     @classmethod
-    def of(
+    def read(
         cls,
         files: Sequence[Path],
         temperatures: Sequence[str] | None = None,
@@ -81,14 +76,14 @@ class LoggerRecords:
             for name in (*roles["temperatures"], *roles["reference"])
             if (unit := _foreign(table, name, units))
         }
-        units = {name: units.get(name, HZ if LIKE_FREQUENCY.match(name) else "") for name in roles["responses"]}
+        units = {name: units.get(name, HZ if is_like_frequency(name) else "") for name in roles["responses"]}
         ignored = {name: why for look in looks for name, why in look.ignored.items()}
         ignored |= {name: "nothing says what it is" for name in columns if name not in used}
         return cls(looks, in_celsius(table, convert)[used], roles, units, convert, waiting, ignored)
 
 
-def _roles(looks: Sequence[Look], columns: list[str], given: dict[str, Any]) -> dict[str, list[str]]:
-    """Columns by what they are: as said, else as the first and the other of two files, or by unit and name."""
+def _roles(looks: Sequence[FileLook], columns: list[str], given: dict[str, Any]) -> dict[str, list[str]]:
+    """Columns by role: as given, else as the first and the other of two files, or by unit and name."""
     unknown = [name for names in given.values() for name in names or () if name not in columns]
     if unknown:
         raise ValueError(f"there are no columns {unknown}; expected some of {columns}{_others(looks)}")
@@ -96,15 +91,15 @@ def _roles(looks: Sequence[Look], columns: list[str], given: dict[str, Any]) -> 
     rest = [name for name in columns if name not in named]
     units = {name: unit for look in looks for name, unit in look.units.items()}
     is_pair = len({frozenset(look.records) for look in looks}) == 2
-    for role, unit, like in (
-        ("temperatures", TEMPERATURES, LIKE_TEMPERATURE),
-        ("responses", {HZ}, LIKE_FREQUENCY),
+    for role, unit, is_like in (
+        ("temperatures", {"°C", "K", "°F"}, is_like_temperature),
+        ("responses", {HZ}, is_like_frequency),
     ):
         if given[role] is None and is_pair:
             first = set(looks[0].records)
             given[role] = [name for name in rest if (name in first) == (role == "temperatures")]
         elif given[role] is None:
-            found = [n for n in rest if units.get(n) in unit or (n not in units and like.match(str(n)))]
+            found = [n for n in rest if units.get(n) in unit or (n not in units and is_like(n))]
             given[role] = [n for n in found if n not in (given["temperatures"] or ())]
         if not given[role]:
             raise ValueError(
@@ -114,7 +109,17 @@ def _roles(looks: Sequence[Look], columns: list[str], given: dict[str, Any]) -> 
     return {role: list(names) for role, names in given.items()}
 
 
-def _others(looks: Sequence[Look]) -> str:
+def is_like_temperature(name: Any) -> bool:
+    """Whether a column has a name as temperatures have."""
+    return re.match(r"t\d*$|t[A-Z_]|temp|.*temp|air|.*luft", str(name), re.IGNORECASE) is not None
+
+
+def is_like_frequency(name: Any) -> bool:
+    """Whether a column has a name as frequencies have."""
+    return re.match(r"f_?\d*$|.*freq|(.*\W)?(mode|hz)", str(name), re.IGNORECASE) is not None
+
+
+def _others(looks: Sequence[FileLook]) -> str:
     """Columns that cannot be used, and why."""
     others = [f"{name!r} is none, as {why}" for look in looks for name, why in look.ignored.items()]
     return f"; {', '.join(others)}" if others else ""
@@ -125,15 +130,14 @@ def _foreign(records: pd.DataFrame, name: str, units: Mapping[str, str]) -> str:
     unit = units.get(name, "")
     if unit in ("K", "°F"):
         return unit
-    return "K" if unit == "" and records[name].between(*KELVIN).mean() > MOSTLY else ""
+    return "K" if unit == "" and records[name].between(200, 340).mean() > MOSTLY else ""
 
 
 def in_celsius(table: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
     """A table with columns that are in K or °F converted to degrees Celsius."""
     found = {name: unit for name, unit in units.items() if name in table}
     scaled = {
-        name: table[name] - ABSOLUTE_ZERO if unit == "K" else (table[name] - FREEZING) * FAHRENHEIT
-        for name, unit in found.items()
+        name: table[name] - 273.15 if unit == "K" else (table[name] - 32.0) * (5 / 9) for name, unit in found.items()
     }
     return table.assign(**scaled)
 

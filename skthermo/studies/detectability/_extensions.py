@@ -30,7 +30,7 @@ from skthermo.studies._scenarios import Scenario
 from skthermo.studies.detectability._pod_curve import pod_curve
 from skthermo.studies.detectability._simulation import LARGEST_SEED, Candidate, Measurement, SeenColumns
 from skthermo.studies.detectability._study import DetectabilityStudy
-from skthermo.surrogate import FittedChain
+from skthermo.surrogate import DataInformedFEM
 
 ChangesBySeverity: TypeAlias = Mapping[tuple[str, float], Mapping[str, Any]]
 """What is changed, as arguments of `DataInformedFEM.simulate`, by family and severity."""
@@ -44,7 +44,7 @@ class CampaignSimulator:
     the model, and ``scatter`` the relative standard deviations of their noise; they are missing where all others are.
     """
 
-    fem: FittedChain
+    fem: DataInformedFEM
     T: Table
     changes: ChangesBySeverity
     measurement: Measurement
@@ -360,7 +360,7 @@ def _further_modes(model: FEModel, modes: Sequence[int] | None) -> list[int]:
     return [int(mode) for mode in modes]
 
 
-def _warn_of_unknown_modes(fem: FittedChain, ranks: Sequence[int]) -> None:
+def _warn_of_unknown_modes(fem: DataInformedFEM, ranks: Sequence[int]) -> None:
     """Warn of modes whose frequencies the parameters of the chain predict badly."""
     theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
     measured, further = (

@@ -29,13 +29,12 @@ from skthermo.studies.detectability._rates import EvaluatedRecords
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     SIMULATED,
-    YEARS,
     Evaluation,
     Key,
     Simulation,
     clean_frequencies,
 )
-from skthermo.surrogate import FittedChain, refitted, resampled
+from skthermo.surrogate import DataInformedFEM, refitted, resampled
 from skthermo.updating import ModelUpdater
 
 DEVIATION = 0.005  # relative, of measured mean frequencies from those of a perfect model
@@ -66,7 +65,7 @@ class Replicates:
     Every replicate is drawn from its own seed alone. Without "noise" among what varies, all replicates have the same.
     """
 
-    fem: FittedChain
+    fem: DataInformedFEM
     parts: Sequence[str]
     with_noise: bool
     years: Sequence[Table]
@@ -75,7 +74,7 @@ class Replicates:
 
     @classmethod
     def of(
-        cls, fem: FittedChain, uncertainty: str | Sequence[str], T: Table, models: Any, number: Any, seed: Any
+        cls, fem: DataInformedFEM, uncertainty: str | Sequence[str], T: Table, models: Any, number: Any, seed: Any
     ) -> Replicates:
         """So many replicates in which the named parts vary; without models, these are drawn from the training
         records."""
@@ -100,7 +99,7 @@ class Replicates:
         varied = [part for part in PARTS[1:] if part in asked and (part != "model" or models)]
         return cls(fem, varied, "noise" in asked, years, models or [], [int(one) for one in seeds[:-1]])
 
-    def replicate(self, number: int) -> Iterator[tuple[str, FittedChain, Table]]:
+    def replicate(self, number: int) -> Iterator[tuple[str, DataInformedFEM, Table]]:
         """One part after the other, with a chain and temperatures in which it and those before vary.
 
         Other training records are those that the chain's structure could have given as well in the same weather.
@@ -132,7 +131,7 @@ class Replicates:
         return np.exp(errors * np.random.RandomState([self.seeds[number], 1]).standard_normal(len(errors)))
 
 
-def _models_of(fem: FittedChain, number: int, seed: int, is_needed: bool) -> list[FEModel]:
+def _models_of(fem: DataInformedFEM, number: int, seed: int, is_needed: bool) -> list[FEModel]:
     """Models drawn from the training records; none, with a warning, where they cannot be drawn and need not."""
     try:
         return drawn_models(fem, number, seed)
@@ -154,7 +153,7 @@ def checked_parts(uncertainty: str | Sequence[str], with_models: bool = False) -
     return asked
 
 
-def drawn_models(fem: FittedChain, number: int, seed: int) -> list[FEModel]:
+def drawn_models(fem: DataInformedFEM, number: int, seed: int) -> list[FEModel]:
     """Models calibrated to the mean of the training records, as far as these determine stiffnesses."""
     mean = np.nanmean(as_floats(fem.records_.frequencies), axis=0)
     with without_warnings():
@@ -420,11 +419,10 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
 
 
 def _rates(
-    simulation: Simulation, chain: FittedChain, seeds: Array, drawn: Sequence[tuple[Array, Table]], first: int
+    simulation: Simulation, chain: DataInformedFEM, seeds: Array, drawn: Sequence[tuple[Array, Table]], first: int
 ) -> dict[Key, tuple[Array, float]]:
     """Rates of alarms, (n_draws,), and the mean number of evaluated records, by detector and scenario."""
-    n_years = YEARS if chain.model is simulation.fem.model else 1
-    clean = clean_frequencies(chain, simulation.scenarios, simulation.T, len(seeds), first, n_years)
+    clean = clean_frequencies(chain, simulation.scenarios, simulation.T, len(seeds), first)
     changed = replace(simulation, clean=clean)
     draws = enumerate(zip(seeds, drawn, strict=True))
     records = (changed.records(simulation.scenarios, number, *pair) for number, pair in draws)

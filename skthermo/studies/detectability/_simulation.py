@@ -17,18 +17,17 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.answers import answer_once, answers_kept
+from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array, as_columns, as_floats, is_real
 from skthermo._core.estimators import _num_samples, last_step, seed_parts
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.memory import remembered
-from skthermo._core.origins import Origin, of_origin, origin_of
 from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.warnings import warnings_of_detector, without_warnings
 from skthermo.detection import DamageDetector
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._rates import EvaluatedRecords, rate_of
-from skthermo.surrogate import FittedChain
+from skthermo.surrogate import DataInformedFEM
 
 SIMULATED, REFERENCE = "simulated", "reference"
 
@@ -38,7 +37,6 @@ Repeat: TypeAlias = tuple[int, Sequence[int]]  # number and seeds
 
 LARGEST_SEED = np.iinfo(np.int32).max
 MOST_ROWS = 20_000  # of records that are evaluated together
-YEARS = 10  # of weather at least, in which an FE model simulates each state in the replicates of a study
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class SeenColumns:
     is_frame: bool
 
     @classmethod
-    def all_of(cls, fem: FittedChain) -> SeenColumns:
+    def all_of(cls, fem: DataInformedFEM) -> SeenColumns:
         """All columns of a chain."""
         names = [*column_names(fem.records_.temperatures, "T"), *fem.mode_names_]
         return cls(names, fem.n_features_in_, np.arange(len(names)), False)
@@ -103,7 +101,7 @@ class SeenColumns:
         return np.arange(n_all - n_columns, n_all)
 
 
-def read_baseline(fem: FittedChain, detector: BaseEstimator, baseline: Table | None) -> tuple[SeenColumns, Table]:
+def read_baseline(fem: DataInformedFEM, detector: BaseEstimator, baseline: Table | None) -> tuple[SeenColumns, Table]:
     """The detector's view, and the records that it learns from: by default those that the chain has learned from.
 
     Only a detector with a part that has ``targets`` sees temperatures.
@@ -129,6 +127,16 @@ def has_targets(detector: BaseEstimator) -> bool:
     return any(name.rsplit("__", 1)[-1] == "targets" for name in detector.get_params())
 
 
+def transformed_by(steps: Pipeline, table: Table) -> tuple[Pipeline, Table]:
+    """Fitted steps, and the table that they give."""
+    return steps, steps.fit_transform(table)
+
+
+def fitted_to(detector: BaseEstimator, table: Table) -> BaseEstimator:
+    """The detector, fitted to the table."""
+    return detector.fit(table)
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A detector that has learned the healthy structure, and which columns it sees.
@@ -147,7 +155,7 @@ class Candidate:
     @classmethod
     def learned(
         cls,
-        fem: FittedChain,
+        fem: DataInformedFEM,
         baseline: Table | None,
         random_state: np.random.RandomState | None,
         memory: str | Memory | None,
@@ -163,20 +171,10 @@ class Candidate:
         is_pipeline = isinstance(fitted, Pipeline) and len(fitted) > 1
         if is_pipeline:
             before = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
-            begins = before.steps[:-1], healthy
-
-            def transformed() -> tuple[Pipeline, Table, Origin | None]:
-                rows = before.fit_transform(healthy)
-                return before, rows, origin_of(rows)
-
-            def learn() -> tuple[Pipeline, Table]:
-                known, rows, origin = remembered(memory, "steps", transformed, begins)
-                return known, of_origin(rows, origin)
-
-            before, seen = answer_once(cls, begins, 0, learn)  # without a size: the candidates keep it in any case
+            before, seen = remembered(memory, transformed_by, before, healthy)
             head = tuple(step for _, step in before.steps[:-1])
         last = fitted[-1] if is_pipeline else fitted
-        last = remembered(memory, "detector", lambda: last.fit(seen), (last, seen))
+        last = remembered(memory, fitted_to, last, seen)
         if is_pipeline:
             fitted.steps = [*before.steps[:-1], (fitted.steps[-1][0], last)]
         detector = fitted if is_pipeline else last
@@ -224,8 +222,8 @@ def _longest_window(detector: BaseEstimator) -> int:
     parts, longest = [detector], 1
     while parts:
         part = parts.pop()
-        longest = max(longest, getattr(part, "width_", 1))
-        parts += [*dict(getattr(part, "steps", ())).values(), *getattr(part, "detectors_", ())]
+        longest = max(longest, getattr(part, "width", 1))
+        parts += [*dict(getattr(part, "steps", ())).values(), *filter(None, [getattr(part, "means_", None)])]
     return longest
 
 
@@ -363,18 +361,18 @@ class Measurement:
     outliers: Any
 
     @classmethod
-    def asked(cls, fem: FittedChain, noise: Any, gaps: Any, outliers: Any) -> Measurement:
+    def asked(cls, fem: DataInformedFEM, noise: Any, gaps: Any, outliers: Any) -> Measurement:
         """Outliers may be the frequencies of the training records before these were cleaned."""
         return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
 
-    def resampled(self, fem: FittedChain, random_state: np.random.RandomState) -> Measurement:
+    def resampled(self, fem: DataInformedFEM, random_state: np.random.RandomState) -> Measurement:
         """With drawn outliers, and the gaps beside them, of other records that could have trained the chain."""
         if self.outliers is None or is_real(self.outliers):
             return self
         service = fem.recorder_.service if isinstance(self.outliers, str) else self.outliers
         return replace(self, outliers=service.resampled(random_state)) if service.has_faults else self
 
-    def of(self, fem: FittedChain, weather: Any, seed: int) -> tuple[Array, Table]:
+    def of(self, fem: DataInformedFEM, weather: Any, seed: int) -> tuple[Array, Table]:
         """Relative noise, (n_records, n_modes), and the temperatures with gaps, as frames if they are."""
         noise = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed)
         if not isinstance(self.gaps, str) or not np.isnan(as_floats(fem.records_.temperatures)).any():
@@ -389,7 +387,7 @@ class Simulation:
     """One weather, fitted detectors by name, and the frequencies before noise, (n_records, n_modes), of each draw of
     every scenario; ``reference`` gives true frequencies for a scenario and a seed."""
 
-    fem: FittedChain
+    fem: DataInformedFEM
     candidates: Mapping[str, Candidate]
     scenarios: Sequence[BaseScenario]
     T: Table
@@ -498,7 +496,7 @@ class Simulation:
         with without_warnings():
             if names:
                 return self.clean[names[0]][0]
-            return self.fem.thermal_.in_weather(self._weather, YEARS * len(self.T)).simulated()
+            return self.fem.thermal_.simulated(self._weather)
 
     def evaluate(
         self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
@@ -577,18 +575,15 @@ def transitions_of(decisions: Array, n_window: int) -> Array:
 
 
 def clean_frequencies(
-    fem: FittedChain, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0, n_years: int = YEARS
+    fem: DataInformedFEM, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0
 ) -> dict[str, list[Array]]:
-    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on.
-
-    The same chain, or others with its FE model, will simulate so many years like T in all.
-    """
-    structure, clean = fem.thermal_.in_weather(fem.weather(T), n_years * len(T)), {}
+    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
+    weather, clean = fem.weather(T), {}
     for scenario in scenarios:
         draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
         changes = [scenario.changes(T, int(draw)) for draw in draws]
         if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
-            clean[scenario.name] = structure.with_each([change["damage"] for change in changes])
+            clean[scenario.name] = fem.thermal_.with_each(weather, [change["damage"] for change in changes])
         else:
-            clean[scenario.name] = [structure.simulated(**change) for change in changes]
+            clean[scenario.name] = [fem.thermal_.simulated(weather, **change) for change in changes]
     return clean

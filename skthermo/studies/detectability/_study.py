@@ -34,7 +34,7 @@ from skthermo.studies.detectability._simulation import (
     ask_each,
     clean_frequencies,
 )
-from skthermo.surrogate import FittedChain
+from skthermo.surrogate import DataInformedFEM
 
 LEAST_REPEATS, MOST_REPEATS = 3, 20
 
@@ -132,8 +132,8 @@ class DetectabilityStudy(BaseEstimator):
         not evaluated. As float32: eight detectors, 13 scenarios, 20 repeats and 365 records are 3 MB; 17 detectors and
         a year of hours 155 MB.
     transitions_ : dict of (str, str, str) to ndarray of shape (n_repeats, n_onsets, n_window)
-        Such decisions of detectors with windows, such as `~skthermo.detection.WindowedAlarm`, after onsets of damage
-        with two windows from one to the next, while a window still holds healthy records; for `time_to_detection`.
+        Such decisions of a `~skthermo.detection.CompensatedDetector` with a window, after onsets of damage that are two
+        windows apart, while a window still holds healthy records; for `time_to_detection`.
     calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
         Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
         `ranking` moves thresholds by them; nothing else is evaluated by them. Measured records have none.
@@ -200,7 +200,7 @@ class DetectabilityStudy(BaseEstimator):
 
     def __init__(
         self,
-        fem: FittedChain,
+        fem: DataInformedFEM,
         detectors: Any,
         scenarios: Sequence[BaseScenario | Mapping[str, float]],
         *,

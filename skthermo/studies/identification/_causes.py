@@ -10,7 +10,8 @@ import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import MatrixLike, check_names, is_real, real_array
-from skthermo._core.effects import ALL_GROUPS, HIGHEST_SEVERITY, StructuralChanges, read_groups
+from skthermo.fem.damage import ALL_GROUPS, read_groups
+from skthermo.surrogate.effects import HIGHEST_SEVERITY, StructuralChanges
 
 MOST_CAUSES = 3  # largest number of causes in one explanation
 

@@ -14,7 +14,7 @@ from scipy import stats
 from scipy.special import log_ndtr, logsumexp, ndtri_exp
 
 from skthermo._core.arrays import Array
-from skthermo._core.effects import ALL_GROUPS
+from skthermo.fem.damage import ALL_GROUPS
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior
 from skthermo.studies.identification._curves import Curves, Effects, Observed
 

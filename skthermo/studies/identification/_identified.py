@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 
 from skthermo._core.arrays import Array
-from skthermo._core.effects import HIGHEST_SEVERITY
 from skthermo._core.text import SPACE, Sentences, chance_text, listed, percent, probability_text
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies._scenarios import UncertainDamage
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior
 from skthermo.studies.identification._shift import ComparedRecords
+from skthermo.surrogate.effects import HIGHEST_SEVERITY
 
 ALIKE = 0.95  # cosine between effects from which on indistinguishable causes are named together
 PHRASES = {

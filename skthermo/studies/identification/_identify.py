@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from skthermo._core.arrays import Array, MatrixLike, as_floats, as_random_state, check_jobs
-from skthermo._core.effects import FrequencyEffects, StructuralChanges
 from skthermo._core.parallel import run_jobs
 from skthermo._core.warnings import warn_each, without_warnings
 from skthermo.studies._scenarios import check_chain, checked_models
@@ -32,6 +31,7 @@ from skthermo.studies.identification._identified import (
 from skthermo.studies.identification._shapes import ShapeEffects, shape_shift
 from skthermo.studies.identification._shift import ComparedRecords, FrequencyShift, observe
 from skthermo.surrogate import refitted
+from skthermo.surrogate.effects import FrequencyEffects, StructuralChanges
 
 LISTED = 1e-3  # least probability of explanations that are listed
 N_DRAWS = 500
@@ -153,7 +153,7 @@ def identify_damage(
     seen = observe(fem, T, F, noise)
 
     def beside(chain: Any, theta: Array) -> ShiftComparison:
-        effects = FrequencyEffects.of(chain, theta, seen.frequencies, changes)
+        effects = FrequencyEffects.averaged(chain, theta, seen.frequencies, changes)
         return compared(effects, seen.shift, shapes, dofs, shape_noise)
 
     def scale_of(every: ShiftComparison) -> Scale:

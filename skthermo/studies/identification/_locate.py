@@ -14,10 +14,10 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._core.arrays import Array, as_random_state
-from skthermo._core.effects import FrequencyEffects, StructuralChanges, read_groups
 from skthermo._core.warnings import reported_by_caller, warn_user, without_warnings
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import Structure
+from skthermo.fem.damage import read_groups
 from skthermo.studies._scenarios import check_chain
 from skthermo.studies.identification._causes import SOMETHING_ELSE, Cause, DamagePrior
 from skthermo.studies.identification._curves import Curves, Observed
@@ -27,6 +27,7 @@ from skthermo.studies.identification._identify import compared, identify_damage
 from skthermo.studies.identification._located import LIKELY, Explained, LocatedDamage, Places, fewest, located_damage
 from skthermo.studies.identification._shift import FrequencyShift, observe
 from skthermo.surrogate import with_model
+from skthermo.surrogate.effects import FrequencyEffects, StructuralChanges
 
 MOST_PIECES, MOST_SLOW_PIECES = 16, 8
 """Into how many pieces a group is divided first; fewer for models that are slow to solve."""
@@ -368,7 +369,7 @@ class MeasuredShift:
         twin = with_model(self.fem, self.structure.divide(self.fem.model, question.parts))
         changes = StructuralChanges.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
-        effects = FrequencyEffects.of(twin, self.theta, mode_is_known, changes)
+        effects = FrequencyEffects.averaged(twin, self.theta, mode_is_known, changes)
         with reported_by_caller(["foreign-shapes"]):
             comparison = compared(effects, self.shift, self.shapes, self.dofs, self.shape_noise)
         observed = comparison.observed(self.prior.model_error)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._core.arrays import Array, as_floats, check_dofs
-from skthermo._core.effects import ChangedStructure, central_differences
 from skthermo._core.warnings import warn_user
 from skthermo.exceptions import RecordsWarning
 from skthermo.studies.identification._curves import Part
 from skthermo.studies.identification._shift import stated_deviations
+from skthermo.surrogate.effects import ChangedStructure, amount_slopes
 
 STATES = ("healthy", "damaged")
 ALIKE = 0.5  # MAC of a measured healthy shape with the model's below which it counts as another mode
@@ -81,7 +81,7 @@ class ShapeEffects:
             change, slopes = self._across(turned), np.moveaxis(self._across(d_turned), 0, -1)
         else:
             change = np.stack([self._changed(row) for row in sets])
-            slopes = np.stack([central_differences(self._changed, row) for row in sets])
+            slopes = np.stack([amount_slopes(self._changed, row) for row in sets])
         return (change[0], slopes[0]) if np.ndim(amounts) == 1 else (change, slopes)
 
     def _changed(self, amounts: Array) -> Array:

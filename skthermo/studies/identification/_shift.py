@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from skthermo._core.arrays import Array, as_floats, check_noise, means_of_known, median, robust_deviation
-from skthermo._core.effects import healthy_frequencies
 from skthermo._core.estimators import check_array
 from skthermo._core.frames import has_stamps, row_times
 from skthermo._core.text import capital, counted, listed, significant
@@ -27,6 +26,7 @@ from skthermo.exceptions import (
 from skthermo.preprocessing import set_aside
 from skthermo.residuals.baseline import PSEUDO_RECORDS, Scatter
 from skthermo.residuals.weather import FAR_OUTSIDE
+from skthermo.surrogate.effects import healthy_frequencies
 
 FEWEST_TO_COMPARE = 8  # records among which one may be called far from the others
 OF_WEATHER = 0.05  # how much the effect of damage may differ from weather to weather, relative to it

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
 from numbers import Integral, Real
 from typing import Any, Literal, Self, TypedDict, Unpack, overload
 
@@ -28,6 +27,7 @@ from skthermo._core.arrays import (
     check_model,
     is_auto,
     is_real,
+    tolerance,
 )
 from skthermo._core.estimators import (
     CallbackSupport,
@@ -40,7 +40,6 @@ from skthermo._core.estimators import (
     check_array,
     check_is_fitted,
     check_takes_weights,
-    fit_weighted,
     inputs_of_last_step,
     last_step,
     offers,
@@ -49,42 +48,36 @@ from skthermo._core.estimators import (
     seeded,
     validate_data,
 )
-from skthermo._core.frames import (
-    Table,
-    check_same_rows,
-    column_names,
-    frame_like,
-    like_targets,
-    row_weights,
-)
-from skthermo._core.memory import remembered
+from skthermo._core.frames import Table, check_same_rows, column_names, frame_like, like_targets, row_weights
 from skthermo._core.saved_frames import SavesFrames
-from skthermo._core.warnings import findings_of, warn_each, warn_user
+from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import BiasAligner, RecordFindings, check_records, set_aside
-from skthermo.residuals.weather import SensorRegression, TrainingRange, misplaced_columns
-from skthermo.surrogate._regression import TemperatureMapper
-from skthermo.surrogate._simulator import Simulator, tolerance
-from skthermo.surrogate.chain._fit_report import FittedChain, mode_warnings, report_of
+from skthermo.preprocessing import BiasAligner
+from skthermo.residuals.weather import SensorRegression, TrainingRange
+from skthermo.surrogate._regression import TemperatureMapper, fit_checked
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate.chain._fit_report import report_of
+from skthermo.surrogate.chain._inverting import doubts_of_shapes, invert, prepare, take_noise, with_shapes
 from skthermo.surrogate.chain._records import (
-    RecordSimulator,
+    CheckedRecords,
     TrainingRecords,
+    checked_records,
     frequency_table,
     measurement_noise,
-    without_outliers,
 )
-from skthermo.surrogate.chain._stages import (
-    ChainInverse,
+from skthermo.surrogate.chain._service import RecordSimulator
+from skthermo.surrogate.chain._thermal import (
     Discrepancy,
     ThermalModel,
     Weather,
-    frequencies_of,
+    doubts_of_factors,
     limits_in_weather,
     possible,
     ratio_regressor,
 )
+from skthermo.surrogate.effects import damage_directions
 from skthermo.surrogate.inverse import PosteriorInverse
 
 
@@ -187,10 +180,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     deal with it in another way. If temperatures are a frame, results are frames. A row that cannot be computed, such as
     one without any temperature, is NaN; no row is dropped.
 
-    A mapper with a method ``predict_covariance(X)``, (n_samples, n_parameters, n_parameters), such as one that has
-    learned from a fleet, makes standard deviations and intervals as wide as it is uncertain. With ``reach_``, a range
-    of weather, and ``from_fleet(X)``, a mask of rows, it says where it is based on records of others. See
-    :doc:`/guide/records_theory`, :doc:`/guide/estimation` and :doc:`/guide/uncertainty`.
+    A mapper whose ``predict`` takes ``return_std``, such as ``TemperatureMapper(BayesianRidge())`` or one that has
+    learned from a fleet, makes standard deviations and intervals as wide as it is uncertain; errors of different
+    parameters count as independent. With ``reach_``, a range of weather, and ``from_fleet(X)``, a mask of rows, a
+    mapper says where it is based on records of others. See :doc:`/guide/records_theory`, :doc:`/guide/estimation` and
+    :doc:`/guide/uncertainty`.
 
     Examples
     --------
@@ -291,31 +285,34 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         F, self.y_is_vector_ = frequency_table(y)
-        given = T, frame_like(F, check_array(F, **options))
-        found = set_aside(*given, model=self.model, needs_all=True)
-        T, F = found.temperatures, found.frequencies
+        records = checked_records(T, frame_like(F, check_array(F, **options)), self.model, self.memory)
+        T, F, usable = records.temperatures, records.frequencies, records.usable
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
-        inverse = self._clone_parts(shapes)
-        weights = row_weights(sample_weight, X)
+        self._clone_parts(records, has_shapes=shapes is not None)
+        inverse, mapper, weights = self.inverse_, self.mapper_, row_weights(sample_weight, X)
         if weights is not None:
-            check_takes_weights(self.mapper_)
-        findings = self._look_at(T, F, given)
-        filled, usable = frame_like(T, self.sensors_.fill(T)[0]), without_outliers(findings, F)
+            check_takes_weights(mapper)
         stages = Stages(self, 5, X, y)
-        with stages.stage("noise"):
-            self.noise_ = measurement_noise(self.mapper_, filled, usable)
-        with stages.stage("inverse", self.inverse_):
+        with collected(), stages.stage("noise"):
+            self.sensors_ = SensorRegression.of(T)
+            filled = frame_like(T, self.sensors_.fill(T)[0])
+            self.noise_ = measurement_noise(mapper, filled, usable)
+        with collected() as findings, stages.stage("inverse", inverse):
             complete = usable if self.imputer_ is None else imputed(self.imputer_, T, usable)
-            aligned = inverse.with_shapes(self.aligner_.fit(complete).transform(complete), shapes)
-            inverse.fit(aligned, self.noise_)
+            aligned = with_shapes(inverse, self.aligner_.fit(complete).transform(complete), shapes)
+            take_noise(inverse, self.noise_)
+            inverse.fit(aligned)
         with stages.stage("parameters of the records"):
-            parameters = inverse.invert(aligned, self.parameter_names_)
-            warn_each(() if shapes is None else inverse.shape_warnings(aligned, parameters.theta))
-        with stages.stage("temperature mapper", self.mapper_):
-            fit_weighted(self.mapper_, filled, named(filled, parameters.theta, self.parameter_names_), weights)
-        with stages.stage("discrepancy and report"):
-            self._hold(recorder_of(self, inverse, T, F, filled, usable, parameters.theta, weights))
-            self.report_ = report_of(self, parameters, findings)
+            found = invert(inverse, aligned, self.parameter_names_)
+            findings += found.findings
+            if shapes is not None:
+                findings += doubts_of_shapes(last_step(inverse), aligned, found.theta)
+        with collected() as of_mapper, stages.stage("temperature mapper", mapper):
+            fit_checked(mapper, filled, named(filled, found.theta, self.parameter_names_), weights)
+        with collected() as of_model, stages.stage("discrepancy and report"):
+            self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
+            findings = [*records.doubts(self.mapper is None), *findings, *of_mapper, *of_model]
+            self.report_ = report_of(self, found, records.findings, findings)
         stages.end()
         warn_each(self.report_.warnings())
         return self
@@ -348,7 +345,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """
         check_is_fitted(self)
         measured = frame_like(F, check_array(F, dtype=np.float64))
-        inputs = ChainInverse(self.inverse_).with_shapes(self.aligner_.transform(measured), shapes)
+        inputs = with_shapes(self.inverse_, self.aligner_.transform(measured), shapes)
         return frame_like(F, as_floats(self.inverse_.transform(inputs)), self.parameter_names_)
 
     @overload
@@ -376,8 +373,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             records, or a sensor departs from what the others predict; `predict`, `predict_interval` and `simulate`
             warn of the same.
         """
-        weather = self.weather(X)
-        return frame_like(X, self.thermal_.parameters(weather), self.parameter_names_)
+        with collected() as findings:
+            weather = self.weather(X)
+        warn_each(findings + self.thermal_.doubts(weather))
+        return frame_like(X, weather.theta, self.parameter_names_)
 
     @overload
     def predict(self, X: pd.DataFrame, return_std: Literal[False] = False) -> pd.DataFrame: ...
@@ -407,43 +406,19 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         std : ndarray or DataFrame of shape (n_samples, n_modes)
             Only with ``return_std``: root mean square differences between measured and predicted frequencies in similar
             weather, out of fold, in Hz. They contain the scatter of the measurement, what a missing temperature costs,
-            and what `predict_covariance` says where the mapper knows it.
+            and the standard deviations of the mapper, if it states some.
         """
-        weather = self.weather(X)
-        frequencies = self.thermal_.simulated(weather)
+        has_std = check_flag(return_std, "return_std")
+        with collected() as findings:
+            weather = self.weather(X)
+            frequencies = self.thermal_.simulated(weather)
+            if has_std:
+                residuals = self.recorder_.residuals
+                deviations = np.hypot(residuals.spread(weather.inputs), self.thermal_.known_deviations(weather))
+                findings += residuals.findings
+        warn_each(findings + self.thermal_.doubts(weather))
         predicted = self._as_targets(X, frequencies)
-        if not check_flag(return_std, "return_std"):
-            return predicted
-        deviations = np.hypot(self.recorder_.residuals.spread(weather.inputs), self.thermal_.known_deviations(weather))
-        return predicted, self._as_targets(X, frequencies * deviations)
-
-    def predict_covariance(self, X: ArrayLike) -> Array:
-        """Covariance of predicted frequencies, because the temperature mapper is uncertain.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius.
-
-        Returns
-        -------
-        ndarray of shape (n_samples, n_modes, n_modes)
-            In Hz squared, in the measured domain, to first order: G C G' with the mapper's covariance C of the
-            parameters and G = d f / d theta, times the discrepancy. It is without the scatter of the measurement;
-            errors of records in similar weather do not average out.
-
-        Raises
-        ------
-        ValueError
-            If the mapper does not state how uncertain it is.
-        """
-        check_is_fitted(self)
-        if not offers(self.mapper_, "predict_covariance"):
-            raise ValueError(
-                f"{type(last_step(self.mapper_)).__name__} does not state how uncertain it is; expected a mapper with "
-                "predict_covariance, such as FleetPrior().fit(bridges).mapper()"
-            )
-        return self.thermal_.predicted_covariance(self.weather(X))
+        return (predicted, self._as_targets(X, frequencies * deviations)) if has_std else predicted
 
     @overload
     def predict_interval(self, X: pd.DataFrame, confidence: float = 0.9) -> tuple[pd.DataFrame, pd.DataFrame]: ...
@@ -491,10 +466,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """
         if not is_real(confidence) or not 0 < confidence < 1:
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
-        weather = self.weather(X)
-        frequencies, residuals = self.thermal_.simulated(weather), self.recorder_.residuals
-        margin = residuals.quantiles(confidence) * residuals.spread(weather.inputs)
-        margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self.thermal_.known_deviations(weather))
+        with collected() as findings:
+            weather, residuals = self.weather(X), self.recorder_.residuals
+            frequencies = self.thermal_.simulated(weather)
+            margin = residuals.quantiles(confidence) * residuals.spread(weather.inputs)
+            margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self.thermal_.known_deviations(weather))
+            findings += residuals.findings
+        warn_each(findings + self.thermal_.doubts(weather))
         lowest = frequencies * np.maximum(1 - margin, 0.0)
         return self._as_targets(X, lowest), self._as_targets(X, frequencies * (1 + margin))
 
@@ -562,10 +540,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         UserWarning
             If a factor is above 10, which may be meant in percent.
         """
-        weather = self.weather(X)
         changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
-        frequencies = self.thermal_.simulated(weather, **changes)
-        frequencies *= 1 + self.recorder_.noise(weather, noise, gaps, outliers, random_state)
+        with collected() as findings:
+            weather = self.weather(X)
+            frequencies = self.thermal_.simulated(weather, **changes)
+            frequencies *= 1 + self.recorder_.noise(weather, noise, gaps, outliers, random_state)
+            if isinstance(noise, str):
+                findings += self.recorder_.residuals.findings
+        warn_each(findings + self.thermal_.doubts(weather) + doubts_of_factors(parameters))
         return frame_like(X, frequencies, self.mode_names_)
 
     def weather(self, X: ArrayLike) -> Weather:
@@ -579,12 +561,32 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         Weather
-            With the temperatures that are ``given`` and ``filled`` from the other sensors, and the ``inputs`` of M2.
+            With the temperatures that are ``given`` and ``filled`` from the other sensors, the ``inputs`` of M2, and
+            what it gives.
         """
         check_is_fitted(self)
-        values = validate_data(self, X, dtype=np.float64, reset=False)
-        filled, deviations = self.sensors_.fill(values)
-        return Weather(X, frame_like(X, filled), deviations, self.mapper_)
+        return self.thermal_.weather(X, validate_data(self, X, dtype=np.float64, reset=False))
+
+    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+
+        Returns
+        -------
+        DataFrame of shape (n_groups, n_modes)
+            Derivatives of ln f by the severity at the mean of the learned parameters, in the measured domain, with the
+            names of the modes. Groups that move no frequency are left out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, or none moves a frequency.
+        """
+        return damage_directions(self, groups)
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far the inputs of M2 are outside the training range, row by row.
@@ -602,7 +604,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             weather that only the fleet has seen.
         """
         weather = self.weather(X)
-        excess = pd.DataFrame(self.training_range_.excess(weather.columns), columns=self.training_range_.names)
+        excess = pd.DataFrame(self.training_range_.excess(weather.inputs), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
         if offers(self.mapper_, "from_fleet"):
             return excess.assign(from_fleet=rows_from_fleet(self.mapper_, weather.filled))
@@ -623,8 +625,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Returns
         -------
         float
-            NaN if fewer than two rows are complete. A warning counts the rows scored if they are fewer than half;
-            `~skthermo.metrics.frequency_scorer` always reports their share.
+            NaN if fewer than two rows are complete. There is a warning if fewer than half of the rows are scored;
+            `~skthermo.metrics.frequency_scorer` reports their share.
         """
         check_is_fitted(self)
         check_same_rows(X, y, ("temperatures", "frequencies"))
@@ -636,12 +638,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         predicted = self.predict(X)
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
-            warn_user(
-                f"the score is of {scored} of {len(predicted)} rows: the others have gaps. Compare scores of the same "
-                "rows only",
-                UnevaluatedRowsWarning,
-                "rows-not-scored",
-            )
+            text = "the score leaves out most rows, which have gaps. Compare scores of the same rows only"
+            warn_each([UnevaluatedRowsWarning(text, "rows-not-scored")])
         return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):
@@ -664,30 +662,46 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         part = getattr(self, name)
         return self._default_part(name) if part is None or is_auto(part) else clone(part)
 
-    def _clone_parts(self, shapes: ArrayLike | None) -> ChainInverse:
-        """Clone inverse, mapper, aligner and imputer, with the model, and seeds where they have none; the inverse."""
+    def _clone_parts(self, records: CheckedRecords, *, has_shapes: bool) -> None:
+        """Clone inverse, mapper, aligner and imputer, with the model, means of earlier temperatures, and seeds."""
         tolerance(self.model, self.reduce)
         self.inverse_, self.mapper_ = self._part("inverse"), self._part("mapper")
         self.aligner_ = with_reference(None if self.aligner == "passthrough" else self._part("aligner"), self.model)
         self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
-        inverse = ChainInverse(self.inverse_)
-        inverse.prepare(self.model, self.memory, self.reduce, has_shapes=shapes is not None)
+        prepare(self.inverse_, self.model, self.memory, self.reduce, has_shapes=has_shapes)
         random_state = seeded(self.random_state)
         for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
             if part is not None:
                 seed_parts(part, random_state)
-        return inverse
-
-    def _look_at(self, T: Table, F: Table, given: tuple[Table, Table]) -> RecordFindings:
-        """Check the records, with warnings; learn how sensors go together, and which means M2 needs by default."""
-        mended = {"frequency-outliers"} | ({"slow-temperatures"} if self.mapper is None else set())
-        findings = findings_of(partial(known_findings, self.memory), *given, mended=mended)
-        warn_each([*misplaced_columns(T, F), *mode_warnings(self.model, F)])
-        self.sensors_ = SensorRegression.of(T)
-        means = getattr(findings.memory, "features", None)  # of earlier temperatures that the frequencies remember
-        if self.mapper is None and means is not None and set(means.sensors) <= set(column_names(T, "T")):
+        if self.mapper is None and (means := records.means_of_earlier_temperatures()) is not None:
             self.mapper_ = make_pipeline(means, self.mapper_)
-        return findings
+
+    def _recorder(
+        self, T: Table, F: Table, filled: Table, usable: Table, theta: Array, weights: Array | None
+    ) -> RecordSimulator:
+        """What predicts and draws records, once the mapper has learned theta."""
+        inputs = inputs_of_last_step(self.mapper_, filled)
+        learned, posterior = possible(self.mapper_.predict(filled))[0], last_step(self.inverse_)
+        is_shared = isinstance(posterior, PosteriorInverse) and posterior.model is self.model
+        simulator = Simulator.around(self.model, learned, self.reduce, posterior.simulator_ if is_shared else None)
+        modelled = as_floats(self.aligner_.inverse_transform(simulator.frequencies(learned, self.n_jobs)))
+        records = TrainingRecords(
+            T, F, as_floats(inputs), theta, learned, as_floats(usable), modelled, weights, self.parameter_names_
+        )
+        parts = {"sensors": self.sensors_, "mapper": self.mapper_}
+        regressor = self._part("discrepancy")
+        thermal = ThermalModel(
+            simulator=simulator,
+            aligner=self.aligner_,
+            discrepancy=Discrepancy.fitted(regressor, records.inputs, records.ratios, weights, **parts),
+            training_range=TrainingRange.of(inputs, records.trained),
+            limits=limits_in_weather(theta),
+            parameter_names=self.parameter_names_,
+            mode_names=self.mode_names_,
+            n_jobs=self.n_jobs,
+            **parts,
+        )
+        return RecordSimulator(thermal, records)
 
     def _hold(self, recorder: RecordSimulator) -> Self:
         """Hold what was learned, and its parts by the names that users know."""
@@ -701,11 +715,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     def _as_targets(self, X: Table, frequencies: Array) -> Any:
         """Frequencies as a vector if the training frequencies were one, else as a table like X."""
         return like_targets(X, frequencies, self.mode_names_, is_vector=self.y_is_vector_)
-
-
-def known_findings(memory: str | Memory | None, T: Table, F: Table) -> RecordFindings:
-    """What `check_records` finds, read from the memory if these records were checked before."""
-    return remembered(memory, "checks", partial(check_records, T, F), (T, F))
 
 
 def with_reference(aligner: BaseEstimator | None, model: FEModel) -> BaseEstimator:
@@ -730,49 +739,8 @@ def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)
 
 
-def recorder_of(
-    chain: DataInformedFEM,
-    inverse: ChainInverse,
-    T: Table,
-    F: Table,
-    filled: Table,
-    usable: Table,
-    theta: Array,
-    weights: Array | None,
-) -> RecordSimulator:
-    """What predicts and draws records, of a chain whose mapper has learned theta."""
-    mapper, aligner, names = chain.mapper_, chain.aligner_, chain.parameter_names_
-    inputs, learned = inputs_of_last_step(mapper, filled), possible(mapper.predict(filled))[0]
-    known = getattr(inverse.posterior, "simulator_", None)
-    simulator = Simulator.around(chain.model, learned, chain.reduce, known)
-    records = TrainingRecords(
-        temperatures=T,
-        frequencies=F,
-        inputs=as_floats(inputs),
-        targets=theta,
-        learned=learned,
-        usable=as_floats(usable),
-        modelled=frequencies_of(simulator, aligner, learned, chain.n_jobs),
-        weights=weights,
-        parameter_names=names,
-    )
-    parts = {"mapper": mapper, "sensors": chain.sensors_}
-    thermal = ThermalModel(
-        simulator=simulator,
-        aligner=aligner,
-        discrepancy=Discrepancy.of(chain._part("discrepancy"), records.ratios, records.folds, **parts),
-        training_range=TrainingRange.of(inputs, records.trained),
-        limits=limits_in_weather(theta),
-        parameter_names=names,
-        mode_names=chain.mode_names_,
-        n_jobs=chain.n_jobs,
-        **parts,
-    )
-    return RecordSimulator(thermal, records)
-
-
 def refitted(
-    fem: FittedChain,
+    fem: DataInformedFEM,
     X: ArrayLike | None = None,
     y: ArrayLike | None = None,
     *,
@@ -829,7 +797,7 @@ def refitted(
     return chain.fit(T if X is None else X, F if y is None else y, sample_weight=weights)
 
 
-def resampled(fem: FittedChain, random_state: int | np.random.RandomState | None = None) -> DataInformedFEM:
+def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | None = None) -> DataInformedFEM:
     """A chain that has learned other records, as its structure could have given them in the training weather.
 
     Such chains differ from this one as it differs from the structure, if its model is right.
@@ -851,7 +819,7 @@ def resampled(fem: FittedChain, random_state: int | np.random.RandomState | None
     -----
     A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
     weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
-    correlated. Nothing is inverted, and what the discrepancy learns counts as much as in the chain.
+    correlated. Nothing is inverted.
 
     Examples
     --------
@@ -864,18 +832,21 @@ def resampled(fem: FittedChain, random_state: int | np.random.RandomState | None
     True
     """
     check_is_fitted(fem)
-    records = fem.records_.resampled(fem.recorder_.residuals, fem.discrepancy_, as_random_state(random_state))
-    filled = frame_like(records.temperatures, fem.sensors_.fill(records.temperatures)[0])
-    targets = named(filled, records.targets, fem.parameter_names_)
-    mapper = fit_weighted(clone(fem.mapper_), filled, targets, records.weights)
-    learned = possible(mapper.predict(filled))[0]
-    records = replace(records, learned=learned, modelled=fem.thermal_.frequencies(learned))
-    discrepancy = fem.discrepancy_.again(records.ratios, mapper)
+    with collected():
+        records = fem.records_.resampled(fem.recorder_.residuals, fem.discrepancy_, as_random_state(random_state))
+        filled = frame_like(records.temperatures, fem.sensors_.fill(records.temperatures)[0])
+        targets = named(filled, records.targets, fem.parameter_names_)
+        mapper = fit_checked(clone(fem.mapper_), filled, targets, records.weights)
+        learned = possible(mapper.predict(filled))[0]
+        records = replace(records, learned=learned, modelled=fem.thermal_.frequencies(learned))
+        parts = {"sensors": fem.sensors_, "mapper": mapper}
+        known = records.inputs, records.ratios, records.weights
+        discrepancy = Discrepancy.fitted(fem.discrepancy_.regressor, *known, **parts)
     thermal = replace(fem.thermal_, mapper=mapper, discrepancy=discrepancy)
     return copy(fem)._hold(RecordSimulator(thermal, records, fem.recorder_.service))
 
 
-def with_model(fem: FittedChain, model: FEModel) -> DataInformedFEM:
+def with_model(fem: DataInformedFEM, model: FEModel) -> DataInformedFEM:
     """A fitted chain with another model of the same frequencies, such as one with divided damage groups.
 
     Parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from numbers import Integral, Real
 from typing import Literal, overload
 
@@ -25,16 +24,11 @@ from skthermo._core.estimators import (
 )
 from skthermo._core.frames import frame_like
 from skthermo._core.memory import remembered
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import FewRecordsWarning, ModelWarning
+from skthermo._core.warnings import collected, warn_each
+from skthermo.exceptions import FewRecordsWarning, ModelWarning, SkthermoWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample
 from skthermo.metrics.errors import complete_r2
 from skthermo.surrogate._regression import FrequencyInverse, MultiplierRegressor, default_network
-
-N_HELD_OUT = 500  # simulations that a score is of
-HELD_OUT_SEED = 20_260_000  # of them: the same for all settings that are compared
-NEAR_HALF_WIDTHS = 2.0  # from the middle, up to which parameters are near the bounds: a regressor extrapolates there
-MANY_FAR_ROWS = 0.05  # share of rows far outside the bounds that gives a warning
 
 
 class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
@@ -72,8 +66,12 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     ----------
     regressor_ : regressor
         Fitted to standardised log frequencies (inputs) and standardised log parameters (outputs).
-    inputs_, targets_ : Standardiser
+    inputs_, targets_ : StandardScaler
         Means and scales of the log frequencies and of the log parameters.
+    log_inputs_, log_targets_ : bool
+        Whether logarithms are standardised: where all frequencies, and all parameters, are positive.
+    findings_ : list of SkthermoWarning
+        What is doubtful about model and samples.
     samples_ : Bunch
         ``theta`` and ``frequencies`` of the training samples, before noise.
     bounds_ : ndarray of shape (n_parameters, 2) or None
@@ -171,13 +169,16 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         """
         random_state = 0 if self.random_state is None and self.memory is not None else self.random_state
         random = check_random_state(random_state)
+        self.findings_: list[SkthermoWarning] = []
         if self.model is not None:
             check_model(self.model)
             stated = 0.0 if isinstance(self.noise, str) else self.noise
             self.noise_ = check_noise(stated, self.model.n_modes, getattr(X, "columns", None))
         if self.model is not None and y is None:
             self._check_columns(X)
-            inputs, theta = self._simulated(random)
+            with collected() as self.findings_:
+                inputs, theta = self._simulated(random)
+            self.findings_ += self._doubts_of_size()
         else:
             inputs, theta = self._read_xy(X, y, ("frequencies", "theta"))
             self.bounds_, self.samples_ = None, Bunch(theta=theta, frequencies=inputs)
@@ -185,7 +186,8 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
                 check_theta(theta, self.model.parameter_names, allow_nan=True)
                 self.parameter_names_ = list(self.model.parameter_names)
         seed = None if random_state is None else random
-        self._learn(inputs, theta, seed, log_inputs=True, memory=self.memory)
+        self._learn(inputs, theta, random_state=seed, log_inputs=True, memory=self.memory)
+        warn_each(self.findings_)
         return self
 
     @overload
@@ -233,9 +235,9 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
             If more than 5 % of the rows give parameters that are farther outside the bounds than half the width of
             the box.
         """
-        theta = self._predict_arrays(X)[0]
+        theta = self._regress(self._inputs(X))[0]
         if self.bounds_ is not None:
-            warn_user(far_outside_text(theta, self.bounds_, self.parameter_names_), ModelWarning, "outside-bounds")
+            warn_each(far_outside(theta, self.bounds_, self.parameter_names_))
         return frame_like(X, theta, self.get_feature_names_out())
 
     def score(
@@ -286,8 +288,8 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
             return super().score(X, y, sample_weight)
         if self.bounds_ is None:
             raise ValueError("InverseSurrogate has learned from given parameters, not simulations; expected y to score")
-        random = np.random.RandomState(HELD_OUT_SEED)
-        samples = self._drawn(N_HELD_OUT, random)
+        random = np.random.RandomState(20_260_000)  # the same simulations for all settings that are compared
+        samples = self._drawn(500, random)
         noisy = add_noise(samples.frequencies, self.noise_, random_state=random)
         return complete_r2(np.log(samples.theta), np.log(self._regress(noisy)[0]))
 
@@ -313,24 +315,28 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
 
     def _simulated(self, random: np.random.RandomState) -> tuple[Array, Array]:
         """Noisy frequencies and parameters of simulations in the box."""
-        names = tuple(self.model.parameter_names)
-        if len(names) > self.model.n_modes:
-            warn_user(
-                f"{len(names)} parameters and {self.model.n_modes} modes: frequencies cannot distinguish all "
-                "parameters. Use more modes or fewer parameters, or a PosteriorInverse",
-                FewRecordsWarning,
-                "underdetermined",
-            )
-        self.bounds_ = check_bounds(self.bounds, names)
-        self.parameter_names_, self.y_is_vector_ = list(names), False
+        self.parameter_names_, self.y_is_vector_ = list(self.model.parameter_names), False
+        self.bounds_ = check_bounds(self.bounds, self.parameter_names_)
         self.samples_ = self._drawn(self.n_samples, random)
         return add_noise(self.samples_.frequencies, self.noise_, random_state=random), self.samples_.theta
 
     def _drawn(self, n_samples: int, random: np.random.RandomState) -> Bunch:
         """Samples in the box; read from the memory if they are there."""
-        settings = (self.bounds_, n_samples, random.randint(np.iinfo(np.int32).max))
-        draw = partial(sample, self.model, *settings[:2], n_jobs=self.n_jobs, random_state=settings[2])
-        return remembered(self.memory, "simulations", draw, (self.model, settings))
+        seed = random.randint(np.iinfo(np.int32).max)
+        settings = self.model, self.bounds_, n_samples, seed, self.n_jobs
+        return remembered(self.memory, drawn_samples, *settings, ignore=["n_jobs"])
+
+    def _doubts_of_size(self) -> list[SkthermoWarning]:
+        n_parameters, n_modes = len(self.parameter_names_), self.model.n_modes
+        if n_parameters <= n_modes:
+            return []
+        return [
+            FewRecordsWarning(
+                f"{n_parameters} parameters and {n_modes} modes: frequencies cannot distinguish all parameters. Use "
+                "more modes or fewer parameters, or a PosteriorInverse",
+                "underdetermined",
+            )
+        ]
 
     def _check_columns(self, X: ArrayLike | None) -> None:
         """Check number and names of the columns; without X, they are those of an array."""
@@ -338,24 +344,37 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         if found != self.model.n_modes:
             raise ValueError(f"X has {found} columns; expected the {self.model.n_modes} modes of {self.model!r}")
 
-    def _predict_arrays(self, X: ArrayLike, return_std: bool = False) -> tuple[Array, Array]:
+    def _inputs(self, X: ArrayLike) -> Array:
         check_is_fitted(self)
-        return self._regress(self._positive(X, None if self.inputs_.log else 0), return_std)
+        return self._positive(X, None if self.log_inputs_ else 0)
 
 
-def far_outside_text(theta: Array, bounds: Array, names: Sequence[str]) -> str:
-    """Text of the warning if many rows have parameters far outside the bounds, else an empty string."""
+def drawn_samples(model: FEModel, bounds: Array, n_samples: int, seed: int, n_jobs: int | None) -> Bunch:
+    """Random samples in a box, as a memory keeps them."""
+    return sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
+
+
+def far_outside(
+    theta: Array, bounds: Array, names: Sequence[str], *, near: float = 2.0, many: float = 0.05
+) -> list[SkthermoWarning]:
+    """The finding that many rows have parameters far outside the bounds, where a regressor extrapolates.
+
+    Parameters are ``near`` up to so many half-widths of the box from its middle; ``many`` is a share of the rows.
+    """
     known, middle, half = theta[~np.isnan(theta).any(axis=1)], bounds.mean(axis=1), np.diff(bounds, axis=1)[:, 0] / 2
-    least = np.maximum(middle - NEAR_HALF_WIDTHS * half, bounds[:, 0] / 2)  # positive
-    far = (known < least) | (known > middle + NEAR_HALF_WIDTHS * half)
+    least = np.maximum(middle - near * half, bounds[:, 0] / 2)  # positive
+    far = (known < least) | (known > middle + near * half)
     rows = far.any(axis=1)
-    if not rows.size or rows.mean() <= MANY_FAR_ROWS:
-        return ""
+    if not rows.size or rows.mean() <= many:
+        return []
     worst = int(far.sum(axis=0).argmax())
     values, (lowest, highest) = known[far[:, worst], worst], bounds[worst]
-    return (
-        f"{rows.sum()} of {rows.size} rows give parameters farther outside the bounds than half their width. "
-        f"{names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, with bounds "
-        f"{lowest:.6g} to {highest:.6g}. Give frequencies in Hz in the order of the model's modes, wider bounds, "
-        "or the noise of the measurement"
-    )
+    return [
+        ModelWarning(
+            f"{rows.sum()} of {rows.size} rows give parameters farther outside the bounds than half their width. "
+            f"{names[worst]!r} is {values.min():.3g} to {values.max():.3g} in {len(values)} rows, with bounds "
+            f"{lowest:.6g} to {highest:.6g}. Give frequencies in Hz in the order of the model's modes, wider bounds, "
+            "or the noise of the measurement",
+            "outside-bounds",
+        )
+    ]

@@ -17,10 +17,12 @@ from sklearn.utils import Bunch
 
 from skthermo._core.arrays import (
     Array,
+    Reduce,
     check_flag,
     check_model,
     check_noise,
     check_prior,
+    is_auto,
     robust_deviation,
     spread_evenly,
     tolerance,
@@ -38,7 +40,7 @@ from skthermo._core.frames import column_names, frame_like, row_times
 from skthermo._core.memory import remembered
 from skthermo._core.parallel import with_progress
 from skthermo._core.text import listed, percent
-from skthermo._core.warnings import warn_user
+from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
 from skthermo.fem import FEModel, evaluate
 from skthermo.fem.affine import ResponseSurface, n_terms
@@ -50,29 +52,14 @@ from skthermo.surrogate.inverse._steps import (
     Objective,
     Refined,
     ShapeInputs,
+    deviations,
     information,
     minimise,
     refine,
 )
-from skthermo.surrogate.inverse._steps import deviations as deviations_of
 
-N_TEACHING = 300  # records, spread evenly, that teach prior and noise
-FEWEST_TEACHING = 10  # below which a warning is given
-N_PASSES = 4  # of linearising the model at what is known of these records, and learning from that
-LONGEST_MOVE = 1.0  # of ln theta of a record from one of these passes to the next
-FEWEST_RUNS, MOST_RUNS = 200, 600  # of a program without derivatives, in each of two rounds
-RUNS_PER_TERM = 3  # of a cubic surface
-EXACT, EXACT_WITH_GAPS = 1e-6, 1e-3
-"""Relative standard deviation of frequencies that count as exact. Where modes are missing, many parameters fit the
-others, and this noise lets steps move along the curve of these parameters."""
+LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the relative noise that records teach
 MOST_STEPS = 100  # of each row
-CHUNKS_PER_BLOCK = 8  # of the model, that are refined together: few, so that progress is visible
-MANY = 0.01  # share of rows that have not converged, or that the full model solves, above which a warning is given
-FIRST_DEVIATION, FIRST_NOISE = 0.03, 0.01  # of ln theta and of ln f, before records are known
-MOVED = 1e-3, 3.0  # range of the deviations of ln theta
-LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the noise
-SHARE_OF_STEPS = 0.1  # least noise as a share of the scatter of the differences of successive records
-FAR = 5.0  # standard deviations beyond which a frequency teaches nothing
 
 
 @dataclass(frozen=True)
@@ -122,17 +109,17 @@ class LinearRecords:
     slopes: Array
 
     @classmethod
-    def of(cls, local: Local, missing: NDArray[np.bool_]) -> LinearRecords:
-        """Of an objective and its linear model at some ln theta."""
+    def around(cls, local: Local, missing: NDArray[np.bool_]) -> LinearRecords:
+        """Records by the linear model of an objective at some ln theta."""
         values = local.residual + np.einsum("smp,sp->sm", local.sensitivity, local.x)
         usable = ~missing & np.isfinite(values) & np.isfinite(local.sensitivity).all(axis=2)
         return cls(np.where(usable, values, np.nan), np.where(usable[:, :, np.newaxis], local.sensitivity, 0.0))
 
-    def near(self, prior: ThermalPrior, noise: Array) -> LinearRecords:
-        """Those without observations that are far from what prior and noise make probable."""
+    def near(self, prior: ThermalPrior, noise: Array, *, far: float = 5.0) -> LinearRecords:
+        """Records without observations that are ``far`` standard deviations from what prior and noise expect."""
         variances = np.einsum("smp,pq,smq->sm", self.slopes, prior.covariance, self.slopes) + noise**2
         with np.errstate(invalid="ignore"):
-            return LinearRecords(np.where(self.values**2 <= FAR**2 * variances, self.values, np.nan), self.slopes)
+            return LinearRecords(np.where(self.values**2 <= far**2 * variances, self.values, np.nan), self.slopes)
 
     def posterior(self, prior: ThermalPrior, noise: Array) -> tuple[Array, Array]:
         """Means, (n_records, n_parameters), and covariances of ln theta given each record."""
@@ -143,12 +130,19 @@ class LinearRecords:
         return np.einsum("spq,sq->sp", covariances, pulls), covariances
 
     def learned(
-        self, prior: ThermalPrior, noise: Array, least: Array, *, learns_prior: bool, learns_noise: NDArray[np.bool_]
+        self,
+        prior: ThermalPrior,
+        noise: Array,
+        least: Array,
+        *,
+        learns_prior: bool,
+        learns_noise: NDArray[np.bool_],
+        moved: tuple[float, float] = (1e-3, 3.0),
     ) -> tuple[ThermalPrior, Array]:
-        """The most likely prior and noise, from given ones.
+        """The most likely prior and noise, by steps from given ones.
 
-        Noise is that of each observation, (n_observations,), and no smaller than the least. What the model cannot
-        follow counts as noise.
+        Noise is relative, one number for each observation, (n_observations,), and no smaller than the least. What the
+        model cannot follow counts as noise. The deviations of the prior lie in the range ``moved``.
         """
         n_own = 1 + len(prior.own)
 
@@ -165,8 +159,8 @@ class LinearRecords:
         start = np.log(np.append([prior.common, *prior.own] if learns_prior else [], noise[learns_noise]))
         if not len(start):
             return prior, noise
-        lowest = np.append([MOVED[0]] * (n_own * learns_prior), least[learns_noise])
-        highest = np.append([MOVED[1]] * (n_own * learns_prior), [MOST_NOISE] * learns_noise.sum())
+        lowest = np.append([moved[0]] * (n_own * learns_prior), least[learns_noise])
+        highest = np.append([moved[1]] * (n_own * learns_prior), [MOST_NOISE] * learns_noise.sum())
         bounds = np.log(np.column_stack([lowest, highest]))
         return read(minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
@@ -193,10 +187,11 @@ class LinearRecords:
 def least_noise(log_frequencies: Array) -> Array:
     """A lower limit of the noise of each mode, from records in their order, (n_modes,).
 
-    A mode that a parameter of its own can follow would otherwise count as exact.
+    It is a tenth of the scatter that the differences of successive records show. Without it, a mode that one parameter
+    alone can follow would count as exact.
     """
     steps = robust_deviation(np.diff(log_frequencies, axis=0)) if len(log_frequencies) > 1 else np.zeros(1)
-    share = SHARE_OF_STEPS / np.sqrt(2) * np.nan_to_num(steps)
+    share = 0.1 / np.sqrt(2) * np.nan_to_num(steps)
     return np.clip(np.broadcast_to(share, log_frequencies.shape[1:]), LEAST_NOISE, MOST_NOISE / 2)
 
 
@@ -205,8 +200,8 @@ class Posterior:
     """Posterior modes of records, by an FE model or by a surface in its place.
 
     ``noise`` is that of all observations, frequencies and components of shapes, (n_observations,). Rows start where the
-    response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes no steps of its own.
-    Rows that end outside the box of a reduced model go on with the full one.
+    response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes no steps of its own,
+    and was run ``n_runs`` times.
     """
 
     simulator: Simulator
@@ -217,56 +212,30 @@ class Posterior:
     surface: ResponseSurface | None
     is_program: bool
     n_runs: int = 0
-    n_jobs: int | None = None
 
-    def invert(self, inputs: Array) -> Bunch:
-        """What `PosteriorInverse.invert` gives, for rows of inputs."""
-        n_parameters, some = len(self.prior.own), ~np.isnan(inputs).all(axis=1)
-        result = Bunch(
-            theta=np.full((len(inputs), n_parameters), np.nan),
-            std=np.full((len(inputs), n_parameters), np.nan),
-            residuals=np.full((len(inputs), self.n_modes), np.nan),
-            weight=np.zeros(len(inputs)),
-            converged=np.zeros(len(inputs), dtype=bool),
-            solves=np.zeros(len(inputs), dtype=np.intp),
-            full_solves=np.zeros(len(inputs), dtype=np.intp),
-        )
-        if not some.any():
-            return result
-        objective = self.objective(inputs[some])
-        found = self._refine(objective)
-        local, lost = found.local, found.stalled[:, np.newaxis]
-        sensitivity = np.nan_to_num(local.sensitivity)
-        noise, precision = objective.noise, self.prior.precision
-        std = deviations_of(information(sensitivity, np.where(objective.missing, np.inf, noise), precision))
-        at_best = deviations_of(information(sensitivity, noise, precision))
-        result.theta[some] = np.where(lost, np.nan, np.exp(local.x))
-        result.std[some] = np.where(lost, np.nan, std) * result.theta[some]
-        unknown = lost | np.isnan(objective.log_measured)
-        result.residuals[some] = np.where(unknown, np.nan, local.residual[:, : self.n_modes])
-        result.weight[some] = ((at_best / std) ** 2).mean(axis=1)
-        result.converged[some] = found.converged
-        result.solves[some], result.full_solves[some] = found.solves, found.full_solves
-        return result
+    def linearise(self, simulator: Simulator, n_jobs: int | None) -> Linearise:
+        """Frequencies and, perhaps, shapes by a simulator, with their derivatives by ln theta."""
+        dofs = None if self.shapes is None else self.shapes.dofs
+        return partial(simulator.linearise, n_jobs=n_jobs, dofs=dofs, relative=True)
 
-    def objective(self, inputs: Array) -> Objective:
-        """That of rows of inputs, by the reduced model where there is one."""
+    def objective(self, inputs: Array, n_jobs: int | None) -> Objective:
+        """The objective of rows of inputs, by the reduced model where there is one.
+
+        Frequencies count as exact to 1e-6 at most. Where modes are missing, many parameters fit the others, and a noise
+        of 1e-3 lets steps move along the curve of these parameters.
+        """
         frequencies = inputs[:, : self.n_modes]
         units = np.empty((*frequencies.shape, 0)) if self.shapes is None else self.shapes.unit_shapes(inputs)
         gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
         noise = np.tile(self.noise, (len(inputs), 1))
-        noise[:, : self.n_modes] = np.maximum(self.noise[: self.n_modes], np.where(gaps, EXACT_WITH_GAPS, EXACT))
-        by_surface = self.surface.linearise if self.is_program and self.surface is not None else None
-        linearise = by_surface or self._by(self.simulator.approximate)
-        return Objective(linearise, np.log(frequencies), noise, self.prior.precision, units)
+        noise[:, : self.n_modes] = np.maximum(self.noise[: self.n_modes], np.where(gaps, 1e-3, 1e-6))
+        is_by_surface = self.is_program and self.surface is not None
+        linearise = self.surface.linearise if is_by_surface else self.linearise(self.simulator.approximate, n_jobs)
+        missing = np.isnan(np.hstack([frequencies, units.reshape(len(units), -1)]))
+        return Objective(linearise, np.log(frequencies), noise, self.prior.precision, units, missing)
 
-    def _by(self, simulator: Simulator) -> Linearise:
-        """Frequencies and, perhaps, shapes by a simulator, with their derivatives by ln theta."""
-        dofs = None if self.shapes is None else self.shapes.dofs
-        return partial(simulator.linearise, n_jobs=self.n_jobs, dofs=dofs, relative=True)
-
-    def _refine(self, objective: Objective) -> Refined:
-        """Refine rows in blocks, which show the progress."""
+    def refined(self, objective: Objective, n_jobs: int | None) -> Refined:
+        """Refine rows, a few chunks of the model at a time, so that progress is visible."""
         n_rows = len(objective.log_measured)
         start = np.zeros((n_rows, len(self.prior.own)))
         if self.surface is not None:
@@ -275,71 +244,126 @@ class Posterior:
             if self.is_program:
                 return found
             start = found.local.x
-        size = CHUNKS_PER_BLOCK * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
-        blocks = np.split(np.arange(n_rows), range(size, n_rows, size))
-        refined = (self._refine_block(objective.of(rows), start[rows]) for rows in blocks)
-        parts = with_progress(refined, n_rows, None, count=lambda part: len(part.converged), unit="records")
+        size = 8 * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
+        blocks = [slice(first, first + size) for first in range(0, n_rows, size)]
+        refine_block = partial(self._refine_block, objective, start, n_jobs)
+        parts = with_progress(map(refine_block, blocks), n_rows, None, count=Refined.__len__, unit="records")
         return Refined.together([*parts])
 
-    def _refine_block(self, objective: Objective, start: Array) -> Refined:
-        """Refine rows; where those of a reduced model end outside its box, the full model takes the last steps."""
-        found = refine(objective, start, MOST_STEPS, sorts=not getattr(self.simulator.model, "track", False))
-        if self.simulator.reduced is not None:
-            outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
-            if outside.size:
-                exact = replace(objective.of(outside), linearise=self._by(Simulator(self.simulator.model)))
-                last = minimise(exact, found.local.x[outside], MOST_STEPS)
-                last.full_solves += last.solves
-                last.solves += found.solves[outside]
-                found.put(outside, last)
+    def _refine_block(self, objective: Objective, start: Array, n_jobs: int | None, rows: slice) -> Refined:
+        """Refine rows; where the steps of a reduced model end outside its box, the full model takes the last ones."""
+        some = objective.some(rows)
+        found = refine(some, start[rows], MOST_STEPS, sorts=not getattr(self.simulator.model, "track", False))
+        if self.simulator.reduced is None:
+            return found
+        outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
+        if outside.size:
+            full = self.linearise(Simulator(self.simulator.model), n_jobs)
+            last = minimise(replace(some.some(outside), linearise=full), found.local.x[outside], MOST_STEPS)
+            last.full_solves += last.solves
+            last.solves += found.solves[outside]
+            found.put(outside, last)
         return found
 
-    def learned(self, inputs: Array, reduce: Any, *, learns_prior: bool, learns_noise: NDArray[np.bool_]) -> Posterior:
-        """The same with prior and noise as records teach them, and a model or surface that suits these records.
 
-        The model is linearised at its nominal state first, and then at what is known of each record.
-        """
-        rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), N_TEACHING)
-        if not len(rows):
-            return self
-        at_nominal = self._by(self.simulator)(np.ones((1, len(self.prior.own))))
-        nominal = [*map(partial(np.repeat, repeats=len(rows), axis=0), at_nominal)]
-        now, x = self, np.zeros((len(rows), len(self.prior.own)))
-        objective = replace(self.objective(inputs[rows]), linearise=lambda _: nominal)
-        least = self.noise.copy()
-        least[: self.n_modes] = least_noise(np.log(inputs[:, : self.n_modes]))
-        runs: list[tuple[Array, Array]] = []
-        for number in range(N_PASSES):
-            records = LinearRecords.of(objective.at(x), objective.missing)
-            records = records.near(now.prior, now.noise) if number else records
-            prior, noise = records.learned(
-                now.prior, now.noise, least, learns_prior=learns_prior, learns_noise=learns_noise
-            )
-            move = records.posterior(prior, noise)[0] - x
-            x = x + np.clip(move, -LONGEST_MOVE, LONGEST_MOVE)
-            now = replace(now, prior=prior, noise=noise)
-            if now.is_program:
-                now = now._with_runs(x, runs) if number < 2 else now
-            elif number == 0:
-                around = partial(Simulator.around, now.simulator.model, np.exp(x), reduce, n_rows=len(inputs))
-                now = replace(now, simulator=around())
-            else:
-                now = replace(now, simulator=now.simulator.extended(np.exp(x)))
-            objective = now.objective(inputs[rows])
+def inverted(posterior: Posterior, inputs: Array, n_jobs: int | None) -> Bunch:
+    """What `PosteriorInverse.invert` gives, for rows of inputs."""
+    shape, some = (len(inputs), len(posterior.prior.own)), ~np.isnan(inputs).all(axis=1)
+    result = Bunch(
+        theta=np.full(shape, np.nan),
+        std=np.full(shape, np.nan),
+        residuals=np.full((len(inputs), posterior.n_modes), np.nan),
+        weight=np.zeros(len(inputs)),
+        converged=np.zeros(len(inputs), dtype=bool),
+        solves=np.zeros(len(inputs), dtype=np.intp),
+        full_solves=np.zeros(len(inputs), dtype=np.intp),
+    )
+    if not some.any():
+        return result
+    objective = posterior.objective(inputs[some], n_jobs)
+    found = posterior.refined(objective, n_jobs)
+    local, lost = found.local, found.stalled[:, np.newaxis]
+    sensitivity = np.nan_to_num(local.sensitivity)
+    noise, precision = objective.noise, posterior.prior.precision
+    std = deviations(information(sensitivity, np.where(objective.missing, np.inf, noise), precision))
+    at_best = deviations(information(sensitivity, noise, precision))
+    result.theta[some] = np.where(lost, np.nan, np.exp(local.x))
+    result.std[some] = np.where(lost, np.nan, std) * result.theta[some]
+    unknown = lost | np.isnan(objective.log_measured)
+    result.residuals[some] = np.where(unknown, np.nan, local.residual[:, : posterior.n_modes])
+    result.weight[some] = ((at_best / std) ** 2).mean(axis=1)
+    result.converged[some] = found.converged
+    result.solves[some], result.full_solves[some] = found.solves, found.full_solves
+    return result
+
+
+def taught(
+    first: Posterior,
+    inputs: Array,
+    reduce: Reduce,
+    learns_prior: bool,
+    learns_noise: NDArray[np.bool_],
+    n_jobs: int | None,
+    *,
+    n_teaching: int = 300,
+    n_passes: int = 4,
+) -> Posterior:
+    """A posterior with prior and noise as records teach them, and a model or surface that suits these records.
+
+    At most ``n_teaching`` records, spread evenly, teach. The model is linearised at its nominal state first, and then
+    in each pass at what is known of each record, whose ln theta moves by at most 1 from one pass to the next.
+    """
+    rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), n_teaching)
+    if not len(rows):
+        return first
+    n_parameters = len(first.prior.own)
+    at_nominal = first.linearise(first.simulator, n_jobs)(np.ones((1, n_parameters)))
+    nominal = [np.repeat(part, len(rows), axis=0) for part in at_nominal]
+    now, x = first, np.zeros((len(rows), n_parameters))
+    objective = replace(first.objective(inputs[rows], n_jobs), linearise=lambda _: nominal)
+    least = first.noise.copy()
+    least[: first.n_modes] = least_noise(np.log(inputs[:, : first.n_modes]))
+    learns = {"learns_prior": learns_prior, "learns_noise": learns_noise}
+    runs: list[tuple[Array, Array]] = []
+    for number in range(n_passes):
+        records = LinearRecords.around(objective.at(x), objective.missing)
+        records = records.near(now.prior, now.noise) if number else records
+        prior, noise = records.learned(now.prior, now.noise, least, **learns)
+        x = x + np.clip(records.posterior(prior, noise)[0] - x, -1.0, 1.0)
+        now = replace(now, prior=prior, noise=noise)
         if now.is_program:
-            return now
-        solved = now.simulator.approximate.linearise(np.exp(x), now.n_jobs, relative=True)
-        return replace(now, surface=ResponseSurface.of(x, *solved))
+            now = with_runs(now, x, runs, n_jobs) if number < 2 else now
+        elif number == 0:
+            around = Simulator.around(now.simulator.model, np.exp(x), reduce, n_rows=len(inputs))
+            now = replace(now, simulator=around)
+        else:
+            now = replace(now, simulator=now.simulator.extended(np.exp(x)))
+        objective = now.objective(inputs[rows], n_jobs)
+    if now.is_program:
+        return now
+    solved = now.simulator.approximate.linearise(np.exp(x), n_jobs, relative=True)
+    return replace(now, surface=ResponseSurface.fitted(x, *solved))
 
-    def _with_runs(self, x: Array, runs: list[tuple[Array, Array]]) -> Posterior:
-        """The same with a surface through further runs of a program near some ln theta."""
-        random, n_parameters = np.random.RandomState(len(runs)), x.shape[1]
-        number = int(np.clip(RUNS_PER_TERM * n_terms(n_parameters, 3), FEWEST_RUNS, MOST_RUNS))
-        points = x[random.randint(len(x), size=number)]
-        points = points + self.prior.deviations * random.standard_normal(points.shape)
-        runs.append((points, evaluate(self.simulator.model, np.exp(points), n_jobs=self.n_jobs)))
-        surface = ResponseSurface.of(*(np.concatenate(part) for part in zip(*runs, strict=True)))
-        return replace(self, surface=surface, n_runs=self.n_runs + number + (2 * n_parameters + 1) * (len(runs) == 1))
+
+def with_runs(
+    posterior: Posterior,
+    x: Array,
+    runs: list[tuple[Array, Array]],
+    n_jobs: int | None,
+    *,
+    fewest: int = 200,
+    most: int = 600,
+    per_term: int = 3,
+) -> Posterior:
+    """A posterior with a surface through further runs of a program near some ln theta, ``per_term`` of a cubic one."""
+    random, n_parameters = np.random.RandomState(len(runs)), x.shape[1]
+    number = int(np.clip(per_term * n_terms(n_parameters, 3), fewest, most))
+    points = x[random.randint(len(x), size=number)]
+    points = points + posterior.prior.deviations * random.standard_normal(points.shape)
+    runs.append((points, evaluate(posterior.simulator.model, np.exp(points), n_jobs=n_jobs)))
+    surface = ResponseSurface.fitted(*(np.concatenate(part) for part in zip(*runs, strict=True)))
+    at_nominal = (2 * n_parameters + 1) * (len(runs) == 1)
+    return replace(posterior, surface=surface, n_runs=posterior.n_runs + number + at_nominal)
 
 
 class PosteriorInverse(FrequencyInverse, Estimator):
@@ -391,6 +415,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         With ``dofs``: how columns of shapes are read (``reference`` holds the nominal shapes at the sensors).
     n_runs_ : int
         How often a program without derivatives was run.
+    findings_ : list of SkthermoWarning
+        What is doubtful about the records of `fit`.
     n_parameters_, parameter_names_ : int, list of str
         Number of parameters and their names.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -482,7 +508,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_model(model)
         tolerance(model, self.reduce)
         names = list(model.parameter_names)
-        self.shape_inputs_ = None if self.dofs is None else ShapeInputs.of(model, self.dofs, self.shape_noise)
+        self.shape_inputs_ = None if self.dofs is None else ShapeInputs.read(model, self.dofs, self.shape_noise)
         n_columns = model.n_modes if self.shape_inputs_ is None else self.shape_inputs_.n_columns
         found = validate_data(self, X).shape[1]
         if found != n_columns:
@@ -494,22 +520,25 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         self._check_different(inputs[:, : model.n_modes], column_names(X, "f"))
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
-        n_records = int((~np.isnan(inputs).all(axis=1)).sum())
-        if n_records < FEWEST_TEACHING and (learns_prior or learns_noise.any()):
-            warn_user(
-                f"{n_records} records teach the prior of the parameters and the noise of the modes; expected at least "
-                f"{FEWEST_TEACHING}. Both stay near {100 * FIRST_NOISE:g} to 3 %. Give prior and noise",
-                FewRecordsWarning,
-                "few-teaching-records",
-            )
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
-        teach = partial(first.learned, in_order, self.reduce, learns_prior=learns_prior, learns_noise=learns_noise)
-        content = (replace(first, n_jobs=None), inputs, self.reduce, learns_prior, learns_noise)
-        known = remembered(self.memory, "prior", teach, content)
-        simulator = replace(known.simulator, model=model)  # not a copy that was read
-        self.posterior_ = replace(known, simulator=simulator, n_jobs=self.n_jobs)
-        self.simulator_, self.prior_ = simulator, known.prior
-        self.noise_ = known.noise[: model.n_modes]
+        asked = first, in_order, self.reduce, learns_prior, learns_noise, self.n_jobs
+        with collected() as self.findings_:
+            known = remembered(self.memory, taught, *asked, ignore=["n_jobs"])
+        self.simulator_ = replace(known.simulator, model=model)  # not a copy that was read
+        self.posterior_ = replace(known, simulator=self.simulator_)
+        self.prior_, self.noise_ = known.prior, known.noise[: model.n_modes]
+        n_records = int((~np.isnan(inputs).all(axis=1)).sum())
+        if n_records < 10 and (learns_prior or learns_noise.any()):
+            self.findings_.append(
+                FewRecordsWarning(
+                    f"{n_records} records teach the prior of the parameters and the noise of the modes; expected at "
+                    "least 10. Both stay near 1 to 3 %. Give prior and noise",
+                    "few-teaching-records",
+                )
+            )
+        if not is_auto(self.reduce):
+            self.findings_ += self.simulator_.doubts()
+        warn_each(self.findings_)
         return self
 
     @overload
@@ -541,7 +570,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
             If more than 1 % of the rows have not converged, or are solved by the full model beside a reduced one.
         """
         found = self.invert(X)
-        self.warn_of(found)
+        warn_each(found.findings)
         return (found.theta, found.std) if check_flag(return_std, "return_std") else found.theta
 
     def invert(self, X: ArrayLike) -> Bunch:
@@ -565,7 +594,9 @@ class PosteriorInverse(FrequencyInverse, Estimator):
             - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
               they have reached;
             - ``solves``, ``full_solves`` (n_samples,): how often a model was solved with its derivatives for the row,
-              and how many of these were of the full model because steps ended outside the box of the reduced one.
+              and how many of these were of the full model because steps ended outside the box of the reduced one;
+            - ``findings``, a list: warnings that more than 1 % of the rows have not converged, or were solved by the
+              full model.
 
         Examples
         --------
@@ -579,36 +610,12 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         """
         check_is_fitted(self)
         inputs = self._read(X)
-        invert = partial(self.posterior_.invert, inputs)
-        found = remembered(self.memory, "inversion", invert, (replace(self.posterior_, n_jobs=None), inputs))
+        with collected() as findings:
+            found = remembered(self.memory, inverted, self.posterior_, inputs, self.n_jobs, ignore=["n_jobs"])
+        findings += doubts_of(found)
         names = self.get_feature_names_out()
-        return Bunch(**{**found, "theta": frame_like(X, found.theta, names), "std": frame_like(X, found.std, names)})
-
-    def warn_of(self, found: Bunch) -> None:
-        """Warn if many rows have not converged, or are solved by the full model.
-
-        Parameters
-        ----------
-        found : Bunch
-            What `invert` has given.
-        """
-        n_rows, rows = len(found.weight), np.flatnonzero(unconverged(found))
-        if rows.size > MANY * n_rows:
-            warn_user(
-                f"{rows.size} of {n_rows} rows did not converge in {MOST_STEPS} steps, row {rows[0]} the first. They "
-                "keep what they reached. Use a model with track=True where modes cross",
-                ModelWarning,
-                "not-converged",
-            )
-        rows = np.flatnonzero(found.full_solves)
-        if rows.size > MANY * n_rows:
-            warn_user(
-                f"the parameters of {rows.size} of {n_rows} rows, row {rows[0]} the first, are outside the box of the "
-                f"reduced model. The full one was solved {found.full_solves.sum()} times, which takes longer. Fit to "
-                "records of such weather",
-                ModelWarning,
-                "outside-reduced-model",
-            )
+        tables = {name: frame_like(X, found[name], names) for name in ("theta", "std")}
+        return Bunch(**{**found, **tables, "findings": findings})
 
     @property
     def n_runs_(self) -> int:
@@ -620,16 +627,15 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         """What is known before the records: what is stated, and first values of the rest."""
         model, shapes = self.model, self.shape_inputs_
         names = tuple(model.parameter_names)
-        prior = ThermalPrior(names, FIRST_DEVIATION, np.full(len(names), FIRST_DEVIATION))
+        prior, stated = ThermalPrior(names, 0.03, np.full(len(names), 0.03)), np.full(model.n_modes, 0.01)
         if not isinstance(self.prior, str):
             prior = ThermalPrior(names, 0.0, check_prior(self.prior, names))
-        stated = np.full(model.n_modes, FIRST_NOISE)
         if not isinstance(self.noise, str):
-            stated = np.maximum(check_noise(self.noise, model.n_modes, mode_names), EXACT)
+            stated = np.maximum(check_noise(self.noise, model.n_modes, mode_names), 1e-6)
         noise = stated if shapes is None else np.append(stated, shapes.deviations)
         has_derivatives = hasattr(model, "linearised") or hasattr(model, "jacobian")
         is_program = not (has_derivatives if shapes is None else hasattr(model, "linearised_modes"))
-        return Posterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program, 0, self.n_jobs)
+        return Posterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program)
 
     def _read(self, X: ArrayLike) -> Array:
         """Measured columns, with shapes normalised."""
@@ -652,3 +658,25 @@ class PosteriorInverse(FrequencyInverse, Estimator):
 def unconverged(found: Bunch) -> NDArray[np.bool_]:
     """Rows with frequencies whose steps have not converged."""
     return ~found.converged & (found.weight > 0)
+
+
+def doubts_of(found: Bunch, *, many: float = 0.01) -> list[ModelWarning]:
+    """Findings that many rows have not converged, or were solved by the full model."""
+    findings = []
+    if unconverged(found).sum() > many * len(found.weight):
+        findings.append(
+            ModelWarning(
+                f"parameters of many records did not converge in {MOST_STEPS} steps, and are what was reached (invert "
+                "says which). Use a model with track=True where modes cross",
+                "not-converged",
+            )
+        )
+    if (found.full_solves > 0).sum() > many * len(found.weight):
+        findings.append(
+            ModelWarning(
+                "parameters of many records are outside the box of the reduced model, and the full one was solved for "
+                "them, which takes longer (invert says how often). Fit to records of such weather",
+                "outside-reduced-model",
+            )
+        )
+    return findings

@@ -12,15 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._core.arrays import Array, by_mode, check_dofs, real_array
 from skthermo.fem import FEModel, evaluate_modes, shape_components
 
-NODE = 1e-6
-"""Largest component at the sensors, as a share of the largest of the shape, below which a mode does not move them."""
-
 Linearise = Callable[[Array], tuple[Array, ...]]
 """Frequencies (n_samples, n_modes) and d ln f / d ln theta (n_samples, n_modes, n_parameters) at theta; where shapes
 are measured, also shapes (n_samples, n_sensors, n_modes) and d phi / d ln theta."""
-
-LEAST_DAMPING = 1e-14  # share of the diagonal added to precision matrices, which rounding could make singular
-LONGEST_STEP = 0.5  # largest change of ln theta in one step
 
 
 @dataclass(frozen=True)
@@ -36,14 +30,14 @@ class ShapeInputs:
     noise: Array
 
     @classmethod
-    def of(cls, model: FEModel, dofs: ArrayLike, noise: ArrayLike) -> ShapeInputs:
-        """The columns for a model and sensors, which must be able to see each mode."""
+    def read(cls, model: FEModel, dofs: ArrayLike, noise: ArrayLike) -> ShapeInputs:
+        """The columns for a model and sensors, each mode of which must move a sensor."""
         if not hasattr(model, "modes"):
             raise ValueError(f"dofs are given, but {model!r} has no method 'modes'; expected a model that gives shapes")
         shapes = np.asarray(model.modes(np.ones((1, len(model.parameter_names))))[1])[0]
         places = check_dofs(dofs, len(shapes), getattr(model, "dofs", ()))
         largest = np.abs(shapes[places]).max(axis=0) / np.abs(shapes).max(axis=0)
-        if (largest < NODE).any():
+        if (largest < 1e-6).any():  # rounding errors at a node
             raise ValueError(
                 f"mode {largest.argmin()} does not move the degrees of freedom {places.tolist()}; expected one that "
                 "it moves, or model.with_modes without this mode"
@@ -83,7 +77,7 @@ class ShapeInputs:
         shapes = inputs[:, self.n_modes :].reshape(len(inputs), self.n_modes, self.n_sensors)
         return shapes / np.sqrt(self.n_sensors)
 
-    def of_parameters(self, model: FEModel, theta: Array, n_jobs: int | None = None) -> Array:
+    def simulated(self, model: FEModel, theta: Array, n_jobs: int | None = None) -> Array:
         """Inputs that the model gives for rows of theta, without noise."""
         frequencies, shapes = evaluate_modes(model, theta, self.dofs, n_jobs=n_jobs)
         return np.hstack([frequencies, shape_components(shapes.swapaxes(1, 2), self.reference)])
@@ -114,68 +108,28 @@ def information(sensitivity: Array, noise: Array, precision: Array) -> Array:
     return scaled.swapaxes(1, 2) @ scaled + precision
 
 
-def deviations(information: Array) -> Array:
-    """Standard deviations, (n_samples, n_parameters), of Gaussians with these precision matrices."""
-    diagonal = np.einsum("spp->sp", information)
-    regular = information + np.eye(diagonal.shape[1]) * (LEAST_DAMPING * diagonal)[:, np.newaxis]
-    return np.sqrt(np.abs(np.einsum("spp->sp", np.linalg.inv(regular))))
+def deviations(information: Array, *, least_damping: float = 1e-14) -> Array:
+    """Standard deviations, (n_samples, n_parameters), of Gaussians with these precision matrices.
 
-
-@dataclass(frozen=True)
-class Objective:
-    """Half of the squared misfits of ln f and of shapes in standard deviations of the noise, and of ln theta by the
-    ``precision`` of its prior about 0, (n_parameters, n_parameters).
-
-    ``log_measured`` and ``units``, measured shapes of unit length, (n_samples, n_modes, n_sensors), are NaN where a
-    mode is missing; without shapes, there are no sensors. ``noise``, (n_samples, n_observations), holds standard
-    deviations of ln f and, mode by mode, of the components of shapes.
+    A share of the diagonal is added to a matrix, which rounding could make singular.
     """
-
-    linearise: Linearise
-    log_measured: Array
-    noise: Array
-    precision: Array
-    units: Array
-
-    @property
-    def n_sensors(self) -> int:
-        return self.units.shape[2]
-
-    @property
-    def missing(self) -> NDArray[np.bool_]:
-        """Which observations are missing, (n_samples, n_observations)."""
-        n_components = self.log_measured.shape[1] * self.n_sensors
-        return np.isnan(np.hstack([self.log_measured, self.units.reshape(len(self.units), n_components)]))
-
-    def at(self, x: Array) -> Local:
-        """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
-        (frequencies, sensitivity, *modes), missing = self.linearise(np.exp(x)), self.missing
-        residual = self.log_measured - np.log(frequencies)
-        if self.n_sensors:
-            misfit, change = shape_misfit(self.units, *modes)
-            residual, sensitivity = np.hstack([residual, misfit]), np.hstack([sensitivity, change])
-        residual = np.where(missing, 0.0, residual)
-        pull = x @ self.precision
-        value = 0.5 * (((residual / self.noise) ** 2).sum(axis=1) + (pull * x).sum(axis=1))
-        gradient = -np.einsum("smp,sm->sp", sensitivity, residual / self.noise**2) + pull
-        hessian = information(sensitivity, np.where(missing, np.inf, self.noise), self.precision)
-        return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual, sensitivity)
-
-    def of(self, rows: NDArray) -> Objective:
-        return replace(self, log_measured=self.log_measured[rows], noise=self.noise[rows], units=self.units[rows])
-
-    def without_shapes(self) -> Objective:
-        """The objective of frequencies alone."""
-        return replace(self, noise=self.noise[:, : self.log_measured.shape[1]], units=self.units[:, :, :0])
+    diagonal = np.einsum("spp->sp", information)
+    regular = information + np.eye(diagonal.shape[1]) * (least_damping * diagonal)[:, np.newaxis]
+    return np.sqrt(np.abs(np.einsum("spp->sp", np.linalg.inv(regular))))
 
 
 class Rows:
     """Arrays of the same rows, and further objects of the same rows."""
 
-    def of(self, rows: NDArray) -> Self:
-        return type(self)(*(part.of(rows) if isinstance(part, Rows) else part[rows] for part in vars(self).values()))
+    def some(self, rows: NDArray) -> Self:
+        """Some of the rows."""
+        parts = []
+        for part in vars(self).values():
+            parts.append(part.some(rows) if isinstance(part, Rows) else part[rows])
+        return type(self)(*parts)
 
     def put(self, rows: NDArray, other: Self) -> None:
+        """Put other values into some of the rows."""
         for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
             if isinstance(mine, Rows):
                 mine.put(rows, theirs)
@@ -185,8 +139,11 @@ class Rows:
     @classmethod
     def together(cls, parts: Sequence[Self]) -> Self:
         """The rows of all parts, one after the other."""
-        columns = zip(*(vars(part).values() for part in parts), strict=True)
-        return cls(*(type(c[0]).together(c) if isinstance(c[0], Rows) else np.concatenate(c) for c in columns))
+        joined = []
+        for column in zip(*[vars(part).values() for part in parts], strict=True):
+            is_nested = isinstance(column[0], Rows)
+            joined.append(type(column[0]).together(column) if is_nested else np.concatenate(column))
+        return cls(*joined)
 
 
 @dataclass
@@ -201,42 +158,64 @@ class Local(Rows):
     sensitivity: Array
 
     def step(self, damping: Array) -> Array:
-        """Damped Gauss-Newton step."""
+        """Damped Gauss-Newton step, that changes no ln theta by more than 0.5."""
         diagonal = np.einsum("spp->sp", self.hessian)
-        shares = np.maximum(damping, LEAST_DAMPING)[:, np.newaxis]
+        shares = np.maximum(damping, 1e-14)[:, np.newaxis]  # rounding could make the matrix singular
         damped = self.hessian + np.eye(self.x.shape[1]) * (shares * diagonal)[:, np.newaxis]
         step = -np.linalg.solve(damped, self.gradient[:, :, np.newaxis])[:, :, 0]
-        longest = np.abs(step).max(axis=1, keepdims=True)
-        return step * np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LONGEST_STEP))
+        return step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 0.5))
 
     def gain(self, step: Array) -> Array:
         """How much a step would lower the objective if it were quadratic."""
         return -(self.gradient * step).sum(axis=1) - 0.5 * np.einsum("sp,spq,sq->s", step, self.hessian, step)
 
-    def moved(self, step: Array, missing: NDArray[np.bool_]) -> Local:
-        """These rows after a small step: residuals and objective are those of the linearised model."""
-        residual = self.residual - np.einsum("smp,sp->sm", self.sensitivity, step)
-        value = self.value - self.gain(step)
-        return replace(self, x=self.x + step, value=value, residual=np.where(missing, 0.0, residual))
 
+@dataclass(frozen=True)
+class Objective:
+    """Half of the squared misfits of ln f and of shapes in standard deviations of the noise, and of ln theta by the
+    ``precision`` of its prior about 0, (n_parameters, n_parameters).
 
-SMALL_STEP = 1e-6  # a Gauss-Newton step of ln theta that counts as none
-SMALL_SHARE = 0.001
-"""A Gauss-Newton step is the last one if it is smaller than this share of the posterior standard deviations, and if the
-curvature of ln f along it changes no frequency by more than this share of the noise. The noise is what is stated or,
-where the residuals of a row show more, what they show."""
+    ``log_measured`` and ``units``, measured shapes of unit length, (n_samples, n_modes, n_sensors), are NaN where a
+    mode is missing; without shapes, there are no sensors. ``noise``, (n_samples, n_observations), holds standard
+    deviations of ln f and, mode by mode, of the components of shapes; ``missing`` tells which observations are.
+    """
 
-SMALL_GAIN = 1e-10
-"""The share of the objective that a Gauss-Newton step would gain, below which rounding errors hide it."""
+    linearise: Linearise
+    log_measured: Array
+    noise: Array
+    precision: Array
+    units: Array
+    missing: NDArray[np.bool_]
 
-FIRST_DAMPING, LAST_DAMPING = 1e-4, 1e8
-"""Damping after a first step that fails, as a share of the Hessian's diagonal, and damping at which a row stalls."""
+    def at(self, x: Array) -> Local:
+        """The objective of every row, and its Gauss-Newton model, at ln theta = x."""
+        frequencies, sensitivity, *modes = self.linearise(np.exp(x))
+        residual = self.log_measured - np.log(frequencies)
+        if self.units.shape[2]:
+            misfit, change = shape_misfit(self.units, *modes)
+            residual, sensitivity = np.hstack([residual, misfit]), np.hstack([sensitivity, change])
+        residual = np.where(self.missing, 0.0, residual)
+        pull = x @ self.precision
+        value = 0.5 * (((residual / self.noise) ** 2).sum(axis=1) + (pull * x).sum(axis=1))
+        gradient = -np.einsum("smp,sm->sp", sensitivity, residual / self.noise**2) + pull
+        hessian = information(sensitivity, np.where(self.missing, np.inf, self.noise), self.precision)
+        return Local(x, np.where(np.isfinite(value), value, np.inf), gradient, hessian, residual, sensitivity)
 
-SOME_MISFIT, LARGE_MISFIT = 0.5, 3.0
-"""Residuals, root mean square in standard deviations of the noise: above the first, another order of modes is tried
-where two are close; above the second, a row starts again at the nominal state."""
+    def some(self, rows: NDArray) -> Objective:
+        """The objective of some rows."""
+        parts = self.log_measured[rows], self.noise[rows], self.precision, self.units[rows], self.missing[rows]
+        return Objective(self.linearise, *parts)
 
-CLOSE = 0.1  # difference of ln f up to which two neighbouring modes may have crossed
+    def without_shapes(self) -> Objective:
+        """The objective of frequencies alone."""
+        n_modes = self.log_measured.shape[1]
+        noise, missing = self.noise[:, :n_modes], self.missing[:, :n_modes]
+        return replace(self, noise=noise, units=self.units[:, :, :0], missing=missing)
+
+    def misfit(self, found: Local) -> Array:
+        """Root mean square of the residuals in standard deviations of the noise."""
+        n_measured = np.maximum((~self.missing).sum(axis=1), 1)
+        return np.sqrt(((found.residual / self.noise) ** 2).sum(axis=1) / n_measured)
 
 
 @dataclass
@@ -249,92 +228,126 @@ class Refined(Rows):
     solves: NDArray[np.intp]
     full_solves: NDArray[np.intp]
 
+    def __len__(self) -> int:
+        return len(self.converged)
 
-def refine(objective: Objective, start: Array, n_steps: int, *, sorts: bool) -> Refined:
+
+def refine(
+    objective: Objective,
+    start: Array,
+    n_steps: int,
+    *,
+    sorts: bool,
+    some_misfit: float = 0.5,
+    large_misfit: float = 3.0,
+    close: float = 0.1,
+) -> Refined:
     """Posterior modes of ln theta, by at most ``n_steps`` steps from each start.
 
-    Rows that stall where a model that sorts its modes has kinks start again beyond, and so do those with a misfit, if
-    two modes are exchanged there; rows with a large misfit, where two modes exchange their shapes, start again at the
-    estimate from frequencies alone.
+    A model that ``sorts`` its modes has kinks where two modes cross. Rows that stall there start again beyond; so do
+    rows with some misfit, root mean square in standard deviations of the noise, where two modes within ``close`` of ln
+    f are exchanged. Rows with a large misfit start again at the nominal state and, where two modes exchange their
+    shapes, at the estimate from frequencies alone.
     """
     found = minimise(objective, start, n_steps)
-
-    def again(rows: NDArray[np.intp], start: Array | Local) -> None:
-        there = minimise(objective.of(rows), start, n_steps)
-        there.solves += found.solves[rows]
-        better = there.local.value < found.local.value[rows]
-        found.solves[rows] = there.solves
-        found.put(rows[better], there.of(better))
-
-    def doubtful(misfit: float) -> NDArray[np.intp]:
-        return np.flatnonzero(~found.converged | (normalised_misfit(objective, found.local) > misfit))
-
     for lower in range(objective.log_measured.shape[1] - 1 if sorts else 0):
-        rows = doubtful(SOME_MISFIT)
-        rows = rows[np.abs(gap(objective.of(rows), found.local.of(rows), lower)) < CLOSE]
-        if rows.size:
-            here, some = found.local.of(rows), objective.of(rows)
-            beyond = some.at(across(some, here, lower))
-            goes_on = ~found.converged[rows] | exchanged(here, beyond, lower)
-            found.solves[rows[~goes_on]] += 1
-            if goes_on.any():
-                again(rows[goes_on], beyond.of(goes_on))
-    if sorts and (rows := doubtful(LARGE_MISFIT)).size:
-        again(rows, np.zeros((len(rows), len(objective.precision))))
-    if objective.n_sensors and (rows := doubtful(LARGE_MISFIT)).size:
-        again(rows, minimise(objective.without_shapes().of(rows), start[rows], n_steps).local.x)
+        rows = doubtful(objective, found, some_misfit)
+        some, here = objective.some(rows), found.local.some(rows)
+        fitted = some.log_measured - here.residual[:, : some.log_measured.shape[1]]
+        near = np.abs(fitted[:, lower + 1] - fitted[:, lower]) < close  # not where one is missing
+        if not near.any():
+            continue
+        rows, some, here = rows[near], some.some(near), here.some(near)
+        beyond = some.at(across(some, here, lower))
+        goes_on = ~found.converged[rows] | exchanged(here, beyond, lower)
+        found.solves[rows[~goes_on]] += 1
+        start_again(objective, found, rows[goes_on], beyond.some(goes_on), n_steps)
+    if sorts and (rows := doubtful(objective, found, large_misfit)).size:
+        start_again(objective, found, rows, np.zeros((len(rows), len(objective.precision))), n_steps)
+    if objective.units.shape[2] and (rows := doubtful(objective, found, large_misfit)).size:
+        by_frequencies = minimise(objective.without_shapes().some(rows), start[rows], n_steps)
+        start_again(objective, found, rows, by_frequencies.local.x, n_steps)
     return found
 
 
-def minimise(objective: Objective, start: Array | Local, n_steps: int) -> Refined:
-    """Levenberg-Marquardt steps from each start, ln theta or the objective there."""
+def doubtful(objective: Objective, found: Refined, misfit: float) -> NDArray[np.intp]:
+    """Rows that have not converged, or whose misfit is larger than that."""
+    return np.flatnonzero(~found.converged | (objective.misfit(found.local) > misfit))
+
+
+def start_again(
+    objective: Objective, found: Refined, rows: NDArray[np.intp], start: Array | Local, n_steps: int
+) -> None:
+    """Take steps from another start, and keep what they reach in rows whose objective is smaller there."""
+    if not rows.size:
+        return
+    there = minimise(objective.some(rows), start, n_steps)
+    there.solves += found.solves[rows]
+    better = there.local.value < found.local.value[rows]
+    found.solves[rows] = there.solves
+    found.put(rows[better], there.some(better))
+
+
+def minimise(
+    objective: Objective,
+    start: Array | Local,
+    n_steps: int,
+    *,
+    small_gain: float = 1e-10,
+    first_damping: float = 1e-4,
+    last_damping: float = 1e8,
+) -> Refined:
+    """Levenberg-Marquardt steps from each start, ln theta or the objective there.
+
+    An undamped step is a row's last one if it is small, or if it would gain a ``small_gain`` of the objective, below
+    which rounding errors hide it. After a first step that fails, the damping is ``first_damping`` of the Hessian's
+    diagonal; at ``last_damping`` a row stalls.
+    """
     found = start if isinstance(start, Local) else objective.at(start.copy())
     converged, damping = np.zeros(len(found.x), dtype=bool), np.zeros(len(found.x))
     solves = np.ones(len(found.x), dtype=np.intp)
     active = np.flatnonzero(np.isfinite(found.value))
     for remaining in range(n_steps, -1, -1):
-        here, problem = found.of(active), objective.of(active)
+        here, problem = found.some(active), objective.some(active)
         undamped = here.step(np.zeros(len(active)))
-        last = here.moved(undamped, problem.missing)
-        is_last = is_small(undamped, problem, last) | (here.gain(undamped) <= SMALL_GAIN * here.value)
-        found.put(active[is_last], last.of(is_last))
+        # residuals and objective after a small step are those of the linearised model
+        change = np.einsum("smp,sp->sm", here.sensitivity, undamped)
+        gain, residual = here.gain(undamped), np.where(problem.missing, 0.0, here.residual - change)
+        last = replace(here, x=here.x + undamped, value=here.value - gain, residual=residual)
+        is_last = is_small(undamped, problem, last) | (gain <= small_gain * here.value)
+        found.put(active[is_last], last.some(is_last))
         converged[active] = is_last
-        active = active[~converged[active] & (damping[active] < LAST_DAMPING)]
+        active = active[~converged[active] & (damping[active] < last_damping)]
         if not active.size or not remaining:
             break
-        here = found.of(active)
+        here = found.some(active)
         step = here.step(damping[active])
-        there = objective.of(active).at(here.x + step)
+        there = objective.some(active).at(here.x + step)
         solves[active] += 1
         better = there.value < here.value
-        found.put(active[better], there.of(better))
+        found.put(active[better], there.some(better))
         with np.errstate(invalid="ignore"):  # a row that cannot step is damped more
             success = (here.value - there.value) / here.gain(step)
-        harder, easier = np.maximum(FIRST_DAMPING, 4 * damping[active]), damping[active] / 10
-        easier[easier < FIRST_DAMPING] = 0.0
+        harder, easier = np.maximum(first_damping, 4 * damping[active]), damping[active] / 10
+        easier[easier < first_damping] = 0.0
         damping[active] = np.where(success > 0.75, easier, np.where(success > 0.25, damping[active], harder))
-    stalled = ~converged & ((damping > FIRST_DAMPING) | ~np.isfinite(found.value))
+    stalled = ~converged & ((damping > first_damping) | ~np.isfinite(found.value))
     return Refined(found, converged, stalled, solves, np.zeros_like(solves))
 
 
-def is_small(step: Array, objective: Objective, after: Local) -> NDArray[np.bool_]:
-    """Whether steps, after which rows are as given, are so small beside the noise that no further one is needed."""
-    shown = np.maximum(1.0, normalised_misfit(objective, after))[:, np.newaxis]
-    by_noise = SMALL_SHARE * shown * deviations(after.hessian)
-    by_curvature = np.sqrt(SMALL_SHARE * shown * objective.noise.min(axis=1, keepdims=True))
-    return (np.abs(step) <= np.maximum(SMALL_STEP, np.minimum(by_noise, by_curvature))).all(axis=1)
+def is_small(
+    step: Array, objective: Objective, after: Local, *, share: float = 0.001, least: float = 1e-6
+) -> NDArray[np.bool_]:
+    """Whether steps, after which rows are as given, are so small beside the noise that no further one is needed.
 
-
-def normalised_misfit(objective: Objective, found: Local) -> Array:
-    """Root mean square of the residuals in standard deviations of the noise."""
-    n_measured = np.maximum((~objective.missing).sum(axis=1), 1)
-    return np.sqrt(((found.residual / objective.noise) ** 2).sum(axis=1) / n_measured)
-
-
-def gap(objective: Objective, found: Local, lower: int) -> Array:
-    """Difference of ln f between two neighbouring modes of the model; NaN where one of them is missing."""
-    fitted = (objective.log_measured - found.residual[:, : objective.log_measured.shape[1]])[:, lower : lower + 2]
-    return fitted[:, 1] - fitted[:, 0]
+    A step is small if it is less than a share of the posterior standard deviations, and if the curvature of ln f along
+    it changes no frequency by more than that share of the noise. The noise is what is stated or, where the residuals of
+    a row show more, what they show. A change of ln theta by ``least`` counts as none.
+    """
+    shown = np.maximum(1.0, objective.misfit(after))[:, np.newaxis]
+    by_noise = share * shown * deviations(after.hessian)
+    by_curvature = np.sqrt(share * shown * objective.noise.min(axis=1, keepdims=True))
+    return (np.abs(step) <= np.maximum(least, np.minimum(by_noise, by_curvature))).all(axis=1)
 
 
 def across(objective: Objective, found: Local, lower: int) -> Array:
@@ -344,8 +357,9 @@ def across(objective: Objective, found: Local, lower: int) -> Array:
     order = np.arange(n_modes)
     order[[lower, lower + 1]] = order[[lower + 1, lower]]
     fitted = np.exp(objective.log_measured - found.residual[:, :n_modes]), found.sensitivity[:, :n_modes]
-    measured, noise = frequencies.log_measured[:, order], frequencies.noise[:, order]
-    here = replace(frequencies, linearise=lambda _: fitted, log_measured=measured, noise=noise).at(found.x)
+    parts = frequencies.log_measured[:, order], frequencies.noise[:, order], frequencies.precision
+    missing = frequencies.missing[:, order]
+    here = Objective(lambda _: fitted, *parts, frequencies.units, missing).at(found.x)
     return here.x + here.step(np.zeros(len(here.x)))
 
 

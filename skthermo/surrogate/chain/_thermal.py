@@ -1,0 +1,357 @@
+"""What a chain predicts with: the weather of rows, M2, the simulator of the FE model, aligner and discrepancy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, clone
+
+from skthermo._core.arrays import (
+    Array,
+    MatrixLike,
+    as_columns,
+    as_floats,
+    as_mapping,
+    is_real,
+    median,
+    patterns,
+    real_array,
+    robust_deviation,
+    spread_evenly,
+)
+from skthermo._core.estimators import (
+    fit_outputs,
+    inputs_of_last_step,
+    last_step,
+    predict_with_std,
+    reach_of,
+    rows_from_fleet,
+)
+from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import collected
+from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
+from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, filled_text, unpredicted_text
+from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
+from skthermo.surrogate._simulator import Simulator
+
+POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
+
+
+def ratio_regressor() -> TemperatureMapper:
+    """What learns ratios of frequencies by default, with a penalty for each mode.
+
+    Penalties are few, because it is fitted often; below the least, rounding errors would show.
+    """
+    return TemperatureMapper(default_lines(np.logspace(-1, 5, 7), alpha_per_target=True))
+
+
+class LearnedRatios(NamedTuple):
+    """A fitted regressor of measured over modelled frequencies, for modes that are measured in the same rows."""
+
+    modes: NDArray[np.intp]
+    regressor: BaseEstimator
+
+
+@dataclass(frozen=True, eq=False)
+class Discrepancy:
+    """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
+
+    Regressors have ``learned`` the ratios from inputs of the ``mapper``. It is 0 for modes with few records, and for
+    all without a ``regressor``.
+    """
+
+    regressor: BaseEstimator | None
+    learned: tuple[LearnedRatios, ...]
+    n_modes: int
+    sensors: SensorRegression | None = None
+    mapper: Any = None
+
+    @classmethod
+    def fitted(
+        cls,
+        regressor: BaseEstimator | None,
+        inputs: Array,
+        ratios: Array,
+        weights: Array | None = None,
+        *,
+        sensors: SensorRegression | None = None,
+        mapper: Any = None,
+        fewest: int = 30,
+        far: float = 5.0,
+        most: int = 20_000,
+    ) -> Discrepancy:
+        """Learn from ratios, (n_rows, n_modes), beside inputs of M2.
+
+        A mode with a ratio ``far`` from its median, in robust deviations of its logarithm, leaves out the row. Modes
+        with the ``fewest`` rows learn, from at ``most`` so many, spread evenly.
+        """
+        n_modes = ratios.shape[1]
+        if regressor is None:
+            return cls(None, (), n_modes, sensors, mapper)
+        usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
+        logs, learned = np.log(np.where(usable[:, np.newaxis], ratios, np.nan)), []
+        with np.errstate(invalid="ignore"):
+            is_far = np.abs(logs - median(logs)) > far * robust_deviation(logs)
+        present, of_mode = patterns(~np.isnan(logs).T)
+        for number, mask in enumerate(present):
+            modes = np.flatnonzero(of_mode == number)
+            rows = spread_evenly(np.flatnonzero(mask & ~is_far[:, modes].any(axis=1)), most)
+            if len(rows) < fewest or not np.ptp(inputs[rows], axis=0).all():
+                continue
+            values, own = ratios[np.ix_(rows, modes)], None if weights is None else weights[rows]
+            values = values[:, 0] if len(modes) == 1 else values
+            is_ours = isinstance(regressor, TemperatureMapper)
+            known = (clone(regressor), inputs[rows], values, own)
+            learned.append(LearnedRatios(modes, fit_checked(*known) if is_ours else fit_outputs(*known)))
+        return cls(regressor, tuple(learned), n_modes, sensors, mapper)
+
+    def __call__(self, X: Table) -> Array:
+        """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
+        T = frame_like(X, self.sensors.fill(as_floats(X))[0])
+        with collected():
+            return self.at(as_floats(inputs_of_last_step(self.mapper, T)))
+
+    def at(self, inputs: Array) -> Array:
+        """delta at inputs of M2; NaN in rows in which one is missing."""
+        known = ~np.isnan(inputs).any(axis=1)
+        delta = np.full((len(inputs), self.n_modes), np.nan)
+        delta[known] = 0.0
+        for modes, regressor in self.learned if known.any() else ():
+            delta[np.ix_(known, modes)] = np.log(as_columns(regressor.predict(inputs[known])))
+        return delta
+
+
+@dataclass(frozen=True, eq=False)
+class Weather:
+    """Temperatures of rows, and what a chain expects in them.
+
+    Temperatures are ``given``, and ``filled`` from the other sensors with standard ``deviations``. M2 sees ``inputs``,
+    lags included, and gives ``theta``, NaN in ``impossible`` rows; ``delta`` is the discrepancy.
+    """
+
+    given: Table
+    filled: Table
+    deviations: Array
+    inputs: Array
+    theta: Array
+    impossible: NDArray[np.bool_]
+    delta: Array
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalModel(SavesFrames):
+    """What a chain has learned to predict with: M2, the simulator of the FE model, the aligner and the discrepancy.
+
+    ``sensors`` and ``training_range`` detect unusual weather, in which parameters stay within ``limits``, the least and
+    the largest of each.
+    """
+
+    mapper: BaseEstimator
+    simulator: Simulator
+    aligner: BaseEstimator
+    discrepancy: Discrepancy
+    sensors: SensorRegression
+    training_range: TrainingRange
+    limits: Array
+    parameter_names: Sequence[str]
+    mode_names: Sequence[Any]
+    n_jobs: int | None
+
+    def weather(self, X: Table, T: Array) -> Weather:
+        """The weather of a table, whose temperatures T have been read."""
+        T, deviations = self.sensors.fill(T)
+        filled = frame_like(X, T)
+        inputs = as_floats(inputs_of_last_step(self.mapper, filled))
+        theta, impossible = possible(self.learned(filled))
+        return Weather(X, filled, deviations, inputs, theta, impossible, self.discrepancy.at(inputs))
+
+    def learned(self, T: Table) -> Array:
+        """Parameters at complete temperatures, as the mapper gives them, within the limits."""
+        theta = as_columns(self.mapper.predict(T))
+        return np.where(is_possible(theta), np.clip(theta, *self.limits), theta)
+
+    def doubts(self, weather: Weather) -> list[SkthermoWarning]:
+        """Findings: filled sensors, unknown weather, impossible parameters."""
+        findings = self.sensors.doubts(weather.given)
+        consequence = "Standard deviations and intervals of predictions include the error of that"
+        message = filled_text(weather.deviations, column_names(weather.filled, "T"), consequence)
+        if message:
+            findings.append(RecordsWarning(message, "filled-temperatures"))
+        message = unpredicted_text(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled))
+        if message:
+            findings.append(UnevaluatedRowsWarning(message, "not-predicted"))
+        reach, inputs = reach_of(self.mapper, weather.filled) or (self.training_range, weather.inputs)
+        findings += reach.doubts(inputs)
+        if rows_from_fleet(self.mapper, weather.filled).any():
+            findings.append(
+                WeatherWarning(
+                    "rows are in weather outside the training records, and are predicted from the fleet. Standard "
+                    "deviations and intervals include that uncertainty. Fit again when there are such records",
+                    "rows-from-fleet",
+                )
+            )
+        if weather.impossible.any():
+            findings.append(
+                ModelWarning(
+                    f"the mapper gave multipliers outside {POSSIBLE[0]:g} to {POSSIBLE[1]:g}. These rows are NaN. Use "
+                    "a mapper that extrapolates mildly, such as the default",
+                    "impossible-parameters",
+                )
+            )
+        return findings + self.simulator.doubts_at(weather.theta)
+
+    def frequencies(self, theta: Array) -> Array:
+        """Frequencies of the healthy model in the measured domain, without discrepancy; NaN where theta is."""
+        return as_floats(self.aligner.inverse_transform(self.simulator.frequencies(possible(theta)[0], self.n_jobs)))
+
+    def simulated(
+        self,
+        weather: Weather,
+        modes: Sequence[int] | None = None,
+        *,
+        damage: Mapping[str, float | ArrayLike] | None = None,
+        parameters: Mapping[str, float] | None = None,
+        stiffness: MatrixLike | None = None,
+        mass: MatrixLike | None = None,
+    ) -> Array:
+        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
+        simulator, theta = self.simulator, weather.theta
+        if modes is not None:
+            simulator = simulator.changed("with_modes", modes)
+        if stiffness is not None or mass is not None:
+            simulator = simulator.changed("with_added", stiffness=stiffness, mass=mass)
+        if parameters is not None:
+            theta = theta * factors_of(parameters, self.parameter_names)
+        if damage is not None:
+            fixed, growing = split_damage(damage, weather.given)
+            simulator = simulator.damaged(fixed)
+            if growing:
+                severities = np.column_stack(list(growing.values()))
+                simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
+                theta = np.hstack([theta, 1 - severities])
+        frequencies = simulator.frequencies(theta, self.n_jobs)
+        if modes is not None:
+            return frequencies
+        return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(weather.delta)
+
+    def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]]) -> list[Array]:
+        """Frequencies with one damage of the same groups after the other, solved together by one model."""
+        groups, theta = list(draws[0]), np.tile(weather.theta, (len(draws), 1))
+        severities = np.array([[draw[group] for group in groups] for draw in draws])
+        simulator = self.simulator.with_damage_parameters(groups, severities.min(), severities.max())
+        theta = np.hstack([theta, np.repeat(1 - severities, len(weather), axis=0)])
+        parts = np.split(simulator.frequencies(theta, self.n_jobs), len(draws))
+        return [as_floats(self.aligner.inverse_transform(part)) * np.exp(weather.delta) for part in parts]
+
+    def propagated(self, theta: Array, deviations: Array, *, step: float = 0.01) -> Array:
+        """Relative standard deviations of frequencies in the measured domain from those of theta, (n_rows, n_modes).
+
+        The slope of the aligner is that over a relative ``step`` of the frequencies; exact for shifts and scales.
+        """
+        frequencies, jacobian = self.simulator.linearise(possible(theta)[0], self.n_jobs)
+        sides = [as_floats(self.aligner.inverse_transform(frequencies * (1 + side))) for side in (-step, step)]
+        slopes = np.log(sides[1] / sides[0]) / (2 * step * frequencies)
+        effects = slopes[:, :, np.newaxis] * jacobian * deviations[:, np.newaxis]
+        return np.sqrt((effects**2).sum(axis=2))
+
+    def known_deviations(self, weather: Weather) -> Array:
+        """Relative standard deviations because temperatures were filled and as the mapper's ``return_std`` says."""
+        n_parameters = len(self.parameter_names)
+
+        def predict(filled: Table) -> Array:
+            return np.hstack([self.learned(filled), self.discrepancy(filled)])
+
+        def log_frequencies(both: Array) -> Array:
+            return np.log(self.frequencies(both[:, :n_parameters])) + both[:, n_parameters:]
+
+        cost = PredictionError.of_fills(self.sensors, weather.given, weather.filled, predict, log_frequencies)
+        variances = np.einsum("ijj->ij", cost.of_all(len(weather), len(self.mode_names)))
+        inputs = inputs_of_last_step(self.mapper, weather.filled)
+        stated = predict_with_std(last_step(self.mapper), inputs)[1]
+        if stated is not None:
+            variances = variances + self.propagated(weather.theta, stated) ** 2
+        return np.sqrt(variances)
+
+
+def limits_in_weather(estimates: Array, *, beyond: float = 0.3) -> Array:
+    """The least and the largest value of each parameter in any weather, given what records have shown, (2, n).
+
+    Other weather may move ln theta ``beyond`` what a record has shown. A mapper would carry a bearing that freezes on
+    to any stiffness.
+    """
+    seen = np.nanmin(estimates, axis=0), np.nanmax(estimates, axis=0)
+    return np.stack([np.minimum(np.exp(-beyond), seen[0]), np.maximum(np.exp(beyond), seen[1])])
+
+
+def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
+    theta = as_columns(theta).copy()
+    impossible = ~(is_possible(theta) | np.isnan(theta)).all(axis=1)
+    theta[impossible] = np.nan
+    return theta, impossible
+
+
+def is_possible(theta: Array) -> NDArray[np.bool_]:
+    """Which multipliers a model can have."""
+    return (POSSIBLE[0] <= theta) & (theta <= POSSIBLE[1])
+
+
+def factors_of(parameters: Mapping[str, float], names: Sequence[str]) -> Array:
+    """The factor of every parameter, 1 where none is given."""
+    factors = dict.fromkeys(names, 1.0)
+    parameters = as_mapping(parameters)
+    if not isinstance(parameters, Mapping):
+        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
+    for name, factor in parameters.items():
+        if name not in factors:
+            raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
+        if not is_real(factor) or not 0 < factor < 1e150:
+            raise ValueError(f"the factor of parameter {name!r} is {factor!r:.100}; expected a positive number")
+        factors[name] = float(factor)
+    return np.array(list(factors.values()))
+
+
+def doubts_of_factors(parameters: Mapping[str, float] | None, *, large: float = 10.0) -> list[ModelWarning]:
+    """The finding that a factor was perhaps meant in percent."""
+    return [
+        ModelWarning(
+            f"the factor of parameter {name!r} is {factor:g} (expected at most {large:g}). Its stiffness is multiplied "
+            "by that. Give 1.02 for 2 % more",
+            "large-factor",
+        )
+        for name, factor in (as_mapping(parameters) or {}).items()
+        if factor > large
+    ]
+
+
+def split_damage(
+    damage: Mapping[str, float | ArrayLike], X: ArrayLike
+) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
+    """Severities that are the same in all rows, and those with a value for each row."""
+    damage = as_mapping(damage)
+    if not isinstance(damage, Mapping):
+        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    fixed: dict[str, Any] = {}
+    growing: dict[str, NDArray[np.float64]] = {}
+    n_rows = np.shape(X)[0]
+    for group, severity in damage.items():
+        if np.ndim(severity) == 0:
+            fixed[group] = severity
+            continue
+        values = real_array(severity, f"damage of group {group!r}")
+        if values.shape != (n_rows,) or not (values < 1).all() or not np.isfinite(values).all():
+            raise ValueError(
+                f"damage of group {group!r} has shape {values.shape} and highest value {values.max(initial=0)}; "
+                f"expected one severity or {n_rows}, one for each row, finite and below 1"
+            )
+        check_same_rows(X, severity, ("temperatures", f"damage of group {group!r}"))
+        growing[group] = values
+    return fixed, growing

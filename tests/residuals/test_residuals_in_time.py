@@ -1,0 +1,113 @@
+"""Numbers of independent records, trailing means and regimes of residuals."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+
+from skthermo.residuals.numbers import independent_records
+from skthermo.residuals.regimes import change_of_scatter
+from skthermo.residuals.windows import WindowMeans
+
+
+def autoregressive(n_rows, correlation, seed=0, n_columns=1):
+    noise = np.random.default_rng(seed).normal(size=(n_rows + 500, n_columns))
+    return lfilter([np.sqrt(1 - correlation**2)], [1.0, -correlation], noise, axis=0)[500:]
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+def test_independent_records_are_the_variance_over_that_of_the_mean(correlation):
+    """Of an autoregression of first order, n (1 - r) / (1 + r) in the limit of many records."""
+    n, counts = 3000, [independent_records(autoregressive(3000, correlation, seed)[:, 0]) for seed in range(30)]
+    assert np.median(counts) == pytest.approx(n * (1 - correlation) / (1 + correlation), rel=0.3)
+
+
+def test_numbers_of_independent_records_have_bounds():
+    drift = np.cumsum(np.random.default_rng(0).normal(size=500))
+    assert 1 <= independent_records(drift) < 15
+    assert independent_records(np.append(drift, np.nan)) == independent_records(drift)
+    assert independent_records(np.arange(5.0)) == 5
+    assert independent_records(np.array([])) == 1
+
+
+def means(values, window, regime=None, share=0.5, index=None):
+    table = pd.DataFrame(values, index)
+    regime = np.zeros(len(table), dtype=np.intp) if regime is None else regime
+    learned = WindowMeans.fitted(table, regime, window, share)
+    return learned, learned(table, regime, is_baseline=True)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 12), st.integers(0, 1000))
+def test_means_are_those_of_the_last_records_without_outliers(window, seed):
+    values = np.random.default_rng(seed).uniform(-1, 1, (60, 2))  # within four robust deviations
+    found = means(values, window)[1]
+    for row in range(60):
+        part = values[max(row - window + 1, 0) : row + 1]
+        if len(part) >= window / 2:
+            np.testing.assert_allclose(found[row], part.mean(axis=0), atol=1e-12)
+        else:
+            assert np.isnan(found[row]).all()
+
+
+def test_an_outlier_moves_a_mean_by_no_more_than_four_robust_deviations():
+    values = np.random.default_rng(0).normal(size=(400, 1))
+    spoiled = values.copy()
+    spoiled[100] = 1e6
+    quiet, loud = (means(rows, 8)[1] for rows in (values, spoiled))
+    assert np.nanmax(np.abs(loud - quiet)) < 8 / 8
+    assert (loud[np.abs(np.arange(400) - 104) > 8] == quiet[np.abs(np.arange(400) - 104) > 8])[8:].mean() > 0.9
+
+
+def test_more_change_of_any_record_never_moves_a_mean_back():
+    values = np.random.default_rng(0).normal(size=(50, 1))
+    learned, found = means(values, 5)
+    zero = np.zeros(50, dtype=np.intp)
+    for size in (0.5, 2.0, 100.0):
+        moved = learned(pd.DataFrame(values + size), zero, is_baseline=True)
+        assert (moved - found)[4:].min() >= 0
+        found = moved
+
+
+def test_means_are_taken_within_a_regime_and_time():
+    stamps = pd.date_range("2025", periods=48, freq="h")
+    values, regime = np.random.default_rng(1).uniform(-1, 1, (48, 1)), np.arange(48) % 2
+    found = means(values, "6h", regime, index=stamps)[1]
+    np.testing.assert_allclose(found[20], values[[16, 18, 20]].mean(axis=0))
+    np.testing.assert_allclose(found[21], values[[17, 19, 21]].mean(axis=0))
+
+
+def test_the_records_of_the_baseline_are_the_history_of_later_ones():
+    stamps, values = pd.date_range("2025", periods=60, freq="h"), np.random.default_rng(2).uniform(-1, 1, (60, 1))
+    for window in (6, "6h"):
+        learned, _ = means(values[:48], window, index=stamps[:48])
+        later = learned(pd.DataFrame(values[48:], stamps[48:]), np.zeros(12, dtype=np.intp))
+        whole = pd.DataFrame(values, stamps).rolling(6).mean()[48:]
+        np.testing.assert_allclose(later, whole, atol=1e-12)
+
+
+def frosty(seed, factor):
+    """Residuals of ten modes over two years of days, which scatter more in frost."""
+    random = np.random.default_rng(seed)
+    T = 10 - 12 * np.cos(2 * np.pi * np.arange(730) / 365) + random.normal(0, 3, 730)
+    scale = np.where(T < 0, factor, 1.0)[:, np.newaxis]
+    weather = np.column_stack([random.normal(size=730), T])
+    return weather, 0.01 * scale * random.normal(size=(730, 3)), np.arange(730) // 14 % 5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_change_of_scatter_is_found_where_it_is_and_nowhere_else(seed):
+    column, value = change_of_scatter(*frosty(seed, 3.0))
+    assert column == 1
+    assert -4 < value < 4
+    assert change_of_scatter(*frosty(seed, 1.0)) is None
+
+
+def test_one_cold_week_is_no_regime():
+    weather, residuals, folds = frosty(0, 1.0)
+    week = slice(140, 154)
+    weather[week, 1] -= 60
+    residuals[week] *= 5
+    assert change_of_scatter(weather, residuals, folds) is None
