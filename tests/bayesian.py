@@ -37,7 +37,7 @@ class Logs(RegressorMixin, BaseEstimator):
         prior = np.diag(np.broadcast_to(np.asarray(self.width, dtype=float) ** -2.0, (B.shape[1],)))
         self.covariance_ = np.linalg.inv(B.T @ B / self.noise**2 + prior)
         self.coef_ = start + self.covariance_ @ B.T @ (logs - B @ start) / self.noise**2
-        self.own_ = TrainingRange.of(X, np.ones(len(B), dtype=bool))
+        self.own_ = TrainingRange.spanned(X, np.ones(len(B), dtype=bool))
         return self
 
     def predict(self, X):

@@ -25,7 +25,7 @@ from sklearn.model_selection._search import BaseSearchCV
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neighbors._base import _get_weights
 from sklearn.pipeline import Pipeline
-from sklearn.utils import check_random_state
+from sklearn.utils import _safe_indexing, check_random_state
 from sklearn.utils._metadata_requests import _routing_enabled
 from sklearn.utils._param_validation import HasMethods, InvalidParameterError, StrOptions
 from sklearn.utils._user_interface import _print_elapsed_time
@@ -382,7 +382,9 @@ def offers(estimator: Any, name: str) -> bool:
     last = last_step(estimator)
     if isinstance(last, MultiOutputRegressor):
         return all(offers(part, name) for part in last.estimators_)
-    return offers(last.mapper_, name) if hasattr(last, "mapper_") else hasattr(last, name)
+    if hasattr(last, "mapper_") and name != "predict_covariance":
+        return offers(last.mapper_, name)
+    return hasattr(last, name)
 
 
 def inputs_of_last_step(estimator: Any, X: Any) -> Any:

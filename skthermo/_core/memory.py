@@ -15,11 +15,13 @@ def remembered(
 ) -> Result:
     """What a function gives, read from the memory if it was given the same arguments, but those to ignore, before."""
     try:
-        return check_memory(memory).cache(function, ignore=list(ignore))(*arguments)
+        known = check_memory(memory).cache(function, ignore=list(ignore))
+    except OSError as error:
+        raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error
+    try:
+        return known(*arguments)
     except PicklingError as error:
         raise ValueError(
             f"memory cannot recognise {arguments[0]!r:.200}; expected an object that can be pickled, or memory=None. "
             "Its functions and classes have to come from a module, not from a script, notebook, function or lambda"
         ) from error
-    except OSError as error:
-        raise ValueError(f"memory is {memory!r}; expected a folder that can be written to ({error})") from error

@@ -328,10 +328,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _learn(self, X: Any) -> tuple[list[SkthermoWarning], Any]:
         """Learn from a baseline: findings, and residuals out of fold."""
         T, F, findings = self._read_baseline(X)
-        self.sensors_ = SensorRegression.of(T)
+        self.sensors_ = SensorRegression.fitted(T)
         inputs, filled = self._filled(T)
         Y, folds = as_floats(F), read_folds(self.cv, inputs)
-        self.training_range_ = TrainingRange.of(inputs, ~np.isnan(Y).all(axis=1))
+        self.training_range_ = TrainingRange.spanned(inputs, ~np.isnan(Y).all(axis=1))
         self.relative_ = (np.fmin.reduce(Y) > 0) & (np.nanstd(Y, axis=0) < np.nanmean(Y, axis=0) / 3)
         self.folds_ = np.full(len(Y), -1)
         for number, (_, test) in enumerate(folds):

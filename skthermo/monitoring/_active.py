@@ -164,7 +164,7 @@ class ActiveDetector(SavesFrames):
         frequencies = as_floats(trained[targets])
         deviation = np.nanstd(frequencies, axis=0)
         usual = np.nanmean(frequencies, axis=0), np.where(deviation > 0, deviation, 1.0)
-        weather = TrainingRange.of(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
+        weather = TrainingRange.spanned(trained[temperatures], ~np.isnan(frequencies).all(axis=1))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
         step = usual_step(trained.index)
         within = memory.duration(step) + (2 * persistence - 1) * step

@@ -484,7 +484,7 @@ def _unknown(old: ActiveDetector, new: ActiveDetector, overlap: pd.DataFrame, ta
         return [0.0, 0.0, 0.0, np.nan, False]
     shares = []
     for active in (old, new):
-        known = TrainingRange.of(active.trained[weather], np.ones(len(active.trained), dtype=bool))
+        known = TrainingRange.spanned(active.trained[weather], np.ones(len(active.trained), dtype=bool))
         shares.append(float((np.nan_to_num(known.excess(overlap[weather])) > BEYOND).any(axis=1).mean()))
     return [*shares, shares[1] - shares[0], np.nan, shares[1] > shares[0]]
 

@@ -30,20 +30,7 @@ from skthermo.residuals.weather import (
     weather_coordinates,
 )
 
-MOST_LAGS = 120  # number of records later up to which covariances are compared
-N_TIMES = 12  # number of correlation times that are tried
-N_DRAWN, MOST_DRAWN = 100_000, 64
-"""Size of the simulated records of which covariances are expected, and largest number of their columns."""
 PSEUDO_RECORDS = 12  # weight, in independent records, of the correlations of single records beside those of one part
-FEWEST = 20  # number of training records of a mode below which its scatter counts as unknown
-SMALLEST = 1e-3  # eigenvalue of correlations
-DRAWN_FROM = 25  # number of records with the most similar weather that noise is drawn from
-RUNS = 6  # times the correlation time less 1, and 1 more, is the mean length of a run of drawn records
-MOST_SCALED = 2.0  # ratio of the scatter in the weather of a row and of its record beyond which a run ends
-SPREAD_OF = 100  # number of records with the most similar weather whose residuals give the spread
-COMPARED_WITH = 50  # least number of records with the most similar weather whose mean a residual is compared with
-OVERFITTED = 0.75  # ratio of a mapper's own median residual to that out of fold, below which it has learned noise
-SIMILAR = 0.1  # share of the records whose weather counts as similar, in means
 JITTER = 1e-9  # share of its variance that each mode has of its own, also where two scatter the same
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
 MOST_SIMILAR = 500  # number of similar records that stand for all of them
@@ -58,9 +45,9 @@ class BaselineResiduals:
     mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
     of the training records they are. ``ratios``, (n_records, n_parameters), are the parameters of the records over
     out-of-fold predictions. ``errors``, (n_records, n_modes), are the relative standard deviations of out-of-fold
-    predictions as a mapper states them, None if it does not; ``reach`` is the weather within which they hold, all by
-    default, and ``beyond``, (n_records,), how far each record was outside that of the mapper that predicted it.
-    ``findings`` say in which weather residuals are not to be trusted.
+    predictions as a mapper states them that knows the weather within which they hold, ``reach``, else None. ``beyond``,
+    (n_records,), is how far each record was outside the reach of the mapper that predicted it. ``findings`` say in
+    which weather residuals are not to be trusted.
     """
 
     weather: Array
@@ -95,9 +82,7 @@ class BaselineResiduals:
         """
 
         def of_known(known: Array) -> Array:
-            if self.errors is not None and self.reach is None:
-                return self._spread(self._scattered, known, np.zeros(len(known)))
-            reach = self.reach or TrainingRange.of(self.weather, slice(None))
+            reach = self.reach or TrainingRange.spanned(self.weather, slice(None))
             return self._spread(self._scattered, known, reach.excess(known).mean(axis=1))
 
         return self._where_known(weather, of_known)
@@ -111,7 +96,7 @@ class BaselineResiduals:
         shares = np.zeros_like(self.values)
         weather = weather[~np.isnan(weather).any(axis=1)]
         wanted = self.coordinates.transform(weather) if len(weather) else weather
-        for mask, modes in rows_by_pattern(compared(self.values, int(MOST_SIMILAR / SIMILAR)).T):
+        for mask, modes in rows_by_pattern(compared(self.values, int(MOST_SIMILAR / 0.1)).T):
             known = np.flatnonzero(mask)
             if not len(known):
                 continue
@@ -127,7 +112,7 @@ class BaselineResiduals:
         The predictions count as least squares on `WeatherFunctions`, and what these leave as its mean in similar
         weather: the mapper errs alike for a season, the most in the coldest and the warmest.
         """
-        weights, functions = self.shares(weather), WeatherFunctions.of(self.weather)
+        weights, functions = self.shares(weather), WeatherFunctions.fitted(self.weather)
         of_records = functions.values(self.weather)
         wanted = functions.values(weather[~np.isnan(weather).any(axis=1)], is_clipped=True)
         for column, known in zip(weights.T, ~np.isnan(self.values.T), strict=True):
@@ -148,13 +133,13 @@ class BaselineResiduals:
     @cached_property
     def scatter(self) -> Scatter:
         """How records scatter around what similar weather explains, and how long they remember it."""
-        return Scatter.of(self)
+        return Scatter.estimated(self)
 
     @property
     def is_overfitted(self) -> bool:
-        """Whether the mapper's own residuals are clearly smaller than those of the same records out of fold."""
+        """Whether the mapper's own median residual is less than three quarters of that out of fold."""
         own, out_of_fold = median(np.abs(self.own)), median(np.abs(self.values))
-        return bool(own.mean() < OVERFITTED * out_of_fold.mean())
+        return bool(own.mean() < 0.75 * out_of_fold.mean())
 
     def quantiles(self, confidence: float) -> Array:
         """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""
@@ -164,8 +149,8 @@ class BaselineResiduals:
         """Residuals for rows of weather in order of time, (n_samples, n_modes), with the gaps of whole records.
 
         A smoothed stationary bootstrap: each row takes the record after the one before it took or, where such a run
-        ends by chance, one of the records with the most similar weather. In weather that scatters more or less than
-        that of its records, a run is scaled, or ends where that is a factor of `MOST_SCALED`. A second draw of its own
+        ends by chance, one of the 25 records with the most similar weather. In weather that scatters more or less than
+        that of its records, a run is scaled, or ends where that is a factor of 2. A second draw of its own
         is added with a small weight, so that the largest residual of the training records is not the largest of all.
         Rows of unknown weather are NaN.
         """
@@ -211,10 +196,11 @@ class BaselineResiduals:
         """What noise is drawn from: between the residuals out of fold and those of the mapper of all records.
 
         The former hold the errors of mappers of fewer records, beside those of the mapper that simulates; the latter
-        are too small, and do not count where it has learned noise: where they change less from record to record.
+        are too small, and do not count where it has learned noise: where they change by less than three quarters from
+        record to record.
         """
         own, out_of_fold = np.abs(np.diff(self.own, axis=0)), np.abs(np.diff(self.values, axis=0))
-        is_overfitted = np.nansum(median(own)) < OVERFITTED * np.nansum(median(out_of_fold))
+        is_overfitted = np.nansum(median(own)) < 0.75 * np.nansum(median(out_of_fold))
         return self.values if is_overfitted else (self.values + self.own) / 2
 
     @cached_property
@@ -248,19 +234,22 @@ class BaselineResiduals:
     def _similar(self, weather: Array) -> scipy.sparse.csr_array:
         """Equal weights of the records with the most similar weather, (n_rows, n_records)."""
         some = one_in_each_part(len(self.places), MOST_PLACES)
-        near = self._drawn_from.of(self.coordinates.transform(weather))[1]
+        near = self._drawn_from.nearest(self.coordinates.transform(weather))[1]
         ends = np.arange(0, near.size + 1, near.shape[1])
         weights = np.full(near.size, 1 / near.shape[1])
         return scipy.sparse.csr_array((weights, some[near].ravel(), ends), (len(near), len(self.places)))
 
     @cached_property
     def _drawn_from(self) -> NearestPlaces:
-        return NearestPlaces(self.places[one_in_each_part(len(self.places), MOST_PLACES)], DRAWN_FROM)
+        return NearestPlaces(self.places[one_in_each_part(len(self.places), MOST_PLACES)], 25)
 
     def _taken(self, similar: scipy.sparse.csr_array, random_state: np.random.RandomState) -> NDArray[np.intp]:
-        """Positions of records in runs for rows with some similar records."""
+        """Positions of records in runs for rows with some similar records.
+
+        The mean length of a run is 1 and six times the correlation time less 1.
+        """
         n_rows, n_records = similar.shape
-        ends = np.flatnonzero(random_state.uniform(size=n_rows) < 1 / (1 + RUNS * (self.correlation_time - 1)))
+        ends = np.flatnonzero(random_state.uniform(size=n_rows) < 1 / (1 + 6 * (self.correlation_time - 1)))
         which = random_state.randint(similar.indptr[1], size=n_rows)
         taken = similar.indices.reshape(n_rows, -1)[np.arange(n_rows), which].astype(np.intp)
         if len(ends) == n_rows:
@@ -277,7 +266,7 @@ class BaselineResiduals:
             is_other = records >= n_records
             some = ~is_other & (step > 0)
             changes = np.abs(here[rows[some]] - logs[records[some]])
-            is_other[some] = (changes > np.log(MOST_SCALED)).any(axis=1)
+            is_other[some] = (changes > np.log(2.0)).any(axis=1)
             reached = np.minimum.reduceat(np.where(is_other, step, lengths[run]), first)
             kept = step < reached[run]
             taken[rows[kept]] = records[kept]
@@ -294,17 +283,20 @@ class BaselineResiduals:
 
     @cached_property
     def _levels(self) -> tuple[Array, Array]:
-        """Mean and standard deviation of residuals and ratios in the weather of each record, outliers left out."""
+        """Mean and standard deviation of residuals and ratios in the weather of each record, outliers left out.
+
+        They are those of the 100 records with the most similar weather.
+        """
         columns = self.usual if self.ratios is None else np.hstack([self.usual, self.ratios])
-        mean = np.nan_to_num(self._local_mean(columns, self.weather, SPREAD_OF, MOST_PLACES))
-        square = np.nan_to_num(self._local_mean(columns**2, self.weather, SPREAD_OF, MOST_PLACES))
+        mean = np.nan_to_num(self._local_mean(columns, self.weather, 100, MOST_PLACES))
+        square = np.nan_to_num(self._local_mean(columns**2, self.weather, 100, MOST_PLACES))
         size = np.sqrt(np.maximum(np.nanmax(square, axis=0, initial=0), np.finfo(float).tiny))
         return mean, np.maximum(np.sqrt(np.maximum(square - mean**2, 0.0)), JITTER * size)
 
     @cached_property
     def correlation_time(self) -> float:
         """The longest of all modes, in records, of what similar weather does not explain."""
-        means = self._local_mean(self.values, self.weather, SPREAD_OF, MOST_PLACES)
+        means = self._local_mean(self.values, self.weather, 100, MOST_PLACES)
         return float(correlation_times(self.values - means).max())
 
     def _where_known(self, weather: Array, of_known: Callable[[Array], Array]) -> Array:
@@ -317,11 +309,12 @@ class BaselineResiduals:
 
     def _similar_mean(self, values: Array, weather: Array) -> Array:
         """Mean of the records' values in weather most like that of each row, mode by mode."""
-        return self._local_mean(values, weather, self._n_compared, int(MOST_SIMILAR / SIMILAR))
+        return self._local_mean(values, weather, self._n_compared, int(MOST_SIMILAR / 0.1))
 
     @property
     def _n_compared(self) -> int:
-        return int(np.clip(SIMILAR * len(self.values), COMPARED_WITH, MOST_SIMILAR))
+        """Number of records with the most similar weather whose mean a residual is compared with: a tenth."""
+        return int(np.clip(0.1 * len(self.values), 50, MOST_SIMILAR))
 
     def _local_mean(self, values: Array, weather: Array, number: int, most: int) -> Array:
         """Mean of the values of a number of records in weather most like that of each row, among so many at most."""
@@ -331,7 +324,7 @@ class BaselineResiduals:
 
     def _spread(self, values: Array, weather: Array, beyond: Array) -> Array:
         """The spread of residuals in weather, the wider the farther this is beyond what was learned from."""
-        squares = self._local_mean(values**2, weather, SPREAD_OF, MOST_PLACES)
+        squares = self._local_mean(values**2, weather, 100, MOST_PLACES)
         return np.sqrt(np.where(np.isnan(squares), np.inf, squares)) * (1 + beyond)[:, np.newaxis]
 
     @cached_property
@@ -339,9 +332,10 @@ class BaselineResiduals:
         """The residuals, less the share of each that is as a rule an error that the mapper states."""
         if self.errors is None or not self.errors.any():
             return self.values
-        variances = self.errors[:, :, np.newaxis] ** 2 * np.eye(self.n_modes)
-        own = np.diag(Gaussian.fitted(self.values, variances).covariance)
-        return self.values * np.sqrt(own / (own + self.errors**2))
+        errors = np.where(np.isnan(self.values), np.nan, self.errors**2)
+        variances = means_of_known((self.values - means_of_known(self.values)) ** 2)
+        own = np.maximum(variances - means_of_known(errors), np.finfo(float).tiny)
+        return self.values * np.sqrt(own / (own + errors))
 
     @cached_property
     def _scores(self) -> Array:
@@ -350,7 +344,7 @@ class BaselineResiduals:
         for fold in np.unique(self.folds):
             test = self.folds == fold
             weather = self.weather[test]
-            others = TrainingRange.of(self.weather, ~test).excess(weather).mean(axis=1)
+            others = TrainingRange.spanned(self.weather, ~test).excess(weather).mean(axis=1)
             beyond = others if self.beyond is None else self.beyond[test]
             spread = self._spread(np.where(test[:, np.newaxis], np.nan, self._scattered), weather, beyond)
             scores[test] = np.abs(self._scattered[test]) / spread
@@ -382,9 +376,9 @@ def order_statistic(scores: Array, confidence: float) -> float:
 class Scatter:
     """Covariances of records as the sum of an independent part and of one that fades from record to record.
 
-    ``parts``, (2, n_modes, n_modes), are those of single records, and zero for modes of which too little is known;
-    ``memory`` is the correlation of the second part with itself one record later. ``n_records``, (n_modes,), were
-    learned from.
+    ``parts``, (2, n_modes, n_modes), are covariances of single records, zero for modes with fewer than 20 of them.
+    ``memory`` is the correlation of the second part with itself one record later, ``n_records``, (n_modes,), the number
+    of records of each mode.
     """
 
     parts: Array
@@ -392,7 +386,7 @@ class Scatter:
     n_records: NDArray[np.intp]
 
     @classmethod
-    def of(cls, residuals: Any) -> Scatter:
+    def estimated(cls, residuals: Any) -> Scatter:
         """Learn from `BaselineResiduals` what weather similar to theirs does not explain.
 
         Residuals of records that the mapper has learned are too small, those out of fold too large; products of one
@@ -401,8 +395,8 @@ class Scatter:
         of_fold = residuals.less_similar(residuals.values)
         own = of_fold if residuals.is_overfitted else residuals.less_similar(residuals.own)
         n_records = (~np.isnan(own)).sum(axis=0)
-        found = lagged_covariances(own, of_fold, range(int(np.clip(len(own) // 4, 2, MOST_LAGS))))
-        known = np.flatnonzero((n_records >= FEWEST) & (np.diag(found[0]) > 0))
+        found = lagged_covariances(own, of_fold, range(int(np.clip(len(own) // 4, 2, 120))))  # lags in records
+        known = np.flatnonzero((n_records >= 20) & (np.diag(found[0]) > 0))
         parts, memory = np.zeros((2, *found[0].shape)), 0.0
         if known.size:
             inside = np.ix_(known, known)
@@ -475,7 +469,7 @@ def _split(
 
     Without clear signs of a fading part, its covariance is zero.
     """
-    times = np.geomspace(1.5, max(n_rows / 8, 3.0), N_TIMES)
+    times = np.geomspace(1.5, max(n_rows / 8, 3.0), 12)  # correlation times that are tried
     memories = np.append(0.0, (times - 1) / (times + 1))
     expected = _expected(memories, less_similar, n_rows, len(found))
     single = np.diag(found[0])
@@ -505,9 +499,9 @@ def _split(
 def _expected(memories: Array, less_similar: Callable[[Array], Array], n_rows: int, n_lags: int) -> Array:
     """Covariances of simulated records of unit variance, once similar weather has taken its share.
 
-    They are (n_memories, n_lags); the records are drawn alike in every call.
+    They are (n_memories, n_lags); the records, 2 to 64 columns of some 100,000 in all, are drawn alike in every call.
     """
-    n_drawn = int(np.clip(N_DRAWN // n_rows, 2, MOST_DRAWN))
+    n_drawn = int(np.clip(100_000 // n_rows, 2, 64))
     start = 500
     shocks = np.random.RandomState(0).standard_normal((start + n_rows, n_drawn))
     noise = [np.sqrt(1 - m**2) * scipy.signal.lfilter([1.0], [1.0, -m], shocks, axis=0)[start:] for m in memories]
@@ -533,7 +527,7 @@ def _covariance(correlations: Array, variances: Array) -> Array:
     """The covariance with these variances whose correlations are positive definite and close to the given ones."""
     np.fill_diagonal(correlations, 1.0)
     values, vectors = np.linalg.eigh(correlations)
-    positive = vectors * np.maximum(values, SMALLEST) @ vectors.T
+    positive = vectors * np.maximum(values, 1e-3) @ vectors.T
     scale = np.sqrt(variances / np.diag(positive))
     return positive * np.outer(scale, scale)
 

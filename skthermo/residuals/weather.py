@@ -23,31 +23,8 @@ from skthermo.preprocessing.checks import Plausible
 from skthermo.residuals.gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
-EXPLAINED = 0.99  # share of the variance of the weather that its coordinates keep
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
-SPARE = 1.25  # so many times as many places are searched at once for all columns with gaps
-LEAST_SHARE = 1 / 3  # of the places, for which a column with gaps is searched with the others
-MOST_KEPT = 16_000_000  # positions of nearest places that are kept, of 4 bytes
-LEAST_NEW = 0.1  # of the kept places, above which new ones are sorted in
 BEYOND = 0.05  # ranges of the other folds' temperatures, outside which they have not seen a record's weather
-SHARE_OUTSIDE, FEWEST_OUTSIDE = 0.1, 10  # of a fold's records, in weather that no other fold has, above which to warn
-MOST_LEARNED = 20_000  # records that show how sensors go together as well as more of them would
-LONGEST_STEP = 5e7  # operations of a step of the expectation maximisation for records with gaps
-JITTER = 1e-9  # share of its variance that each sensor has of its own, also where two show the same
-FEWEST = 36  # records in a mean departure of a sensor
-LARGEST = 0.1  # share of the training records in a mean departure, so that some of them are independent
-TIMES_USUAL = 3.0  # a mean departure of the training records that is a sensor's fault; a season that they miss gives 2
-MATTERS = 0.03  # ranges of the training temperatures from which a departure moves predictions
-MOST_COORDINATES = 3  # of the weather, of which there are functions
-COLD_AND_HOT = 0.15, 0.85  # quantiles of the first coordinate beyond which the weather counts as cold or hot
-A_DEGREE = 1.0  # below which thermometers may differ without a fault
-MOST_ROWS, LEAST_ROWS = 2000, 30  # evenly spread, that are looked at
-STEADY = 0.15  # variation of a frequency at most
-AS_STEADY = 3.0  # times the variation of the other modes, at most, of a mode
-UNSTEADY = 5.0  # times the variation of modes, at least, of a temperature
-MAGNITUDES = 10.0  # by which a mode may be below the lowest or above the highest of the others
-TOGETHER, ALIKE = 0.1, 0.6  # rank correlation of two modes, and of two temperatures
-DEGREES, RATIO = 20.0, 3.0  # difference of the medians and ratio of the deviations of two temperatures
 
 
 @dataclass(frozen=True)
@@ -59,7 +36,7 @@ class TrainingRange:
     names: Sequence[Any]
 
     @classmethod
-    def of(cls, inputs: Any, trained: Array) -> TrainingRange:
+    def spanned(cls, inputs: Any, trained: Array) -> TrainingRange:
         """The range of a mapper's inputs, over the rows that trained it."""
         values = as_floats(inputs)[trained]
         return cls(np.fmin.reduce(values), np.fmax.reduce(values), column_names(inputs, "T"))
@@ -114,7 +91,7 @@ def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> l
     found = np.zeros(values.shape[1], dtype=bool)
     for fold in np.unique(folds[folds >= 0]):
         test = folds == fold
-        outside = np.nan_to_num(TrainingRange.of(weather, ~test).excess(values[test])) > BEYOND
+        outside = np.nan_to_num(TrainingRange.spanned(weather, ~test).excess(values[test])) > BEYOND
         n_outside = outside.any(axis=1).sum()
         if n_outside >= 10 and n_outside > 0.1 * test.sum():
             found |= outside.any(axis=0)
@@ -134,7 +111,8 @@ def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> l
 class SensorRegression:
     """What each sensor shows, given any others, as learned from records.
 
-    ``usual`` holds the largest mean departure of each sensor in some number of consecutive training records.
+    ``usual`` holds the largest mean departure of each sensor in some number of consecutive training records: from 36
+    to a tenth of them, so that some means are independent.
     """
 
     gaussian: Gaussian
@@ -143,19 +121,19 @@ class SensorRegression:
     usual: dict[int, Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, temperatures: Any) -> SensorRegression:
+    def fitted(cls, temperatures: Any) -> SensorRegression:
         """Learn from records; a sensor without any value is not learned."""
         values = as_floats(temperatures)
         telling = _telling_rows(values)
         learned = ~np.isnan(telling).all(axis=0)
         found = Gaussian.fitted(telling[:, learned])
         variances = np.diag(found.covariance)
-        own = np.diag(JITTER * np.where(variances > 0, variances, 1.0))
-        reach = TrainingRange.of(temperatures, np.ones(len(values), dtype=bool))
+        own = np.diag(1e-9 * np.where(variances > 0, variances, 1.0))  # also where two sensors show the same
+        reach = TrainingRange.spanned(temperatures, np.ones(len(values), dtype=bool))
         sensors = cls(Gaussian(found.mean, found.covariance + own), learned, reach)
         departures = sensors.departures(values[np.argsort(row_times(temperatures), kind="stable")])
-        lengths = FEWEST << np.arange(20)
-        for length in lengths[lengths <= LARGEST * len(values)]:
+        lengths = 36 << np.arange(20)
+        for length in lengths[lengths <= 0.1 * len(values)]:
             sensors.usual[length] = np.fmax.reduce(np.abs(_running_means(departures, length)))
         return sensors
 
@@ -338,12 +316,15 @@ def _running_means(columns: Array, length: int) -> Array:
 
 
 def _telling_rows(values: Array) -> Array:
-    """Records to learn from: the complete ones where most are, or where gaps would take long; else any."""
+    """At most 20,000 records to learn from: the complete ones where most are, or where gaps would take long; else any.
+
+    A step of the expectation maximisation for records with gaps may take some 5e7 operations.
+    """
     n_rows, n_sensors = values.shape
     complete = np.flatnonzero(~np.isnan(values).any(axis=1))
-    most = int(np.clip(LONGEST_STEP / n_sensors**3, 3 * n_sensors, MOST_LEARNED))
+    most = int(np.clip(5e7 / n_sensors**3, 3 * n_sensors, 20_000))
     if 2 * len(complete) >= n_rows or (most < n_rows and len(complete) >= 10 * n_sensors):
-        return values[complete[one_in_each_part(len(complete), MOST_LEARNED)]]
+        return values[complete[one_in_each_part(len(complete), 20_000)]]
     return values[one_in_each_part(n_rows, most)]
 
 
@@ -351,7 +332,8 @@ def _telling_rows(values: Array) -> Array:
 class WeatherFunctions:
     """Functions of the weather, of which a sum stands for what a mapper may have mislearned.
 
-    A constant, principal coordinates of the standardised weather and their squares, and two hinges of the first one.
+    A constant, three principal coordinates of the standardised weather and their squares, and two hinges of the first
+    coordinate, where the weather is cold and where it is hot.
     """
 
     mean: Array
@@ -360,15 +342,15 @@ class WeatherFunctions:
     reach: Array
 
     @classmethod
-    def of(cls, weather: Array) -> WeatherFunctions:
+    def fitted(cls, weather: Array) -> WeatherFunctions:
         """The functions for records, (n_records, n_inputs), without gaps in those that count."""
         known = weather[~np.isnan(weather).any(axis=1)]
         centre, directions = weather_axes(known)
-        directions = directions[:MOST_COORDINATES]
+        directions = directions[:3]
         spread = ((known - centre) @ directions.T).std(axis=0)
         directions = directions / np.where(spread > 0, spread, 1.0)[:, np.newaxis]
         places = (known - centre) @ directions.T
-        ends = np.quantile(places[:, 0], COLD_AND_HOT)
+        ends = np.quantile(places[:, 0], (0.15, 0.85))
         return cls(centre, directions, ends, np.array([places.min(axis=0), places.max(axis=0)]))
 
     @property
@@ -385,13 +367,13 @@ class WeatherFunctions:
         return np.hstack([np.ones_like(first), places, places**2 - 1, *hinges])
 
 
-def weather_coordinates(weather: Array, explained: float = EXPLAINED) -> Pipeline:
+def weather_coordinates(weather: Array, explained: float = 0.99) -> Pipeline:
     """Principal components of the standardised weather, in which similar records are near each other."""
     with np.errstate(divide="ignore", invalid="ignore"):  # of weather that is always the same
         return make_pipeline(StandardScaler(), PCA(explained)).fit(weather)
 
 
-def weather_axes(weather: Array, explained: float = EXPLAINED) -> tuple[Array, Array]:
+def weather_axes(weather: Array, explained: float = 0.99) -> tuple[Array, Array]:
     """The middle of the weather, (n_inputs,), and its principal directions per degree, (n_coordinates, n_inputs).
 
     A direction has the sign that does not depend on rounding where two inputs weigh alike.
@@ -415,7 +397,7 @@ class NearestPlaces:
     def _tree(self) -> NearestNeighbors:
         return NearestNeighbors(n_neighbors=self.number).fit(self.places)
 
-    def of(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
+    def nearest(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
         """Mean distance (n_wanted,) to the places nearest to each wanted one, and their positions, nearest first,
         (n_wanted, number)."""
         distances, near = np.empty(len(wanted)), np.empty((len(wanted), self.number), dtype=np.int32)
@@ -447,12 +429,13 @@ def nearest_in_parts(
 def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, number: int) -> Array:
     """Mean of each column's values at the places nearest to each wanted one, among those where the column is used.
 
-    One search for all columns finds enough places for most rows; the others have a search for each column.
+    One search for all columns, of a quarter more places than a column with gaps in a third of them needs, finds enough
+    places for most rows; the others have a search for each column.
     """
     means, shares = np.full((len(wanted), values.shape[1]), np.nan), used.mean(axis=0) if len(used) else np.zeros(0)
     if not len(places):
         return means
-    enough = number if shares.min() == 1 else int(np.ceil(SPARE * number / max(shares.min(), LEAST_SHARE)))
+    enough = number if shares.min() == 1 else int(np.ceil(1.25 * number / max(shares.min(), 1 / 3)))
     filled = np.where(used, values, 0.0)
     for part, _, near in nearest_in_parts(places, wanted, enough, n_columns=values.shape[1]):
         known = used[near]
@@ -490,25 +473,26 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
     """A warning about temperatures that behave like frequencies, and one about frequencies that behave like
     temperatures.
 
-    Frequencies are positive, vary by a few percent of their median, and rise and fall together. Temperatures in degrees
-    Celsius vary by far more, and are nearly equal.
+    Frequencies are positive, vary by a few percent of their median, at most 15, and rise and fall together (rank
+    correlation above .1). Temperatures in degrees Celsius vary five times as much, and are nearly equal (rank
+    correlation above .6).
     """
-    if len(temperatures) < LEAST_ROWS:
+    if len(temperatures) < 30:
         return
-    T, F = Columns(temperatures, "T"), Columns(frequencies, "f")
-    steady = F.variation[F.variation <= STEADY]
-    usual = np.median(steady) if len(steady) else np.min(T.variation, initial=STEADY)
-    is_temperature = (F.variation >= UNSTEADY * usual) & (len(steady) > 0 or (T.variation <= STEADY).any())
-    is_mode = (T.variation <= AS_STEADY * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
-    is_mode &= T.variation <= STEADY
+    T, F = TypicalColumns(temperatures, "T"), TypicalColumns(frequencies, "f")
+    steady = F.variation[F.variation <= 0.15]
+    usual = np.median(steady) if len(steady) else np.min(T.variation, initial=0.15)
+    is_temperature = (F.variation >= 5.0 * usual) & (len(steady) > 0 or (T.variation <= 0.15).any())
+    is_mode = (T.variation <= 3.0 * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
+    is_mode &= T.variation <= 0.15
     if not is_mode.any() and not is_temperature.any():
         return
-    ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=LEAST_ROWS).fillna(0).to_numpy()
+    ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=30).fillna(0).to_numpy()
     n_sensors = len(T.names)
     among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
     together = across[:, ~is_temperature].mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
-    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), TOGETHER)
-    is_temperature &= ((across > ALIKE) & T.nearly(F))[~is_mode].any(axis=0)
+    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), 0.1)
+    is_temperature &= ((across > 0.6) & T.nearly(F))[~is_mode].any(axis=0)
     if is_mode.any():
         yield RecordsWarning(
             f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
@@ -525,11 +509,11 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
         )
 
 
-class Columns:
-    """Columns of a table, of rows evenly spread, with their robust statistics."""
+class TypicalColumns:
+    """TypicalColumns of a table, of rows evenly spread, with their robust statistics."""
 
     def __init__(self, table: Table, default: str):
-        values = as_floats(table)[spread_evenly(np.arange(len(table)), MOST_ROWS)]
+        values = as_floats(table)[spread_evenly(np.arange(len(table)), 2000)]
         self.values, self.names = values, column_names(table, default)
         self.median, self.deviation = median(values), robust_deviation(values)
         positive = (np.fmin.reduce(values) > 0) & (self.deviation > 0)
@@ -538,14 +522,14 @@ class Columns:
     def named(self, chosen: NDArray[np.bool_]) -> list:
         return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
 
-    def reach(self, others: Columns) -> NDArray[np.bool_]:
+    def reach(self, others: TypicalColumns) -> NDArray[np.bool_]:
         """Which others have about the magnitude of some of these."""
-        lowest, highest = np.nanmin(self.median) / MAGNITUDES, np.nanmax(self.median) * MAGNITUDES
+        lowest, highest = np.nanmin(self.median) / 10, np.nanmax(self.median) * 10
         return (others.median >= lowest) & (others.median <= highest)
 
-    def nearly(self, others: Columns) -> NDArray[np.bool_]:
+    def nearly(self, others: TypicalColumns) -> NDArray[np.bool_]:
         """Which pairs with others could be temperatures of the same place, (n_columns, n_others)."""
         difference = np.abs(self.median[:, np.newaxis] - others.median)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = self.deviation[:, np.newaxis] / others.deviation
-        return (difference <= DEGREES) & (ratio >= 1 / RATIO) & (ratio <= RATIO)
+        return (difference <= 20) & (ratio >= 1 / 3) & (ratio <= 3)

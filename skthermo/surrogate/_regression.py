@@ -149,9 +149,9 @@ class MultiplierRegressor(RegressorMixin, Estimator):
             If ``return_std`` is set and the regressor gives no standard deviations.
         """
         theta, std = self._regress(self._inputs(X), check_flag(return_std, "return_std"))
-        if std is None:
-            return self._as_targets(X, theta)
-        return self._as_targets(X, theta), self._as_targets(X, std)
+        names, is_vector = self.parameter_names_, self.y_is_vector_
+        table = like_targets(X, theta, names, is_vector=is_vector)
+        return table if std is None else (table, like_targets(X, std, names, is_vector=is_vector))
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over parameters.
@@ -221,7 +221,8 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         self.n_parameters_ = y.shape[1]
         self.log_inputs_, self.log_targets_ = log_inputs and bool((X > 0).all()), bool((y > 0).all())
         X, y = np.log(X) if self.log_inputs_ else X, np.log(y) if self.log_targets_ else y
-        self.inputs_, self.targets_ = (StandardScaler().fit(values, sample_weight=weights) for values in (X, y))
+        self.inputs_ = StandardScaler().fit(X, sample_weight=weights)
+        self.targets_ = StandardScaler().fit(y, sample_weight=weights)
         X, y = self.inputs_.transform(X), self.targets_.transform(y)
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, seeded(random_state))
@@ -252,10 +253,6 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         with np.errstate(over="ignore"):
             theta[complete] = np.exp(found) if self.log_targets_ else found
         return theta, std * theta if std is not None and self.log_targets_ else std
-
-    def _as_targets(self, X: Table, values: Array) -> Any:
-        """Predictions as a vector or a frame if the training targets were."""
-        return like_targets(X, values, self.parameter_names_, is_vector=self.y_is_vector_)
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()

@@ -118,8 +118,8 @@ def is_named_simply(service, sensors, columns, start):
     before = service.T.loc[: T.index[0]].iloc[:-1]
     for n_days in range(1, WEEK + 1):
         until = T.loc[: T.index[0].normalize() + pd.Timedelta(days=n_days, nanoseconds=-1)]
-        text = sensors.warning(pd.concat([before, until]).loc[until.index[-1] - pd.Timedelta(days=WEEK) :])
-        if text.startswith(repr(columns[0])):
+        found = sensors.doubts(pd.concat([before, until]).loc[until.index[-1] - pd.Timedelta(days=WEEK) :])
+        if any(str(one).startswith(repr(columns[0])) for one in found):
             return True
     return False
 
@@ -188,7 +188,7 @@ def naming(folder, seeds):
             cases = service.cases(kind)
             of.setdefault(KINDS[kind], []).extend(service.is_named(kind, *case) for case in cases)
             if kind == "offset":
-                sensors = SensorRegression.of(service.baseline[0])
+                sensors = SensorRegression.fitted(service.baseline[0])
                 of.setdefault(SIMPLE, []).extend(is_named_simply(service, sensors, *case) for case in cases)
         number, years = false.get(service.name, (0, 0.0))
         false[service.name] = number + (service.healthy["kind"] != "dead").sum(), years + service.years

@@ -153,7 +153,7 @@ def test_every_estimator_gets_temperatures_filled_from_the_other_sensors(estimat
     holed = with_gaps(["T1"], [0, 7])
     fitted = compensator(estimator).fit(holed)
     filled = T.copy()
-    filled["T1"] = SensorRegression.of(holed[T.columns]).fill(holed[T.columns])[0][:, 0]
+    filled["T1"] = SensorRegression.fitted(holed[T.columns]).fill(holed[T.columns])[0][:, 0]
     expected = np.log(F / clone(estimator).fit(filled, F).predict(filled))
     # memory may be laid out otherwise, and then linear algebra rounds otherwise
     measured = np.delete(np.arange(len(X)), [0, 7])

@@ -20,7 +20,7 @@ def test_predictions_err_as_least_squares_on_the_weather_do(fem):
     """What depends on the weather by its functions is predicted exactly, and noise as much as the weights say."""
     residuals = fem.recorder_.residuals
     inputs = residuals.weather[:60]
-    basis, weights = WeatherFunctions.of(residuals.weather), residuals.prediction_weights(inputs)
+    basis, weights = WeatherFunctions.fitted(residuals.weather), residuals.prediction_weights(inputs)
     functions = basis.values(inputs)
     law = np.random.RandomState(0).standard_normal((basis.size, 1))
     of_records = basis.values(residuals.weather) @ law

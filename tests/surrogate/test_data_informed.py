@@ -209,7 +209,7 @@ def test_impossible_parameters_are_nan_with_a_warning():
             return theta
 
     model = chain(inverse=trained(), mapper=Wild(LinearRegression())).fit(T, F)
-    with pytest.warns(UserWarning, match="2 of 365 .*row 2.*impossible-parameters"):
+    with pytest.warns(UserWarning, match="impossible-parameters"):
         predicted = model.predict(T)
     np.testing.assert_array_equal(np.flatnonzero(predicted.isna().all(axis=1)), [2, 5])
 

@@ -2,7 +2,6 @@
 
 import pickle
 from copy import deepcopy
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,8 +10,8 @@ from sklearn.base import clone
 from sklearn.linear_model import Ridge
 
 from skthermo.datasets import make_truss
-from skthermo.fem import CallableModel
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper, _simulator, refitted
+from skthermo.fem import AffineModel, CallableModel
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper, refitted
 from skthermo.surrogate._simulator import Simulator
 from tests.fem.frames import portal
 
@@ -144,97 +143,56 @@ CHANGES = [
 ]
 
 
-def test_each_change_is_made_once_and_is_no_other(simulator):
-    first, again = ([change(simulator) for change in CHANGES] for _ in range(2))
-    assert all(one is other for one, other in zip(first, again, strict=True))
-    assert len({id(one) for one in first}) == len(CHANGES)
-    for made, change in zip(first, CHANGES, strict=True):
-        theta = np.hstack([THETA, np.full((5, len(made.box) - 4), 0.95)])
-        fresh = change(Simulator(TRUSS, simulator.reduced, BOX, 1e-6))
-        np.testing.assert_array_equal(made.frequencies(theta), fresh.frequencies(theta))
-        np.testing.assert_allclose(made.frequencies(theta), made.model.frequencies(theta), rtol=1e-6)
+@pytest.mark.parametrize("change", CHANGES)
+def test_changes_are_those_of_the_model(simulator, change):
+    made = change(simulator)
+    theta = np.hstack([THETA, np.full((5, len(made.box) - 4), 0.95)])
+    np.testing.assert_allclose(made.frequencies(theta), made.model.frequencies(theta), rtol=1e-6)
+    np.testing.assert_array_equal(made.frequencies(theta), change(simulator).frequencies(theta))
 
 
-def test_a_simulator_of_another_model_knows_none(simulator):
+def test_copies_make_the_same(simulator):
     damaged = simulator.damaged({"bottom": 0.1})
-    other = TRUSS.damaged({"top": 0.3})
-    twin = replace(simulator, model=other, reduced=other.reduced(BOX, tol=1e-6, random_state=0))
-    changed = twin.damaged({"bottom": 0.1})
-    assert changed is not damaged
-    expected = other.damaged({"bottom": 0.1}).frequencies(THETA)
-    np.testing.assert_allclose(changed.frequencies(THETA), expected, rtol=1e-6)
-
-
-def test_copies_are_small_and_make_the_same(simulator):
-    size = len(pickle.dumps(simulator))
-    damaged = simulator.damaged({"bottom": 0.1})
-    assert len(pickle.dumps(simulator)) == size
     for twin in (pickle.loads(pickle.dumps(simulator)), deepcopy(simulator)):
-        again = twin.damaged({"bottom": 0.1})
-        assert again is not damaged
-        np.testing.assert_array_equal(again.frequencies(THETA), damaged.frequencies(THETA))
-
-
-def test_a_chain_on_a_model_that_was_reduced_by_hand_has_them_too():
-    simulator = Simulator(TRUSS.reduced(BOX, random_state=0))
-    assert simulator.damaged({"top": 0.1}) is simulator.damaged({"top": 0.1})
-
-
-def test_full_models_are_not_kept():
-    simulator = Simulator(TRUSS)
-    assert simulator.damaged({"top": 0.1}) is not simulator.damaged({"top": 0.1})
+        np.testing.assert_array_equal(twin.damaged({"bottom": 0.1}).frequencies(THETA), damaged.frequencies(THETA))
 
 
 USUAL = np.exp(np.random.default_rng(1).normal(0, 1, (300, 1)) * [0.02, -0.01, 0.015, 0.01])
 
 
-def with_surfaces(known=None):
-    return Simulator.around(TRUSS, USUAL, 1e-5, known)
+def solved_rows(monkeypatch):
+    """Numbers of rows that models solve, noted from here on."""
+    numbers, solve = [], AffineModel.frequencies
+
+    def noted(self, theta):
+        numbers.append(len(theta))
+        return solve(self, theta)
+
+    monkeypatch.setattr(AffineModel, "frequencies", noted)
+    return numbers
 
 
-def test_many_rows_come_from_a_surface_and_the_others_are_counted():
-    simulator = with_surfaces().damaged({"top": 0.2})
-    later = np.vstack([np.repeat(USUAL, 4, axis=0), [[1.3, 1, 1, 1]], [[np.nan, 1, 1, 1]], 2 * USUAL[:3]])
-    with pytest.warns(UserWarning, match="4 of .*outside-reduced-model"):
-        found = simulator.frequencies(later)
+def test_most_of_many_rows_come_from_a_surface(monkeypatch):
+    simulator = Simulator.around(TRUSS, USUAL, 1e-5).damaged({"top": 0.2})
+    later = np.vstack([np.repeat(USUAL, 8, axis=0), [[1.3, 1, 1, 1]], [[np.nan, 1, 1, 1]], 2 * USUAL[:3]])
+    numbers = solved_rows(monkeypatch)
+    found = simulator.frequencies(later)
+    assert sum(numbers) < len(later) / 3
     exact = simulator.model.frequencies(later[~np.isnan(later).any(axis=1)])
     np.testing.assert_allclose(found[~np.isnan(found).any(axis=1)], exact, rtol=1.5e-5)
-    assert np.isnan(found[1201]).all()
-    (surface,) = simulator._known.surfaces.values()
-    counts = simulator.solved
-    assert counts["surface"] >= 1150
-    assert sum(counts.values()) == 1204 + surface.n_solves_
-    assert counts["full"] == 4
+    assert np.isnan(found[2401]).all()
+    assert [one.kind for one in simulator.doubts_at(later)] == ["outside-reduced-model"]
 
 
-def test_a_surface_does_not_depend_on_what_was_asked_before():
-    rows = np.repeat(USUAL, 8, axis=0)
-    one, other = with_surfaces(), with_surfaces()
-    one.frequencies(rows[:900])
-    one.frequencies(USUAL[:1])
-    np.testing.assert_array_equal(one.frequencies(rows), pickle.loads(pickle.dumps(other)).frequencies(rows))
-    np.testing.assert_array_equal(one.frequencies(rows[:100], n_rows=2400), other.frequencies(rows, n_rows=2400)[:100])
-
-
-def test_few_rows_full_models_and_growing_damage_have_no_surface():
-    few, exact = with_surfaces(), Simulator.around(TRUSS, USUAL, False)
-    full = Simulator.around(TRUSS, USUAL, "auto")
+def test_few_rows_full_models_and_growing_damage_have_no_surface(monkeypatch):
+    few, exact = Simulator.around(TRUSS, USUAL, 1e-5), Simulator.around(TRUSS, USUAL, False)
     rows = np.repeat(USUAL, 10, axis=0)
-    few.frequencies(USUAL)
-    exact.frequencies(rows, n_rows=30_000)
-    full.frequencies(rows)
     growing = few.with_damage_parameters(["top"], 0.0, 0.2)
-    growing.frequencies(np.hstack([rows, np.full((3000, 1), 0.9)]))
-    assert all(one.solved["surface"] == 0 for one in (few, exact, full, growing))
-    np.testing.assert_allclose(full.frequencies(rows, n_rows=30_000), TRUSS.frequencies(rows), rtol=4e-6)
-    assert full.solved["surface"] > 2900
-
-
-def test_those_asked_for_last_are_kept(simulator, monkeypatch):
-    severities = [0.1, 0.2, 0.3]
-    one, two, three = (simulator.damaged({"top": severity}) for severity in severities)
-    monkeypatch.setattr(_simulator, "MOST_KEPT", three.size + one.size)
-    assert simulator.damaged({"top": 0.1}) is one
-    assert simulator.damaged({"top": 0.3}) is three
-    assert simulator.damaged({"top": 0.1}) is one
-    assert simulator.damaged({"top": 0.2}) is not two
+    for simulator, theta in (
+        (few, USUAL),
+        (exact, rows),
+        (growing, np.hstack([rows, np.full((3000, 1), 0.9)])),
+    ):
+        numbers = solved_rows(monkeypatch)
+        simulator.frequencies(theta)
+        assert sum(numbers) == len(theta)

@@ -102,12 +102,8 @@ def test_rows_that_end_outside_the_box_are_solved_by_the_full_model_and_counted(
     np.testing.assert_array_equal(found.full_solves > 0, outside)
     assert (found.solves > found.full_solves).all()
     assert is_same(found, exact)
-    count = found.full_solves.sum()
-    with pytest.warns(UserWarning, match="12 rows") as said:
+    with pytest.warns(UserWarning, match="outside the box of the reduced model.*outside-reduced-model"):
         reduced.transform(F)
-    (text,) = (one for one in map(str, (warning.message for warning in said)) if "reduced model" in one)
-    assert text.startswith("the parameters of 3 of 12 rows, row 4 the first, are outside the box")
-    assert f"full one was solved {count} times" in text
 
 
 @pytest.mark.nightly
@@ -115,9 +111,8 @@ def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
     T, F = records(0.7, 0.95)
     with pytest.warns(UserWarning, match="(?s).*") as said:
         fem = chain().fit(T, F)
-    texts = [str(warning.message) for warning in said]
-    (text,) = (one for one in texts if one.startswith("no reduced model is accurate to 1e-05"))
-    assert "after 4 rounds" in text
+    (text,) = (str(one.message) for one in said if one.message.kind == "no-reduced-model")
+    assert "expected errors up to 1e-05" in text
     found = fem.inverse_.invert(F)
     assert fem.inverse_.simulator_.reduced is fem.simulator_.reduced is None
     assert fem.report_.parameters.n_full_solves == 0  # beside a reduced model

@@ -51,7 +51,7 @@ def test_means_of_autoregressions_have_the_variance_of_the_closed_form():
     for memory in (0.0, 0.6, 0.9):
         ratios = []
         for _ in range(12):
-            scatter = Scatter.of(residuals(noise(memory, 1000, random) @ ROOT.T))
+            scatter = Scatter.estimated(residuals(noise(memory, 1000, random) @ ROOT.T))
             weights = np.full((60, 2), 1 / 60)
             found = scatter.of_sums(weights, np.arange(60)).sum(axis=0)
             ratios.append(found / (correlations(memory, 60).sum() / 60**2))
@@ -60,7 +60,7 @@ def test_means_of_autoregressions_have_the_variance_of_the_closed_form():
 
 def test_independent_records_have_no_lasting_part():
     random = np.random.RandomState(2)
-    found = [Scatter.of(residuals(noise(0.0, 500, random))) for _ in range(20)]
+    found = [Scatter.estimated(residuals(noise(0.0, 500, random))) for _ in range(20)]
     assert np.mean([scatter.memory == 0.0 for scatter in found]) >= 0.9
     assert all((scatter.parts[1] == 0).all() for scatter in found if scatter.memory == 0.0)
     assert np.mean([scatter.variances for scatter in found]) == pytest.approx(1, abs=0.03)
@@ -70,7 +70,7 @@ def test_a_small_part_that_lasts_is_seen():
     """A tenth of the variance that lasts for twenty records makes the variance of long means three times as large."""
     random = np.random.RandomState(3)
     table = np.sqrt(0.9) * noise(0.0, 1500, random) + np.sqrt(0.1) * noise(0.9, 1500, random)
-    scatter = Scatter.of(residuals(table))
+    scatter = Scatter.estimated(residuals(table))
     assert 0.75 < scatter.memory < 0.97
     whole = scatter.of_sums(np.full((300, 2), 1 / 300), np.arange(300)).sum(axis=0)
     expected = 0.9 / 300 + 0.1 * correlations(0.9, 300).sum() / 300**2
@@ -106,7 +106,7 @@ def test_modes_with_gaps_and_modes_that_hardly_any_record_has():
     table[::3, 0], table[10:, 2] = np.nan, np.nan
     given = residuals(table)
     given.less_similar = lambda values: values
-    scatter = Scatter.of(given)
+    scatter = Scatter.estimated(given)
     np.testing.assert_allclose(scatter.variances, [1, 9, 0], rtol=0.2)
     assert scatter.variances[2] == 0  # of ten records nothing is said
     assert np.linalg.eigvalsh(scatter.parts[0][:2, :2]).min() > 0
@@ -116,6 +116,6 @@ def test_residuals_of_a_mapper_that_has_learned_noise_are_not_trusted():
     random = np.random.RandomState(6)
     given = residuals(noise(0.0, 400, random))
     given.own, given.is_overfitted = 0.1 * given.values, True
-    assert Scatter.of(given).variances.mean() == pytest.approx(1, abs=0.15)
+    assert Scatter.estimated(given).variances.mean() == pytest.approx(1, abs=0.15)
     given.is_overfitted = False
-    assert Scatter.of(given).variances.mean() < 0.2
+    assert Scatter.estimated(given).variances.mean() < 0.2

@@ -9,8 +9,7 @@ from scipy.spatial import cKDTree
 
 from skthermo.preprocessing import HampelFilter
 from skthermo.surrogate import resampled
-from skthermo.surrogate.chain import _records
-from skthermo.surrogate.chain._records import ServiceRecords
+from skthermo.surrogate.chain._service import ServiceRecords
 from tests.surrogate.chains import F, T, chain
 
 
@@ -58,7 +57,7 @@ def flawless():
     return chain(random_state=0).fit(T, F)
 
 
-def test_trees_find_the_same_records_of_similar_weather(monkeypatch):
+def test_trees_find_the_same_records_of_similar_weather():
     missing = np.column_stack([lasting(2000, 0.2, 8, seed=1), lasting(2000, 0.05, 2, seed=2)])
     records, shares = records_with(missing), np.linspace(0, 1, 200, endpoint=False)
     trees = {joint: cKDTree(records.places[rows]) for joint, rows in records._joints.items()}
@@ -68,8 +67,7 @@ def test_trees_find_the_same_records_of_similar_weather(monkeypatch):
             assert found[0] == found[1]
     drawn = []
     for few in (0, 10**6):
-        monkeypatch.setattr(_records, "FEW", few)
-        taken = [records.draw(records.places, np.random.RandomState(seed)) for seed in range(15)]
+        taken = [records.draw(records.places, np.random.RandomState(seed), many=few) for seed in range(15)]
         drawn.append(missing[np.concatenate(taken)].mean(axis=0))
     np.testing.assert_allclose(drawn[0], drawn[1], atol=0.05)  # some four standard deviations
 

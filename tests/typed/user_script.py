@@ -9,11 +9,20 @@ from scipy.sparse import csc_array
 from sklearn.linear_model import LinearRegression
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import AffineModel, add_noise, evaluate, sample
 from skthermo.metrics import error_table, mape, probability_of_detection, time_to_detection
 from skthermo.preprocessing import BiasAligner, HingeFeatures, KNNGapImputer, LagFeatures, ModeTracker
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
+from skthermo.studies import DetectabilityStudy, DetectionTask, detection_task, sweep
+from skthermo.surrogate import (
+    DataInformedFEM,
+    InverseSurrogate,
+    PosteriorInverse,
+    TemperatureMapper,
+    refitted,
+    resampled,
+    with_model,
+)
 from skthermo.updating import identifiability
 
 Frame: TypeAlias = pd.DataFrame
@@ -103,14 +112,24 @@ by_position = TemperatureCompensator(LinearRegression(), targets=[3, 4, 5, 6, 7,
 assert_type(by_position.fit_transform(both.to_numpy()), Array)
 assert_type(by_position.transform(both.to_numpy()), Array)
 assert_type(by_position.extrapolation_distance(both.to_numpy()), Array)
-alarm = WindowedAlarm(3, contamination=0.1).fit(residuals)
-assert_type(alarm, WindowedAlarm)
-assert_type(alarm.damage_index(residuals), pd.Series)
+on_residuals = MahalanobisDetector(contamination=0.1).fit(residuals)
+assert_type(on_residuals.damage_index(residuals), pd.Series)
 assert_type(MahalanobisDetector().fit(year.frequencies.to_numpy()).damage_index(f), Array)
-assert_type(alarm.predict(residuals), NDArray[np.int64])
+assert_type(on_residuals.predict(residuals), NDArray[np.int64])
 assert_type(time_to_detection([1.0, 2.0], 1.5), float)
 assert_type(mape(F, fem.predict(T)), Array)
 assert_type(error_table(F, fem.predict(T)), Frame)
+
+# A chain in a study and in a task of scikit-learn's searches.
+scenarios = sweep(model, (0.1, 0.2), groups=["bottom"])
+study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, uncertainty="noise", random_state=0)
+assert_type(study, DetectabilityStudy)
+assert_type(study.run(weather), Frame)
+task = detection_task(fem, weather, scenarios, random_state=0)
+assert_type(task, DetectionTask)
+assert_type(refitted(fem, T, F), DataInformedFEM)
+assert_type(resampled(fem, 0), DataInformedFEM)
+assert_type(with_model(fem, model), DataInformedFEM)
 
 # The model.
 drawn = sample(model, 0.2, 50, random_state=0)

@@ -190,7 +190,7 @@ class FleetMapper(RegressorMixin, Estimator):
         self.basis_, self.centre_ = known.basis, found.centre
         self.coefficients_, self.covariance_ = with_levels(found, state)
         self.misfit_ = (FleetNoise() if known.noise is None else known.noise).misfit(found, families)
-        self.own_range_ = TrainingRange.of(frame_like(X, inputs), trained)
+        self.own_range_ = TrainingRange.spanned(frame_like(X, inputs), trained)
         own = self.own_range_
         fleet = own if self.prior is None else self.prior.reach_
         lowest, highest = np.minimum(own.lowest, fleet.lowest), np.maximum(own.highest, fleet.highest)

@@ -169,7 +169,7 @@ class FleetPrior(Estimator):
         self.bridge_families_ = of_bridge
         self.parameter_names_ = list(dict.fromkeys(name for by_name in of_bridge.values() for name in by_name))
         ends = np.array([end(one.inputs, axis=0) for one in records for end in (np.min, np.max)])
-        self.reach_ = TrainingRange.of(ends if inputs is None else pd.DataFrame(ends, columns=inputs), slice(None))
+        self.reach_ = TrainingRange.spanned(ends if inputs is None else pd.DataFrame(ends, columns=inputs), slice(None))
         return self
 
     def mapper(

@@ -80,7 +80,7 @@ class DailyNoise:
         known = ~np.isnan(values)
         common = (regressors * known[:, :, np.newaxis]).sum(axis=1) / np.maximum(known.sum(axis=1), 1)[:, np.newaxis]
         residuals = DailyResiduals(values, common)
-        scatter = Scatter.of(residuals)
+        scatter = Scatter.estimated(residuals)
         freedom = np.maximum(scatter.n_records - common.shape[1], 1)
         alone = np.nansum(residuals.less_similar(values) ** 2, axis=0) / freedom
         fresh, fading = np.diagonal(scatter.parts, axis1=1, axis2=2)

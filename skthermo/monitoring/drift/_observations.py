@@ -169,7 +169,7 @@ class DailyRecords:
     @classmethod
     def of(cls, fem: Any, T: Any) -> DailyRecords:
         """Learn the weather, and the frequencies in it."""
-        return cls(fem, WeatherFunctions.of(weather(fem, T)), QuadraticFrequencies.of(fem, parameters(fem, T)))
+        return cls(fem, WeatherFunctions.fitted(weather(fem, T)), QuadraticFrequencies.of(fem, parameters(fem, T)))
 
     def means(self, T: Any, F: Any, days: pd.DatetimeIndex, before: float = np.nan) -> DailyMeans:
         """Daily means of records; T may begin with earlier rows than F, which lags need."""

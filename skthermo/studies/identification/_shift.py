@@ -58,7 +58,7 @@ class FrequencyShift:
 def record_shifts(fem: Any, T: Any, theta: Array, F: Array) -> Array:
     """The shift of each record at temperatures T with parameters theta, (n_records, n_modes)."""
     residuals = fem.recorder_.residuals.expected(fem.weather(T).inputs)
-    return np.log(F / (healthy_frequencies(fem, theta, warn=True) * (1 + residuals))) - fem.discrepancy_(T)
+    return np.log(F / (healthy_frequencies(fem, theta) * (1 + residuals))) - fem.discrepancy_(T)
 
 
 def outlying(shifts: Array, deviations: Array) -> NDArray[np.bool_]:

@@ -285,7 +285,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         F, self.y_is_vector_ = frequency_table(y)
-        records = checked_records(T, frame_like(F, check_array(F, **options)), self.model, self.memory)
+        records = checked_records(
+            T, frame_like(F, check_array(F, **options)), self.model, self.memory, uses_means=self.mapper is None
+        )
         T, F, usable = records.temperatures, records.frequencies, records.usable
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
         self._clone_parts(records, has_shapes=shapes is not None)
@@ -294,7 +296,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             check_takes_weights(mapper)
         stages = Stages(self, 5, X, y)
         with collected(), stages.stage("noise"):
-            self.sensors_ = SensorRegression.of(T)
+            self.sensors_ = SensorRegression.fitted(T)
             filled = frame_like(T, self.sensors_.fill(T)[0])
             self.noise_ = measurement_noise(mapper, filled, usable)
         with collected() as findings, stages.stage("inverse", inverse):
@@ -311,7 +313,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             fit_checked(mapper, filled, named(filled, found.theta, self.parameter_names_), weights)
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
-            findings = [*records.doubts(self.mapper is None), *findings, *of_mapper, *of_model]
+            findings = [*records.doubts, *findings, *of_mapper, *of_model]
             self.report_ = report_of(self, found, records.findings, findings)
         stages.end()
         warn_each(self.report_.warnings())
@@ -673,8 +675,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
             if part is not None:
                 seed_parts(part, random_state)
-        if self.mapper is None and (means := records.means_of_earlier_temperatures()) is not None:
-            self.mapper_ = make_pipeline(means, self.mapper_)
+        if self.mapper is None and records.means is not None:
+            self.mapper_ = make_pipeline(records.means, self.mapper_)
 
     def _recorder(
         self, T: Table, F: Table, filled: Table, usable: Table, theta: Array, weights: Array | None
@@ -693,8 +695,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         thermal = ThermalModel(
             simulator=simulator,
             aligner=self.aligner_,
-            discrepancy=Discrepancy.fitted(regressor, records.inputs, records.ratios, weights, **parts),
-            training_range=TrainingRange.of(inputs, records.trained),
+            discrepancy=Discrepancy.fitted(regressor, records.inputs, records.usable / modelled, weights, **parts),
+            training_range=TrainingRange.spanned(inputs, records.trained),
             limits=limits_in_weather(theta),
             parameter_names=self.parameter_names_,
             mode_names=self.mode_names_,
@@ -840,7 +842,7 @@ def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | 
         learned = possible(mapper.predict(filled))[0]
         records = replace(records, learned=learned, modelled=fem.thermal_.frequencies(learned))
         parts = {"sensors": fem.sensors_, "mapper": mapper}
-        known = records.inputs, records.ratios, records.weights
+        known = records.inputs, records.usable / records.modelled, records.weights
         discrepancy = Discrepancy.fitted(fem.discrepancy_.regressor, *known, **parts)
     thermal = replace(fem.thermal_, mapper=mapper, discrepancy=discrepancy)
     return copy(fem)._hold(RecordSimulator(thermal, records, fem.recorder_.service))

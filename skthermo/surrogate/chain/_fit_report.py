@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,9 +24,6 @@ from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.weather import SensorRegression
 from skthermo.surrogate.chain._records import TrainingRecords, mode_offsets
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior, unconverged
-
-if TYPE_CHECKING:
-    from skthermo.surrogate.chain._data_informed import DataInformedFEM
 
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 
@@ -126,7 +123,7 @@ class FittedParameters(SavesFrames):
     n_full_solves: int
 
     @classmethod
-    def found(cls, chain: DataInformedFEM, found: Bunch, scatter: Array) -> FittedParameters:
+    def found(cls, chain: Any, found: Bunch, scatter: Array) -> FittedParameters:
         """What a chain's inverse has found in the records, given the scatter of each mode."""
         theta = found.theta[~np.isnan(found.theta).any(axis=1)]
         sensitivity = linearise(chain.model, np.median(theta, axis=0), relative=True)[1][0]
@@ -305,7 +302,7 @@ class FitReport(SavesFrames):
                 "offsets in report_.modes, update the model, or use the default aligner and discrepancy",
                 "worse-than-mean",
             )
-        if self.has_hidden_offsets:
+        if self.unexplained_offset > 1:
             hidden = modes["hidden offset"]
             large = hidden[hidden.abs() >= 0.3]
             offsets = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
@@ -349,9 +346,7 @@ class FitReport(SavesFrames):
                 )
 
 
-def report_of(
-    chain: DataInformedFEM, found: Bunch, findings: RecordFindings, doubts: Sequence[SkthermoWarning]
-) -> FitReport:
+def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequence[SkthermoWarning]) -> FitReport:
     """The report of a chain of which all else is fitted; ``found`` is what its inverse gave for the records."""
     modes, unexplained = modes_of(chain)
     return FitReport(
@@ -367,7 +362,7 @@ def report_of(
     )
 
 
-def modes_of(chain: DataInformedFEM) -> tuple[pd.DataFrame, float]:
+def modes_of(chain: Any) -> tuple[pd.DataFrame, float]:
     """What `FitReport` says of each mode, and the share of the hidden offsets that nothing explains."""
     records, last, F = chain.records_, last_step(chain.inverse_), as_floats(chain.records_.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
@@ -394,7 +389,7 @@ def modes_of(chain: DataInformedFEM) -> tuple[pd.DataFrame, float]:
     return pd.DataFrame(table, index=chain.mode_names_), unexplained
 
 
-def weather_of_fleet(chain: DataInformedFEM) -> pd.DataFrame | None:
+def weather_of_fleet(chain: Any) -> pd.DataFrame | None:
     """Range of each input in the chain's own records, and in those of a fleet that its mapper has learned from."""
     if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.arrays import Array, as_floats, median, refuse_no_table, robust_deviation, spread_evenly
-from skthermo._core.estimators import last_step, predict_with_std, reach_of
+from skthermo._core.arrays import Array, as_columns, as_floats, median, refuse_no_table, robust_deviation, spread_evenly
+from skthermo._core.estimators import _safe_indexing, last_step, predict_with_std, reach_of
 from skthermo._core.frames import Table, column_names, frame_like, row_times
 from skthermo._core.memory import remembered
 from skthermo._core.saved_frames import SavesFrames
@@ -63,11 +63,6 @@ class TrainingRecords(SavesFrames):
             return np.ones(len(self.inputs), dtype=bool)
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
-    @property
-    def ratios(self) -> Array:
-        """Measured over modelled frequencies, which a discrepancy learns."""
-        return self.usable / self.modelled
-
     def resampled(
         self, residuals: BaselineResiduals, discrepancy: Discrepancy, random_state: np.random.RandomState
     ) -> TrainingRecords:
@@ -107,7 +102,7 @@ class TrainingRecords(SavesFrames):
             least = 2 * N_FOLDS
             raise ValueError(f"{has_theta.sum()} records have parameters; expected at least {least} for residuals")
         own = measured / (self.modelled[order] * np.exp(model.discrepancy.at(inputs))) - 1
-        records = as_frame(self.temperatures).iloc[order]
+        records = _safe_indexing(self.temperatures, order)
         fold_of = remembering_folds(records, inputs, own)
         learner, names = last_step(model.mapper), list(self.parameter_names)
 
@@ -133,26 +128,29 @@ class TrainingRecords(SavesFrames):
         residuals = BaselineResiduals(
             inputs[known], values[known], own[known], fold_of[known], order[known], (theta / predicted)[known]
         )
-        if np.isnan(deviations).all():
+        reach = reach_of(learner, inputs)
+        if reach is None:
             consequence = "Standard deviations, intervals and noise are unreliable there"
             return replace(residuals, findings=tuple(unseen_weather(records, fold_of, consequence)))
-        errors = model.propagated(predicted, deviations)[known]
-        reach = (reach_of(learner, inputs) or (None,))[0]
-        return replace(residuals, errors=errors, reach=reach, beyond=beyond[known, 0])
+        errors = model.propagated(predicted, np.nan_to_num(deviations))[known]
+        return replace(residuals, errors=errors, reach=reach[0], beyond=beyond[known, 0])
 
 
 def stated_by(mapper: BaseEstimator, inputs: Array) -> Array:
-    """What a fitted mapper predicts, with standard deviations, NaN where it knows none, side by side.
+    """Predictions of a fitted mapper, standard deviations, and how far inputs are outside its weather, side by side.
 
-    The last column is how far inputs are outside the weather that it is based on.
+    Only a mapper with ``reach_``, the weather that it is based on, says the latter two.
     """
-    theta, deviations = predict_with_std(mapper, inputs)
     reach = reach_of(mapper, inputs)
-    beyond = np.zeros(len(inputs)) if reach is None else reach[0].excess(reach[1]).mean(axis=1)
-    return np.column_stack([theta, np.full_like(theta, np.nan) if deviations is None else deviations, beyond])
+    if reach is None:  # standard deviations of such a mapper are added to the scatter of all residuals
+        theta = as_columns(mapper.predict(inputs))
+        return np.column_stack([theta, np.full_like(theta, np.nan), np.zeros(len(inputs))])
+    theta, deviations = predict_with_std(mapper, inputs)
+    deviations = np.full_like(theta, np.nan) if deviations is None else deviations
+    return np.column_stack([theta, deviations, reach[0].excess(reach[1]).mean(axis=1)])
 
 
-def remembering_folds(records: pd.DataFrame, inputs: Array, own: Array) -> NDArray[np.intp]:
+def remembering_folds(records: Table, inputs: Array, own: Array) -> NDArray[np.intp]:
     """The fold of each record, in blocks of a week or of five correlation times of in-sample residuals."""
     known = ~np.isnan(own).all(axis=1)
     in_sample = BaselineResiduals(inputs[known], own[known], own[known], np.zeros(known.sum(), dtype=np.intp))
@@ -174,41 +172,41 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
 class CheckedRecords(NamedTuple):
     """Records that a chain learns, without values that cannot be; ``usable`` frequencies are without outliers.
 
-    ``findings`` is what `check_records` has found, ``warned`` the warnings of what was set aside and looks misplaced.
+    ``findings`` is what `check_records` has found, ``means`` the transformer that gives means of earlier temperatures
+    which the frequencies remember, if they do, and ``doubts`` hold warnings.
     """
 
     temperatures: Table
     frequencies: Table
     usable: Table
     findings: RecordFindings
-    warned: list[SkthermoWarning]
-
-    def means_of_earlier_temperatures(self) -> BaseEstimator | None:
-        """The transformer that gives means which the frequencies remember; None where they remember none."""
-        means = getattr(self.findings.memory, "features", None)
-        is_known = means is not None and set(means.sensors) <= set(column_names(self.temperatures, "T"))
-        return means if is_known else None
-
-    def doubts(self, has_means: bool) -> list[SkthermoWarning]:
-        """Warnings of all findings but outliers, which train nothing, and slow temperatures where means are used."""
-        mended = {"frequency-outliers"} | ({"slow-temperatures"} if has_means else set())
-        return [*self.warned, *self.findings.warnings(exclude=mended)]
+    means: BaseEstimator | None
+    doubts: list[SkthermoWarning]
 
 
-def checked_records(T: Table, F: Table, model: FEModel, memory: str | Memory | None) -> CheckedRecords:
-    """Check the records that a chain was given, once for all of its parts."""
-    with collected() as warned:
+def checked_records(
+    T: Table, F: Table, model: FEModel, memory: str | Memory | None, *, uses_means: bool
+) -> CheckedRecords:
+    """Check the records that a chain was given, once for all of its parts.
+
+    There is no warning of outliers, which train nothing, nor of slow temperatures for a chain that uses means of them.
+    """
+    with collected() as doubts:
         found = set_aside(T, F, model=model, needs_all=True)
     findings = remembered(memory, check_records, T, F)
     T, F = found.temperatures, found.frequencies
-    warned += [*misplaced_columns(T, F), *doubts_of_modes(model, F)]
+    mended = {"frequency-outliers"} | ({"slow-temperatures"} if uses_means else set())
+    doubts += [*findings.warnings(exclude=mended), *misplaced_columns(T, F), *doubts_of_modes(model, F)]
+    means = getattr(findings.memory, "features", None)
+    if means is not None and not set(means.sensors) <= set(column_names(T, "T")):
+        means = None
     far = findings.outliers
     if isinstance(F, pd.DataFrame) and far.index.is_unique:  # findings may be of longer tables
         far = far.reindex(index=F.index, columns=F.columns, fill_value=False)
     usable = F
     if far.shape == F.shape and far.to_numpy().any():
         usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))
-    return CheckedRecords(T, F, usable, findings, warned)
+    return CheckedRecords(T, F, usable, findings, means, doubts)
 
 
 def mode_offsets(model: FEModel, F: Table) -> pd.Series:
@@ -272,15 +270,10 @@ def measurement_noise(mapper: BaseEstimator, T: Table, F: Table, *, most: int = 
     inputs, changes = as_floats(inputs)[rows], logs[rows] - median(logs)
     ratios, fold_of = np.exp(changes), np.zeros(len(rows), dtype=np.intp)
     if len(rows) >= N_FOLDS:
-        fold_of = BlockedKFold(N_FOLDS).fold_of(as_frame(T).iloc[rows])
+        fold_of = BlockedKFold(N_FOLDS).fold_of(_safe_indexing(T, rows))
 
     def learn(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
         learned = Discrepancy.fitted(ratio_regressor(), inputs[train], ratios[train])
         return lambda test: learned.at(inputs[test])
 
     return np.minimum(robust_deviation(changes - out_of_fold(learn, fold_of)), 0.1)
-
-
-def as_frame(table: Table) -> pd.DataFrame:
-    """A frame of records, whose index holds the times."""
-    return table if isinstance(table, pd.DataFrame) else pd.DataFrame(as_floats(table), copy=False)

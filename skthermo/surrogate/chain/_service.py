@@ -73,13 +73,16 @@ class ServiceRecords:
         """Whether there is a gap or an outlier."""
         return bool(self.missing.any() or not np.isnan(self.outliers).all())
 
-    def draw(self, places: Array, random_state: np.random.RandomState, *, mean_length: float = 25) -> NDArray[np.intp]:
+    def draw(
+        self, places: Array, random_state: np.random.RandomState, *, mean_length: float = 25, many: int = 10_000
+    ) -> NDArray[np.intp]:
         """Positions of the records whose faults rows of weather in order of time have, (n_rows,).
 
         A row takes the record after the one that the row before it took, so that faults last as long as in training.
         Now and then, after a run of ``mean_length`` records in the mean, a record with the same faults and similar
         weather takes over: where a run of faults begins, or in records with the most usual faults, which are mostly
-        none. All records are taken equally often.
+        none. All records are taken equally often. Of ``many`` records, searching a tree is faster than computing all
+        distances.
         """
         n_records, n_rows = len(self.places), len(places)
         if not self.has_faults:
@@ -87,7 +90,6 @@ class ServiceRecords:
         passes = random_state.uniform(size=n_rows) < 1 / mean_length
         which = random_state.uniform(size=n_rows)
         taken = np.empty(n_rows, dtype=np.intp)
-        many = 10_000  # records at a joint, above which searching a tree is faster than computing all distances
         trees = {joint: cKDTree(self.places[rows]) for joint, rows in self._joints.items() if len(rows) > many}
         record = self._similar(0, places[0], which[0], trees) if n_rows else 0
         for row in range(n_rows):

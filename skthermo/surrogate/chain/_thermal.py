@@ -39,8 +39,6 @@ from skthermo.residuals.weather import PredictionError, SensorRegression, Traini
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
 from skthermo.surrogate._simulator import Simulator
 
-POSSIBLE = (1e-6, 1e6)  # range of multipliers; outside it rounding errors swamp the model's matrices
-
 
 def ratio_regressor() -> TemperatureMapper:
     """What learns ratios of frequencies by default, with a penalty for each mode.
@@ -176,7 +174,7 @@ class ThermalModel(SavesFrames):
     def learned(self, T: Table) -> Array:
         """Parameters at complete temperatures, as the mapper gives them, within the limits."""
         theta = as_columns(self.mapper.predict(T))
-        return np.where(is_possible(theta), np.clip(theta, *self.limits), theta)
+        return np.where(is_impossible(theta), theta, np.clip(theta, *self.limits))
 
     def doubts(self, weather: Weather) -> list[SkthermoWarning]:
         """Findings: filled sensors, unknown weather, impossible parameters."""
@@ -201,8 +199,8 @@ class ThermalModel(SavesFrames):
         if weather.impossible.any():
             findings.append(
                 ModelWarning(
-                    f"the mapper gave multipliers outside {POSSIBLE[0]:g} to {POSSIBLE[1]:g}. These rows are NaN. Use "
-                    "a mapper that extrapolates mildly, such as the default",
+                    "the mapper gave multipliers outside 1e-06 to 1e+06. These rows are NaN. Use a mapper that "
+                    "extrapolates mildly, such as the default",
                     "impossible-parameters",
                 )
             )
@@ -294,14 +292,14 @@ def limits_in_weather(estimates: Array, *, beyond: float = 0.3) -> Array:
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     """Parameters, with NaN in rows with impossible values, and a mask of those rows."""
     theta = as_columns(theta).copy()
-    impossible = ~(is_possible(theta) | np.isnan(theta)).all(axis=1)
+    impossible = is_impossible(theta).any(axis=1)
     theta[impossible] = np.nan
     return theta, impossible
 
 
-def is_possible(theta: Array) -> NDArray[np.bool_]:
-    """Which multipliers a model can have."""
-    return (POSSIBLE[0] <= theta) & (theta <= POSSIBLE[1])
+def is_impossible(theta: Array) -> NDArray[np.bool_]:
+    """Which multipliers no model can have: those with which rounding errors swamp its matrices."""
+    return (theta < 1e-6) | (theta > 1e6)
 
 
 def factors_of(parameters: Mapping[str, float], names: Sequence[str]) -> Array:

@@ -59,7 +59,6 @@ from skthermo.surrogate.inverse._steps import (
 )
 
 LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the relative noise that records teach
-MOST_STEPS = 100  # of each row
 
 
 @dataclass(frozen=True)
@@ -196,8 +195,8 @@ def least_noise(log_frequencies: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Posterior:
-    """Posterior modes of records, by an FE model or by a surface in its place.
+class ThermalPosterior:
+    """ThermalPosterior modes of records, by an FE model or by a surface in its place.
 
     ``noise`` is that of all observations, frequencies and components of shapes, (n_observations,). Rows start where the
     response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes no steps of its own,
@@ -240,7 +239,7 @@ class Posterior:
         start = np.zeros((n_rows, len(self.prior.own)))
         if self.surface is not None:
             by_surface = replace(objective.without_shapes(), linearise=self.surface.linearise)
-            found = minimise(by_surface, start, MOST_STEPS)
+            found = minimise(by_surface, start)
             if self.is_program:
                 return found
             start = found.local.x
@@ -253,21 +252,21 @@ class Posterior:
     def _refine_block(self, objective: Objective, start: Array, n_jobs: int | None, rows: slice) -> Refined:
         """Refine rows; where the steps of a reduced model end outside its box, the full model takes the last ones."""
         some = objective.some(rows)
-        found = refine(some, start[rows], MOST_STEPS, sorts=not getattr(self.simulator.model, "track", False))
+        found = refine(some, start[rows], sorts=not getattr(self.simulator.model, "track", False))
         if self.simulator.reduced is None:
             return found
         outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
         if outside.size:
             full = self.linearise(Simulator(self.simulator.model), n_jobs)
-            last = minimise(replace(some.some(outside), linearise=full), found.local.x[outside], MOST_STEPS)
+            last = minimise(replace(some.some(outside), linearise=full), found.local.x[outside])
             last.full_solves += last.solves
             last.solves += found.solves[outside]
             found.put(outside, last)
         return found
 
 
-def inverted(posterior: Posterior, inputs: Array, n_jobs: int | None) -> Bunch:
-    """What `PosteriorInverse.invert` gives, for rows of inputs."""
+def inverted(taught_by: Any, inputs: Array, posterior: ThermalPosterior, n_jobs: int | None) -> Bunch:
+    """What `PosteriorInverse.invert` gives, for rows of inputs; a memory knows a posterior by what has taught it."""
     shape, some = (len(inputs), len(posterior.prior.own)), ~np.isnan(inputs).all(axis=1)
     result = Bunch(
         theta=np.full(shape, np.nan),
@@ -298,7 +297,7 @@ def inverted(posterior: Posterior, inputs: Array, n_jobs: int | None) -> Bunch:
 
 
 def taught(
-    first: Posterior,
+    first: ThermalPosterior,
     inputs: Array,
     reduce: Reduce,
     learns_prior: bool,
@@ -307,7 +306,7 @@ def taught(
     *,
     n_teaching: int = 300,
     n_passes: int = 4,
-) -> Posterior:
+) -> ThermalPosterior:
     """A posterior with prior and noise as records teach them, and a model or surface that suits these records.
 
     At most ``n_teaching`` records, spread evenly, teach. The model is linearised at its nominal state first, and then
@@ -346,7 +345,7 @@ def taught(
 
 
 def with_runs(
-    posterior: Posterior,
+    posterior: ThermalPosterior,
     x: Array,
     runs: list[tuple[Array, Array]],
     n_jobs: int | None,
@@ -354,7 +353,7 @@ def with_runs(
     fewest: int = 200,
     most: int = 600,
     per_term: int = 3,
-) -> Posterior:
+) -> ThermalPosterior:
     """A posterior with a surface through further runs of a program near some ln theta, ``per_term`` of a cubic one."""
     random, n_parameters = np.random.RandomState(len(runs)), x.shape[1]
     number = int(np.clip(per_term * n_terms(n_parameters, 3), fewest, most))
@@ -407,7 +406,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         ``common`` and ``own`` standard deviations, ``covariance``; ``print(prior_)`` says them in words.
     noise_ : ndarray of shape (n_modes,)
         Relative standard deviations of the frequencies.
-    posterior_ : Posterior
+    posterior_ : ThermalPosterior
         Prior, noise and model by which records are inverted.
     simulator_ : Simulator
         The model and, where it is reduced, its reduced model.
@@ -521,9 +520,10 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
-        asked = first, in_order, self.reduce, learns_prior, learns_noise, self.n_jobs
+        asked = first, in_order, self.reduce, learns_prior, learns_noise
         with collected() as self.findings_:
-            known = remembered(self.memory, taught, *asked, ignore=["n_jobs"])
+            known = remembered(self.memory, taught, *asked, self.n_jobs, ignore=["n_jobs"])
+        self._taught_by = None if self.memory is None else asked
         self.simulator_ = replace(known.simulator, model=model)  # not a copy that was read
         self.posterior_ = replace(known, simulator=self.simulator_)
         self.prior_, self.noise_ = known.prior, known.noise[: model.n_modes]
@@ -611,11 +611,12 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_is_fitted(self)
         inputs = self._read(X)
         with collected() as findings:
-            found = remembered(self.memory, inverted, self.posterior_, inputs, self.n_jobs, ignore=["n_jobs"])
+            asked = self._taught_by, inputs, self.posterior_, self.n_jobs
+            found = remembered(self.memory, inverted, *asked, ignore=["posterior", "n_jobs"])
         findings += doubts_of(found)
-        names = self.get_feature_names_out()
-        tables = {name: frame_like(X, found[name], names) for name in ("theta", "std")}
-        return Bunch(**{**found, **tables, "findings": findings})
+        theta = frame_like(X, found.theta, self.parameter_names_)
+        std = frame_like(X, found.std, self.parameter_names_)
+        return Bunch(**{**found, "theta": theta, "std": std, "findings": findings})
 
     @property
     def n_runs_(self) -> int:
@@ -623,7 +624,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_is_fitted(self)
         return self.posterior_.n_runs
 
-    def _first(self, mode_names: Any) -> Posterior:
+    def _first(self, mode_names: Any) -> ThermalPosterior:
         """What is known before the records: what is stated, and first values of the rest."""
         model, shapes = self.model, self.shape_inputs_
         names = tuple(model.parameter_names)
@@ -635,7 +636,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         noise = stated if shapes is None else np.append(stated, shapes.deviations)
         has_derivatives = hasattr(model, "linearised") or hasattr(model, "jacobian")
         is_program = not (has_derivatives if shapes is None else hasattr(model, "linearised_modes"))
-        return Posterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program)
+        return ThermalPosterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program)
 
     def _read(self, X: ArrayLike) -> Array:
         """Measured columns, with shapes normalised."""
@@ -666,8 +667,8 @@ def doubts_of(found: Bunch, *, many: float = 0.01) -> list[ModelWarning]:
     if unconverged(found).sum() > many * len(found.weight):
         findings.append(
             ModelWarning(
-                f"parameters of many records did not converge in {MOST_STEPS} steps, and are what was reached (invert "
-                "says which). Use a model with track=True where modes cross",
+                "parameters of many records did not converge, and are what was reached in 100 steps (invert says "
+                "which). Use a model with track=True where modes cross",
                 "not-converged",
             )
         )

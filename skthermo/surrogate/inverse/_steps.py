@@ -235,7 +235,7 @@ class Refined(Rows):
 def refine(
     objective: Objective,
     start: Array,
-    n_steps: int,
+    n_steps: int = 100,
     *,
     sorts: bool,
     some_misfit: float = 0.5,
@@ -291,7 +291,7 @@ def start_again(
 def minimise(
     objective: Objective,
     start: Array | Local,
-    n_steps: int,
+    n_steps: int = 100,
     *,
     small_gain: float = 1e-10,
     first_damping: float = 1e-4,
