@@ -215,16 +215,11 @@ FRAMES = {  # equal to a frame in C order
     "Parquet": from_parquet,
 }
 IN_SHORT = {"Fortran order", "lists", "columns of their own", "float32", "polars"}  # of cases that are slow
-FAILS = {("compensator by position", "lists"): "a list of rows is taken for a frame, because it has an attribute index"}
 
 
 def marked(case, form):
-    marks = []
-    if CASES[case].is_slow and form not in IN_SHORT:
-        marks.append(pytest.mark.nightly)
-    if (case, form) in FAILS:
-        marks.append(pytest.mark.xfail(reason=FAILS[case, form], strict=True))
-    return pytest.param(case, form, id=f"{case}, {form}", marks=marks)
+    is_nightly = CASES[case].is_slow and form not in IN_SHORT
+    return pytest.param(case, form, id=f"{case}, {form}", marks=[pytest.mark.nightly] * is_nightly)
 
 
 def each(forms, needs_frames=False):
@@ -359,7 +354,7 @@ def test_copies_of_residuals_give_equal_results(name, form):
 
 def test_a_step_that_writes_into_residuals_changes_no_result():
     def indices(copy):
-        step = StandardScaler(with_mean=False, copy=copy)
+        step = StandardScaler(with_std=False, copy=copy)
         return make_pipeline(clone(COMPENSATOR), step, DirectionalDetector()).fit(BOTH).score_samples(BOTH)
 
     np.testing.assert_array_equal(indices(copy=False), indices(copy=True))

@@ -246,7 +246,7 @@ def healthy_table(records):
     rows = {}
     for name, (T, F) in records:
         cleaned = set_aside(T, F, exclude={"no-rows"})
-        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(SET_ASIDE), 0).sum()
+        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(ASIDE_KINDS), 0).sum()
         counts = (1, bool(found(T, F) - ALSO), np.size(T) + np.size(F), n_values, len(cleaned.left_out))
         rows.setdefault(name, []).append(counts)
     columns = ["records", "with a false finding", "values", "of these set aside", "columns left out"]
