@@ -45,7 +45,7 @@ def test_two_lines_that_fit_warn_twice(action):
         lambda: clone(CHAIN).fit(T, F),
         lambda: clone(CHAIN).fit(T, F),
     ]
-    found = [one for one in given(*lines, action=action) if one.message.kind == "set-aside"]
+    found = [one for one in given(*lines, action=action) if "set-aside" in one.message.kind]
     assert [(one.filename, one.lineno) for one in found] == [
         (line.__code__.co_filename, line.__code__.co_firstlineno) for line in lines
     ]
@@ -55,7 +55,7 @@ def test_two_lines_that_fit_warn_twice(action):
 def test_a_fit_warns_at_most_once_of_a_kind_and_equal_records_in_equal_words(fit):
     found = given(fit)
     kinds = Counter(one.message.kind for one in found)
-    assert kinds["set-aside"] == 1
+    assert sum(times for kind, times in kinds.items() if "set-aside" in kind) == 1
     assert max(kinds.values()) == 1
     assert [str(one.message) for one in given(fit)] == [str(one.message) for one in found]
 
@@ -66,7 +66,7 @@ def test_filters_tell_categories_apart():
         warnings.simplefilter("error", WeatherWarning)
         MahalanobisDetector().fit(F)
         warnings.simplefilter("error", RecordsWarning)
-        with pytest.raises(RecordsWarning, match=r"\[set-aside\]$"):
+        with pytest.raises(RecordsWarning, match=r"set-aside\]$"):
             MahalanobisDetector().fit(F)
 
 
