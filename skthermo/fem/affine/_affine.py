@@ -28,7 +28,7 @@ from skthermo._core.arrays import (
     real_array,
     shape_array,
 )
-from skthermo._core.parallel import map_on_blas_threads
+from skthermo._core.parallel import map_on_blas_threads, single_blas_thread
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._terms import (
@@ -247,7 +247,11 @@ class AffineModel:
         ValueError
             If theta has the wrong width, or a value that is not finite and positive.
         """
-        return self._in_chunks(self._core.frequencies, theta)[0]
+        rows = check_theta(theta, self.parameter_names)
+        if len(rows) > self.rows_per_chunk:
+            return self._in_chunks(self._core.frequencies, rows)[0]
+        with single_blas_thread():
+            return self._core.frequencies(rows)[0]
 
     def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
         """Natural frequencies and mode shapes.
