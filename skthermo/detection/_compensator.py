@@ -345,7 +345,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.scale_, self.usual_deviation_ = robust_deviation(residuals), median(self._deviations(predicted))
         residuals = self._shrunk(residuals, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
-        unknown = np.isnan(residuals).all(axis=1) & ~np.isnan(Y).all(axis=1) & (self.folds_ >= 0)
+        unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
         text = unpredicted_text(unknown, as_floats(inputs))
         findings += [*filled, *doubts, *as_findings(UnevaluatedRowsWarning, text, "not-predicted")]
         findings += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
