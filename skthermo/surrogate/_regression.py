@@ -221,8 +221,9 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         self.n_parameters_ = y.shape[1]
         self.log_inputs_, self.log_targets_ = log_inputs and bool((X > 0).all()), bool((y > 0).all())
         X, y = np.log(X) if self.log_inputs_ else X, np.log(y) if self.log_targets_ else y
-        self.inputs_ = StandardScaler().fit(X, sample_weight=weights)
-        self.targets_ = StandardScaler().fit(y, sample_weight=weights)
+        arrays = StandardScaler().set_output(transform="default")  # whatever the global setting is
+        self.inputs_ = clone(arrays).fit(X, sample_weight=weights)
+        self.targets_ = clone(arrays).fit(y, sample_weight=weights)
         X, y = self.inputs_.transform(X), self.targets_.transform(y)
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, seeded(random_state))

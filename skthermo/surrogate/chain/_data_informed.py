@@ -314,6 +314,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
             findings = [*records.doubts, *findings, *of_mapper, *of_model]
+            findings += [] if is_auto(self.reduce) else self.simulator_.doubts()
             self.report_ = report_of(self, found, records.findings, findings)
         stages.end()
         warn_each(self.report_.warnings())

@@ -245,12 +245,11 @@ def doubts_of_modes(
             ]
     if not len(far):
         return []
-    listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
     return [
         RecordsWarning(
-            f"measured modes differ from the model's nominal frequencies: {listed} (expected at most {large:g} %). "
-            "They may be other modes, or in another unit. Give Hz and the modes of the model in their order, or update "
-            "the model",
+            f"measured modes differ from the model's nominal frequencies by more than {large:g} %: "
+            f"{', '.join(map(repr, far.index))} (see report_.modes). They may be other modes, or in another unit. Give "
+            "Hz and the modes of the model in their order, or update the model",
             "mode-offsets",
         )
     ]

@@ -327,13 +327,12 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         return remembered(self.memory, drawn_samples, *settings, ignore=["n_jobs"])
 
     def _doubts_of_size(self) -> list[SkthermoWarning]:
-        n_parameters, n_modes = len(self.parameter_names_), self.model.n_modes
-        if n_parameters <= n_modes:
+        if len(self.parameter_names_) <= self.model.n_modes:
             return []
         return [
             FewRecordsWarning(
-                f"{n_parameters} parameters and {n_modes} modes: frequencies cannot distinguish all parameters. Use "
-                "more modes or fewer parameters, or a PosteriorInverse",
+                "there are more parameters than modes: frequencies cannot distinguish all parameters. Use more modes "
+                "or fewer parameters, or a PosteriorInverse",
                 "underdetermined",
             )
         ]

@@ -531,8 +531,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         if n_records < 10 and (learns_prior or learns_noise.any()):
             self.findings_.append(
                 FewRecordsWarning(
-                    f"{n_records} records teach the prior of the parameters and the noise of the modes; expected at "
-                    "least 10. Both stay near 1 to 3 %. Give prior and noise",
+                    "fewer than 10 records teach the prior of the parameters and the noise of the modes. Both stay "
+                    "near 1 to 3 %. Give prior and noise",
                     "few-teaching-records",
                 )
             )
