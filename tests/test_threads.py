@@ -5,6 +5,8 @@ import subprocess
 import sys
 
 PROGRAM = """
+import time
+
 import joblib
 import numpy as np
 import scipy.linalg  # brings a BLAS of its own
@@ -15,8 +17,9 @@ from skthermo._core.parallel import map_on_blas_threads, run_jobs, single_blas_t
 def blas_threads():
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
-def limited(_=None):
+def limited(n=0):
     with single_blas_thread():
+        time.sleep(0.01 * (1 + n % 2))  # so that threads leave one after the other
         return blas_threads()
 
 if blas_threads() == {1}:  # all that one core gets unasked

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from skthermo.preprocessing.checks._record_findings import WARNINGS
+from tests.source import kinds_of_warnings
 
 ROOT = Path(__file__).parents[1]
 SOURCE = "\n".join(path.read_text() for path in sorted((ROOT / "skthermo").rglob("*.py")))
@@ -18,18 +18,20 @@ def entries(page):
     return re.findall(r"(?<!\w)_`(.+?)`", (ROOT / "docs" / "guide" / f"{page}.rst").read_text())
 
 
-def kinds():
-    """Kinds of all warnings that the source gives; None where it does not show the text."""
-    for call in ast.walk(ast.parse(SOURCE)):
-        match call:
-            case ast.Call(func=ast.Name(id=name), args=[_, *_, kind]) if re.fullmatch(r"warn_user|\w+Warning", name):
-                yield kind.value if isinstance(kind, ast.Constant) else None
+def kinds_of_findings(tree):
+    """Kinds of what is found in records: keys of the mapping to the texts of their warnings."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Assign(targets=[ast.Name(id="WARNINGS")], value=ast.Dict(keys=keys)):
+                yield from (key.value for key in keys)
 
 
 def test_every_warning_has_an_entry_and_every_entry_a_warning():
-    given = Counter(kinds())
-    assert given.pop(None) == 1  # findings of records, whose kinds are these
-    assert Counter(entries("warnings")) == Counter({*given, *WARNINGS})
+    tree = ast.parse(SOURCE)
+    given, findings = Counter(kinds_of_warnings(tree)), [*kinds_of_findings(tree)]
+    assert given.pop(None) == 1  # findings of records
+    assert findings
+    assert Counter(entries("warnings")) == Counter({*given, *findings})
 
 
 @pytest.mark.parametrize("page", ["report_lines", "errors"])

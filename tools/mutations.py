@@ -29,8 +29,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("preprocessing/_records.py", "preprocessing/test_sensors.py"): [
         (
             "a failing sensor that moves the mean",
-            "level = as_floats(values) - self.offsets_",
-            "level = as_floats(values) - 0 * self.offsets_",
+            "level = values - self.offsets_",
+            "level = values - 0 * self.offsets_",
         ),
     ],
     ("residuals/gaussian.py", "detection/test_known_errors.py"): [
@@ -104,7 +104,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
     ],
     ("fem/modal/_modes.py", "fem/test_local_modes.py"): [
-        ("convergence of shape derivatives", "CONVERGED = 1e-5", "CONVERGED = 1e-1"),
+        ("convergence of shape derivatives", "1e-5**2 * (known", "1e-1**2 * (known"),
         ("massless degrees of freedom", "(x + residuals)[:, ~going]", "x[:, ~going]"),
         ("shape derivative along the mode itself", "-d_masses / 2", "-d_masses"),
         ("shape derivative along other modes", "along / np.where", "-along / np.where"),
@@ -137,7 +137,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("modes beyond those of the model", "GUARD_MODES = 4", "GUARD_MODES = 0"),
     ],
     ("updating/_residuals.py", "updating/test_pairing.py"): [
-        ("pairing where sensors are few", "NOMINAL_SHARE = 0.25", "NOMINAL_SHARE = 0.0"),
+        ("pairing where sensors are few", "0.25 * modes.nominal_mac", "0.0 * modes.nominal_mac"),
     ],
     ("updating/_residuals.py", "updating/test_updater.py"): [
         ("derivative of tangents", "d_along / along**2", "d_along / along"),
@@ -148,7 +148,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
         ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
-        ("parameters distinguished", "values > SMALLEST_SHARE * values[0]", "values >= 0"),
+        ("parameters distinguished", "values > 1e-6 * values[0]", "values >= 0"),
     ],
     ("_core/arrays.py", "updating/test_sensitivity.py"): [
         ("rounding taken for information", "NO_INFORMATION = 1e-12", "NO_INFORMATION = 1e-20"),
@@ -240,7 +240,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("_core/frames.py", "surrogate/test_uncertainty.py"): [
         ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
     ],
-    ("preprocessing/_folds.py", "preprocessing/test_folds.py"): [
+    ("preprocessing/folds.py", "preprocessing/test_folds.py"): [
         ("blocks dealt in turn", "blocks % self.n_splits", "blocks * self.n_splits // (blocks.max() + 1)"),
     ],
     ("_core/matrix_child.py", "test_matlab.py"): [
@@ -257,15 +257,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("datasets/_kw51_campaign.py", "datasets/test_kw51_campaign.py"): [
         ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
     ],
-    ("preprocessing/checks/_columns.py", "preprocessing/test_checks.py"): [
-        ("stuck sensors beside rounding", "length >= USUAL * usual", "length >= usual"),
-        ("stuck sensors beside resting values", "length < USUAL * same[USUAL_RANK]", "False"),
-        ("stuck sensors at all", "SHORTEST = 5", "SHORTEST = 500"),
+    ("preprocessing/checks/_stuck.py", "preprocessing/test_checks.py"): [
+        ("stuck sensors beside rounding", "length >= 4 * usual", "length >= usual"),
+        ("stuck sensors beside resting values", "length < 4 * same[3]", "False"),
+        ("stuck sensors at all", "lengths[longest] >= 5", "lengths[longest] >= 500"),
     ],
     ("preprocessing/checks/_check_records.py", "preprocessing/test_checks.py"): [
         ("direction of a time shift", "inputs[rows - shift]", "inputs[np.minimum(rows + shift, n_rows - 1)]"),
         ("inertia as a time shift", "strength[farthest - 1 : farthest + inertia + 1] = 0", "strength[farthest] = 0"),
-        ("exchanged modes that cross", "            if np.sqrt(ratio.prod()) < IN_ORDER:", "            if True:"),
+        ("exchanged modes that cross", "            if np.sqrt(ratio.prod()) < 0.5:", "            if True:"),
     ],
     ("preprocessing/_hampel.py", "preprocessing/test_hampel.py"): [
         ("outliers where records scatter more", "np.fmax(local, self.deviations_", "np.fmin(local, self.deviations_"),
@@ -349,7 +349,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("a warning for each fold", "if kind in given:", "if kind in given and not in_folds:"),
     ],
     ("_core/parallel.py", "test_threads.py"): [
-        ("the last thread to leave lifts the limit", "_n_inside -= 1", "_n_inside = 0"),
+        ("limits around threads", "if effective_n_jobs(n_jobs) > 1 else", "if effective_n_jobs(n_jobs) > 9 else"),
     ],
     ("residuals/baseline.py", "surrogate/test_scatter.py"): [
         ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),

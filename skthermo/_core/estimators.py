@@ -34,6 +34,7 @@ from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, has_fit_parameter
 
 from skthermo._core.arrays import (
+    HUGE,
     Array,
     as_columns,
     as_floats,
@@ -169,11 +170,20 @@ def check_array(values: Any, *, input_name: str = "y", allow_infinite: bool = Fa
     scikit-learn's `check_array` takes the options. With ``allow_infinite``, infinite values stay, because the caller
     lists them among other errors.
     """
-    refuse_no_table(values, input_name, or_vector=not options.get("ensure_2d", True))
+    is_frame = isinstance(values, pd.DataFrame) and set(values.dtypes) == {np.dtype(float)}
+    if is_frame and values.columns.is_unique and values.columns.inferred_type == "string":
+        numbers = values.to_numpy()
+    elif type(values) is np.ndarray and values.ndim == 2 and values.dtype == float:
+        numbers = values
+    else:
+        refuse_no_table(values, input_name, or_vector=not options.get("ensure_2d", True))
+        numbers = as_floats(values)
     options |= {"dtype": np.float64, "order": "C", "copy": False, "ensure_all_finite": False}
-    array = sklearn.utils.check_array(np.array(as_floats(values), order="C"), input_name=input_name, **options)
+    array = sklearn.utils.check_array(np.array(numbers, order="C"), input_name=input_name, **options)
+    if allow_infinite or not (np.abs(array) > HUGE).any():
+        return array
     infinite = np.isinf(array)
-    if not allow_infinite and infinite.any():
+    if infinite.any():
         place = tuple(np.argwhere(infinite)[0])
         index, columns = getattr(values, "index", None), getattr(values, "columns", None)
         row = f"row {place[0]}" + (
@@ -184,8 +194,7 @@ def check_array(values: Any, *, input_name: str = "y", allow_infinite: bool = Fa
             f"{input_name} is infinite in {infinite.sum()} of {infinite.size} values, the first in {row}{column}; "
             "expected finite numbers, and NaN where a value is missing"
         )
-    if not allow_infinite:
-        refuse_huge(array, input_name)
+    refuse_huge(array, input_name)
     return array
 
 

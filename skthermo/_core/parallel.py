@@ -30,7 +30,7 @@ def single_blas_thread() -> AbstractContextManager[Any]:
     """Limit every BLAS library of this process to one thread.
 
     The thread that starts others enters it around their work: threadpoolctl takes limits from the first thread alone,
-    and those of threads that overlap would be lifted in the wrong order.
+    and threads that overlap would lift their limits in the wrong order.
     """
     return _blas().limit(limits=1)
 

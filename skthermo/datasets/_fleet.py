@@ -41,13 +41,13 @@ class FleetBridge:
     kind : {"truss", "girder", "arch"}
         Its kind.
     seed : tuple of int
-        What everything about it is drawn from.
+        Seed of everything about it.
     atypical_law : {"reversed", "doubled", "knee elsewhere"}, optional
-        How its thermal laws differ from those of its family.
+        How its thermal laws differ from its family's.
 
     See Also
     --------
-    make_fleet : Many of them, with a description of what is drawn.
+    make_fleet : Many of them, with a description of the draws.
 
     Examples
     --------
@@ -65,17 +65,17 @@ class FleetBridge:
     atypical_law: str | None = None
 
     def __reduce__(self):
-        """Leave out what can be built again."""
+        """Leave out parts that can be built again."""
         return FleetBridge, (self.name, self.kind, self.seed, self.atypical_law)
 
     @property
     def is_atypical(self) -> bool:
-        """Whether its thermal laws are not those of its family."""
+        """Whether its thermal laws differ from its family's."""
         return self.atypical_law is not None
 
     @cached_property
     def covariates(self) -> dict[str, str | float]:
-        """What its owner knows: "kind", "material", "span" in m, "latitude" in degrees."""
+        """Facts that its owner knows: "kind", "material", "span" in m, "latitude" in degrees."""
         random, kind = self._random("who"), KINDS[self.kind]
         return {
             "kind": self.kind,
@@ -91,7 +91,7 @@ class FleetBridge:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """What damage can hit, by the names of ``model.groups``."""
+        """Damage groups, by the names of ``model.groups``."""
         return KINDS[self.kind].groups
 
     @cached_property
@@ -180,13 +180,13 @@ class FleetBridge:
             With these attributes:
 
             temperatures : DataFrame of shape (n_records, n_thermometers)
-                In degrees Celsius, with offsets, noise and gaps; the columns are those of ``roles``.
+                In degrees Celsius, with offsets, noise and gaps; the columns are named in ``roles``.
             frequencies : DataFrame of shape (n_records, n_modes)
                 ``f1``, ``f2``, ... in Hz, with noise, gaps and outliers.
             clean_frequencies : DataFrame of shape (n_records, n_modes)
                 Without these.
             theta : DataFrame of shape (n_records, n_zones)
-                What the weather does: multipliers of the stiffness of the zones of ``truth``.
+                Effect of the weather: multipliers of the stiffness of the zones of ``truth``.
 
         Raises
         ------
@@ -319,7 +319,7 @@ class BridgeFleet(dict[str, FleetBridge]):
 
     @cached_property
     def covariates(self) -> pd.DataFrame:
-        """What the owner knows of each bridge, a row for each name."""
+        """Facts that the owner knows of each bridge, a row for each name."""
         return pd.DataFrame.from_dict({name: bridge.covariates for name, bridge in self.items()}, orient="index")
 
 
@@ -332,9 +332,9 @@ def make_fleet(
 ) -> BridgeFleet:
     """Synthetic fleet of bridges with known truth: trusses, girders and tied arches under their own climates.
 
-    Every bridge has its own span, material, climate, thermometers, noise and stiffnesses. Those of one material share
-    their thermal laws, but for coefficients that scatter about the material's. The FE model that comes with a bridge is
-    a little wrong, as users' models are.
+    Every bridge has its own span, material, climate, thermometers, noise and stiffnesses. Bridges of one material share
+    their thermal laws, with coefficients that scatter about the material's. The FE model that comes with a bridge is a
+    little wrong, as users' models are.
 
     Parameters
     ----------

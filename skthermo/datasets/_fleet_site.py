@@ -15,7 +15,7 @@ from skthermo.datasets._kw51_campaign import memory
 
 
 def stream(*key: int) -> np.random.RandomState:
-    """Random numbers that belong to a key of integers, independent of those of any other key."""
+    """Random numbers of a key of integers; other keys have independent ones."""
     return np.random.RandomState(np.random.MT19937(np.random.SeedSequence(key)))
 
 
@@ -46,7 +46,7 @@ class SiteClimate:
 
     def weather(self, first: pd.Timestamp, last: pd.Timestamp, key: tuple[int, ...]) -> pd.DataFrame:
         """Hourly "air" temperature in C and "sun", its share of full sunshine on a horizontal deck, which depend on the
-        date and the key alone. It begins with the year before the first record, so that what remembers the weather has
+        date and the key alone. It begins with the year before the first record, so that parts with thermal inertia have
         settled."""
         years = range(first.year - 1, last.year + 1)
         index = pd.date_range(f"{years[0]}-01-01", f"{years[-1] + 1}-01-01", freq="h", inclusive="left", name="time")
@@ -184,9 +184,9 @@ def draw_thermometers(random: np.random.RandomState) -> list[Thermometer]:
 
 
 def measured(clean: Array, level: Array, gaps: float, outliers: float, rows: NDArray[np.intp], drawn: Array) -> Array:
-    """Frequencies with noise, outliers and gaps; ``rows`` are those of the records among the hourly noise ``drawn``.
+    """Frequencies with noise, outliers and gaps; ``rows`` are the places of the records in the hourly noise ``drawn``.
 
-    The columns of ``drawn`` are those of `columns_for`.
+    `columns_for` says how many columns ``drawn`` has.
     """
     n_modes = clean.shape[1]
     white, lasting, missing, is_wrong, error = np.split(drawn[:, : 5 * n_modes], 5, axis=1)
@@ -214,7 +214,7 @@ def readings(
     rows: NDArray[np.intp],
     drawn: Array,
 ) -> dict[str, Array]:
-    """What the thermometers read: ``means`` of hourly temperatures over each record, with noise and gaps.
+    """Readings of the thermometers: ``means`` of hourly temperatures over each record, with noise and gaps.
 
     ``drawn`` is hourly noise with two columns for each thermometer.
     """

@@ -47,8 +47,8 @@ ADDED_MASSES = {"arch": 353.0, "deck": 837.0}  # kg at each joint of brace and c
 def draw_weather(n_hours: int, random: np.random.RandomState) -> pd.DataFrame:
     """Hourly weather: "steel", "sun" and "slab" in C, "frost" in K below freezing, "moisture" (standard deviation 1).
 
-    "steel" is the temperature below the deck, "sun" that of the members above it, "slab" that of the plate and the
-    ballast. A longer record begins with the same hours as a shorter one.
+    "steel" is the temperature below the deck, "sun" the temperature of the members above it, "slab" of the plate and
+    the ballast. A longer record begins with the same hours as a shorter one.
     """
     index = pd.date_range("2018-10-01", periods=max(n_hours, 11328), freq="h", name="time")
     *streams, for_spell = map(np.random.RandomState, random.randint(2**31 - 1, size=4))
@@ -86,14 +86,14 @@ def cycle(hour: Array) -> Array:
 
 
 def scale_for_scatter(season: Array, anomaly: Array, scatter: float = 4.2) -> float:
-    """What to multiply anomalies with so that season and anomalies together scatter by 4.2 C, within limits."""
+    """Factor of the anomalies with which season and anomalies together scatter by 4.2 C, within limits."""
     (a, b), (_, c) = np.cov(season, anomaly)
     scale = (np.sqrt(max(b**2 + c * (scatter**2 - a), 0.0)) - b) / c
     return float(np.clip(scale, 0.7, 1.3))
 
 
 def cold_spell(index: pd.DatetimeIndex, steel: Array, random: np.random.RandomState) -> Array:
-    """What brings the coldest hour of the first January to about -3 C, fading over days before and after it."""
+    """Change that brings the coldest hour of the first January to about -3 C, fading over days before and after it."""
     january = np.flatnonzero((index.month == 1) & (index.year == index[0].year + 1))
     coldest = january[steel[january].argmin()]
     wanted = -2.9 + 0.3 * random.standard_normal()
@@ -222,7 +222,8 @@ def simulate(
 
 
 def reduced_truth(model: AffineModel, further: Mapping[str, tuple[float, float]] | None = None) -> ReducedModel:
-    """The model for what weather does to the parameters, and for bounds of further ones, with errors below 1e-5."""
+    """A reduced model for parameters as the weather changes them, and for bounds of further ones; errors are below
+    1e-5."""
     return model.reduced(WEATHER_BOX | (further or {}), tol=1e-4, random_state=0)
 
 
@@ -362,10 +363,10 @@ def make_kw51_campaign(
         clean_frequencies : DataFrame of shape (n_hours, 6)
             In Hz, without noise and gaps.
         theta : DataFrame of shape (n_hours, 10)
-            What the weather does: multipliers of the parameters of ``model``. Retrofit, drift and damage, which change
+            Effect of the weather: multipliers of the parameters of ``model``. Retrofit, drift and damage, which change
             groups, come on top.
         model : AffineModel
-            The bridge before its retrofit. Its groups are those of `make_kw51`, and ``bearings`` and ``deck_beams``
+            The bridge before its retrofit. It has the groups of `make_kw51`, and ``bearings`` and ``deck_beams``
             (girders, transverse beams and stiffeners).
         retrofit : dict
             The complete retrofit as keyword arguments of `~skthermo.surrogate.DataInformedFEM.simulate` and
@@ -385,8 +386,9 @@ def make_kw51_campaign(
 
     Notes
     -----
-    The bridge is the updated model of `make_kw51` with bearings added. :ref:`campaign-of-kw51` says how weather moves
-    its ten multipliers, what the retrofit changes, and what is known or assumed of the measurements;
+    The bridge is the updated model of `make_kw51` with bearings added. :ref:`campaign-of-kw51` describes the effect of
+    weather on its ten multipliers, the changes by the retrofit, and the sources and assumptions behind the
+    measurements;
     :doc:`/accuracy_kw51` has statistics of both side by side. A model with the five thermal parameters of `make_kw51`
     as functions of tBD31A can come close to this bridge, but cannot be exact.
 

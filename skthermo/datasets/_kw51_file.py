@@ -1,4 +1,4 @@
-"""Monitoring of the railway bridge KW51, and what its values may be."""
+"""Monitoring of the railway bridge KW51, with limits of possible values."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
 
         temperatures : DataFrame of shape (n_records, 11)
             Temperature and weather, with the columns of ``labels_env``. Only ``tBD31A`` (steel below the deck) and
-            ``tVL`` (air) are temperatures, in degrees Celsius, so that ``data.temperatures[["tBD31A"]]`` is what a
-            temperature mapper should learn from. The others are relative humidity beside the steel (``rhBD31A``), and
-            from the weather station relative humidity (``rhVL``), vapour pressure (``vpVL``), global, diffuse and
-            direct normal radiation (``grVL``, ``drVL``, ``dnrVL``), rain (``raVL``), and speed and direction of the
-            wind (``wsVL``, ``wdVL``), in the units of the file, which it does not state.
+            ``tVL`` (air) are temperatures, in degrees Celsius, so that a temperature mapper should learn from
+            ``data.temperatures[["tBD31A"]]``. The others are relative humidity beside the steel (``rhBD31A``), and from
+            the weather station relative humidity (``rhVL``), vapour pressure (``vpVL``), global, diffuse and direct
+            normal radiation (``grVL``, ``drVL``, ``dnrVL``), rain (``raVL``), and speed and direction of the wind
+            (``wsVL``, ``wdVL``), in the units of the file, which it does not state.
         frequencies : DataFrame of shape (n_records, 14)
             ``f1`` to ``f14`` in Hz, NaN where a mode was not identified.
         damping : DataFrame of shape (n_records, 14)
@@ -63,7 +63,7 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
             Whether a zip file is, to the byte, the published one (by its MD5 checksum); None for a bare MATLAB file,
             whose checksum is not published.
 
-        All have the rows of the file in their order, which need not be that of time. The tables have the same
+        All have the rows of the file in their order, which may not be chronological. The tables have the same
         DatetimeIndex "time", the file's time stamps rounded to seconds, without a time zone. Nothing is filled in or
         left out.
 

@@ -120,12 +120,12 @@ def kw51_structure() -> Structure:
     -------
     Structure
         Its axes are x along the bridge, y across it from -6.2 to 6.2 m, z upwards. Nodes are ("deck", station, line)
-        and ("arch", station, line), with stations 0 to 32 and lines 0 to 4, of which 0 and 4 carry arches;
-        ("joint", foot, head, line, "deck" or "arch") is where a brace meets a connection.
+        and ("arch", station, line), with stations 0 to 32 and lines 0 to 4; lines 0 and 4 carry arches; ("joint", foot,
+        head, line, "deck" or "arch") is where a brace meets a connection.
 
     See Also
     --------
-    make_kw51 : The FE model, and what it assumes.
+    make_kw51 : The FE model and its assumptions.
 
     Examples
     --------

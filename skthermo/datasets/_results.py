@@ -1,4 +1,4 @@
-"""What loaders and campaigns return, with the type of every attribute."""
+"""Results of loaders and campaigns, with the type of every attribute."""
 
 from typing import Any
 
@@ -18,13 +18,13 @@ class Monitoring(Bunch):
 
 
 class Z24Monitoring(Monitoring):
-    """What `load_z24` returns."""
+    """Result of `load_z24`."""
 
     state: pd.Series
 
 
 class KW51Monitoring(Monitoring):
-    """What `load_kw51` returns."""
+    """Result of `load_kw51`."""
 
     damping: pd.DataFrame
     shapes: NDArray[np.complex128]
@@ -34,7 +34,7 @@ class KW51Monitoring(Monitoring):
 
 
 class Campaign(Monitoring):
-    """Simulated records, with what they were simulated from."""
+    """Simulated records, with their model and parameters."""
 
     clean_frequencies: pd.DataFrame
     theta: pd.DataFrame
@@ -42,11 +42,11 @@ class Campaign(Monitoring):
 
 
 class TrussCampaign(Campaign):
-    """What `make_truss_campaign` returns."""
+    """Result of `make_truss_campaign`."""
 
 
 class KW51Campaign(Campaign):
-    """What `make_kw51_campaign` returns; ``shapes`` are there if they were asked for."""
+    """Result of `make_kw51_campaign`; with ``shapes`` if they were asked for."""
 
     damping: pd.DataFrame
     shapes: NDArray[np.complex128]
@@ -56,7 +56,7 @@ class KW51Campaign(Campaign):
 
 
 class FleetRecords(Monitoring):
-    """What ``records`` of a `~skthermo.datasets.make_fleet` bridge returns."""
+    """Result of ``records`` of a `~skthermo.datasets.make_fleet` bridge."""
 
     clean_frequencies: pd.DataFrame
     theta: pd.DataFrame

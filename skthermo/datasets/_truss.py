@@ -153,7 +153,8 @@ def make_truss_campaign(
         Share of its stiffness that a group loses each year (of ``samples_per_year`` records), steadily from the first
         record on.
     damage : mapping of str to float, optional
-        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``, of what the drift leaves.
+        Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``, of the stiffness that the
+        drift leaves.
     damage_from : str, Timestamp or datetime, optional
         When the damage begins; by default with the first record.
     random_state : int, RandomState or None, default=None
@@ -171,10 +172,10 @@ def make_truss_campaign(
         clean_frequencies : DataFrame of shape (n_records, 6)
             Without noise.
         theta : DataFrame of shape (n_records, 3)
-            Multipliers of Young's modulus in the three zones: what the weather does.
+            Multipliers of Young's modulus in the three zones, as the weather changes them.
         model : AffineModel
-            The undamaged thermo-mechanical model, whose parameters are the zones and whose
-            damage groups are those of `make_truss`.
+            The undamaged thermo-mechanical model, whose parameters are the zones, with the damage groups of
+            `make_truss`.
 
     Raises
     ------

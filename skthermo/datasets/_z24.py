@@ -197,8 +197,8 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     """FE model of the Z24 highway bridge: a stick of 3-D beams on springs.
 
     A girder over three spans, clamped to two pier walls; springs under the piers and at the abutments
-    stand for the soil. Its first four modes are those of the monitoring that `load_z24` reads: vertical
-    bending (symmetric), lateral, vertical bending (antisymmetric) and torsion.
+    stand for the soil. Its first four modes were monitored, as `load_z24` reads them: vertical bending (symmetric),
+    lateral, vertical bending (antisymmetric) and torsion.
 
     Parameters
     ----------
@@ -222,9 +222,9 @@ def make_z24(n_modes: int = 4, *, track: bool = True) -> AffineModel:
     Notes
     -----
     Axes: x along the bridge from one abutment, y across, z upwards; the girder's axis is at z = 0.
-    :ref:`structure-of-z24` lists dimensions [PD01]_ and constants [TD04]_, four of which ``tools/fit_z24_constants.py``
-    found from the healthy records above 5 C. Torsion (f4) has vertical modes close below and above it, so that modes
-    change their order in most of the box of +-30 %; columns therefore follow shapes.
+    :ref:`structure-of-z24` lists dimensions [PD01]_ and constants [TD04]_; ``tools/fit_z24_constants.py`` fitted four
+    of the constants to the healthy records above 5 C. Torsion (f4) has vertical modes close below and above it, so that
+    modes change their order in most of the box of +-30 %; columns therefore follow shapes.
 
     Examples
     --------

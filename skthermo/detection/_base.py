@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
-from skthermo._core.arrays import Array, median, robust_deviation
-from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted
-from skthermo._core.frames import column_names, row_times
-from skthermo._core.text import listed
+from skthermo._core.arrays import Array
+from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted, validate_data
+from skthermo._core.frames import row_times
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
 from skthermo.residuals.numbers import independent_records
@@ -160,7 +159,7 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     Columns are frequencies or residuals. A column whose values are positive, with a standard deviation below a third of
     their mean, is read as a frequency, and is divided by its mean; the methods above get relative frequencies and
     residuals as they are. `fit` sets aside, as if they were missing, frequencies that are farther from the median than
-    half of it, and residuals that are farther than a hundred robust standard deviations.
+    half of it, residuals that are farther than a hundred robust standard deviations, and infinite values.
 
     ``_cause(X, rows)`` says why rows have no index. A detector that learns a distribution has ``_has_likelihood()``
     True and ``_log_densities(F)``, and with them a ``score``. A detector, or a step before it, that looks at earlier
@@ -229,29 +228,39 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         Raises
         ------
         ValueError
-            If a column has no value or is constant, a value is infinite, or there are fewer than two rows; or if the
-            detector cannot learn from the baseline.
+            If a column has no value or is constant, or there are fewer than two rows; or if the detector cannot learn
+            from the baseline.
 
         Warns
         -----
         UserWarning
             If values were set aside, or the baseline has too few independent records for the rate of false alarms.
         """
-        F = self._validated(X, reset=True, order="C", ensure_min_samples=2)
+        F = validate_data(self, X, ensure_min_samples=2, allow_infinite=True)
+        times = row_times(X)
         self.findings_: list[SkthermoWarning] = []
-        F, self.report_ = read_columns(F, column_names(X, "x"), self.findings_)
-        self.baseline_index_ = self._learn(F, row_times(X))
+        F, self.report_ = read_columns(F, getattr(X, "columns", range(F.shape[1])), self.findings_)
+        self.baseline_index_ = self._learn(F, times)
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
-        self.n_independent_ = independent_records(self.baseline_index_[np.argsort(row_times(X), kind="stable")])
-        self.findings_ += few_records(self.n_independent_, len(F), self.contamination)
+        self.n_independent_ = independent_records(self.baseline_index_[np.argsort(times, kind="stable")])
+        # a dozen parts tell the number within a factor of two
+        if min(2 * self.n_independent_, len(F)) < 1 / self.contamination - 1:
+            self.findings_.append(
+                FewRecordsWarning(
+                    "the baseline has too few independent records (n_independent_) for a false-alarm rate of "
+                    f"{self.contamination:.2g}: expected {np.ceil(1 / self.contamination - 1):.0f} or more. Later "
+                    "records may raise several times as many alarms. Give a longer baseline, or a higher contamination",
+                    "few-baseline-records",
+                )
+            )
         warn_each(self.findings_)
         return self
 
     def _relative(self, X: ArrayLike) -> Array:
         """Rows of X as `fit` read them: frequencies divided by their level, residuals as they are."""
         check_is_fitted(self)
-        return self._validated(X, reset=False, order="C") / self.report_["level"].to_numpy()
+        return validate_data(self, X, reset=False) / self.report_["level"].to_numpy()
 
     def _index_of(self, X: Any) -> Array:
         return self._index(self._relative(X))
@@ -283,50 +292,33 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         return score
 
 
-def read_columns(F: Array, names: list[Any], findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:
+def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:
     """A baseline as detectors learn it, and how each column was read; what was set aside is added to the findings."""
+    infinite, F = np.isinf(F), np.where(np.isinf(F), np.nan, F)
     empty = np.isnan(F).all(axis=0)
     if empty.any():
-        raise ValueError(
-            f"{listed(np.array(names)[empty])} has no value in {len(F)} rows; expected values in each column"
-        )
-    middle, scatter = median(F), robust_deviation(F)
+        raise ValueError(f"column {list(names)[empty.argmax()]!r} has no value in {len(F)} rows; expected some in each")
+    middle = np.nanmedian(F, axis=0)
+    scatter = 1.4826 * np.nanmedian(np.abs(F - middle), axis=0)  # the standard deviation of normal values
     is_frequency = (middle > 0) & (scatter < middle / 3)
     farthest = np.where(is_frequency, middle / 2, np.where(scatter > 0, 100 * scatter, np.inf))
-    far = np.abs(F - middle) > farthest
+    far = (np.abs(F - middle) > farthest) | infinite
     F = np.where(far, np.nan, F)
     is_frequency &= (np.fmin.reduce(F) > 0) & (np.nanstd(F, axis=0) < np.nanmean(F, axis=0) / 3)
     level = np.where(is_frequency, np.nanmean(F, axis=0), 1.0)
     table = pd.DataFrame(
         {"read_as": np.where(is_frequency, "frequency", "residual"), "level": level, "n_set_aside": far.sum(axis=0)},
-        index=names,
+        index=pd.Index(names),
     )
     if far.any():
         findings.append(
             RecordsWarning(
-                f"values of {listed(table.index[table['n_set_aside'] > 0])} are far from all others of their column. "
+                f"values of {', '.join(map(repr, table.index[far.any(axis=0)]))} are far from all others of their column. "
                 "They count as missing (report_ has their number). Put NaN where a value is missing",
-                "values-set-aside",
+                "set-aside",
             )
         )
     return F / level, table
-
-
-def few_records(n_independent: float, n_records: int, contamination: float) -> list[SkthermoWarning]:
-    """A finding if a baseline has fewer independent records than the rate of false alarms needs.
-
-    Twice the estimate counts, since a dozen parts tell the number within a factor of two.
-    """
-    if min(2 * n_independent, n_records) >= 1 / contamination - 1:
-        return []
-    return [
-        FewRecordsWarning(
-            f"the baseline has too few independent records (n_independent_) for a false-alarm rate of "
-            f"{contamination:.2g}: expected {np.ceil(1 / contamination - 1):.0f} or more. Later records may raise "
-            "several times as many alarms. Give a longer baseline, or a higher contamination",
-            "few-baseline-records",
-        )
-    ]
 
 
 def conformal_threshold(index: Array, contamination: float) -> float:

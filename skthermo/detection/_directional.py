@@ -14,10 +14,10 @@ from sklearn.base import BaseEstimator, clone
 from skthermo._core.arrays import Array, as_floats, check_probability, patterns, real_array
 from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
 from skthermo.detection._base import interleaved_folds
-from skthermo.detection._mahalanobis import MahalanobisDetector, as_if_complete
-from skthermo.preprocessing.folds import out_of_fold
+from skthermo.detection._mahalanobis import MahalanobisDetector
+from skthermo.preprocessing.folds import Rows, out_of_fold
 from skthermo.residuals.cones import project_on_cones
-from skthermo.residuals.gaussian import precisions
+from skthermo.residuals.gaussian import Gaussian, precisions
 
 
 class DirectionalDetector(MahalanobisDetector):
@@ -150,11 +150,14 @@ class DirectionalDetector(MahalanobisDetector):
         white = self._white_effects()
         self.sensitivities_ = pd.Series(np.linalg.norm(white, axis=0), self.directions_.index)
         self.indistinguishable_ = alike(white, self.directions_.index)
+        indices = self._both(self.covariance_, F)
         if self.threshold == "conformal":
-            folds = interleaved_folds(times)
-            indices = out_of_fold(lambda train: lambda test: self._both_from(F[train], F[test]), folds)
-        else:
-            indices = self._both(self.covariance_, F)
+
+            def learn(train: Rows) -> Callable[[Rows], Array]:
+                learned = self._fitted(F[train])
+                return lambda test: self._both(learned, F[test])
+
+            indices = out_of_fold(learn, interleaved_folds(times))
         self.omnibus_scale_ = self._scale_of_omnibus(*indices.T)
         return self._joined(*indices.T)
 
@@ -173,21 +176,15 @@ class DirectionalDetector(MahalanobisDetector):
         rates = (1 - self.omnibus) * self.contamination, self.omnibus * self.contamination
         return rare_level(cone, rates[0]) / rare_level(omnibus, rates[1])
 
-    def _both(self, learned: BaseEstimator, F: Array) -> Array:
+    def _both(self, learned: BaseEstimator | None, F: Array) -> Array:
         """Mahalanobis distance and length in the cone of each row, as if no mode were missing, (n_rows, 2)."""
+        if learned is None:
+            return np.full((len(F), 2), np.inf)
         lengths = project(learned, self.directions_.to_numpy(), F)[1]
         present = ~np.isnan(F)
         lengths[~present.any(axis=1)] = np.nan
         lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))
-        return np.column_stack([as_if_complete(self._distances(learned, F), F), lengths])
-
-    def _both_from(self, others: Array, F: Array) -> Array:
-        """The same by other rows; infinite if these do not determine the covariance."""
-        try:
-            learned = self._fitted(others, [])
-        except ValueError:
-            return np.full((len(F), 2), np.inf)
-        return self._both(learned, F)
+        return np.column_stack([self._indices(learned, F), lengths])
 
     def severities(self, X: ArrayLike) -> pd.DataFrame:
         """Losses by which the test explains each record.
@@ -225,10 +222,8 @@ class DirectionalDetector(MahalanobisDetector):
             groups has happened, such as of a bearing or a mass. NaN where a record has no mode.
         """
         F = self._relative(X)
-        lengths, distances = (
-            project(self.covariance_, self.directions_.to_numpy(), F)[1],
-            self._distances(self.covariance_, F),
-        )
+        lengths = project(self.covariance_, self.directions_.to_numpy(), F)[1]
+        distances = Gaussian(self.covariance_.location_, self.covariance_.covariance_).distances(F)
         shares = np.full(len(F), np.nan)
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
 

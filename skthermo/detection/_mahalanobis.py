@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -14,7 +14,7 @@ from skthermo._core.arrays import Array
 from skthermo._core.estimators import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector, conformal_threshold, interleaved_folds
 from skthermo.exceptions import FewRecordsWarning, ResultWarning, SkthermoWarning
-from skthermo.preprocessing.folds import out_of_fold
+from skthermo.preprocessing.folds import Rows, out_of_fold
 from skthermo.residuals.gaussian import Gaussian, check_invertible, modes_text
 
 
@@ -108,7 +108,12 @@ class MahalanobisDetector(DamageDetector):
         self.covariance_ = self._fitted(F, self.findings_)
         if self.threshold != "conformal":
             return self._index(F)
-        return out_of_fold(lambda train: lambda test: self._index_from(F[train], F[test]), interleaved_folds(times))
+
+        def learn(train: Rows) -> Callable[[Rows], Array]:
+            learned = self._fitted(F[train])
+            return lambda test: self._indices(learned, F[test])
+
+        return out_of_fold(learn, interleaved_folds(times))
 
     def _limit(self, index: Array) -> float:
         if self.threshold == "chi2":
@@ -118,36 +123,39 @@ class MahalanobisDetector(DamageDetector):
         return conformal_threshold(index, self.contamination)
 
     def _index(self, F: Array) -> Array:
-        return as_if_complete(self._distances(self.covariance_, F), F)
+        return self._indices(self.covariance_, F)
 
-    def _index_from(self, others: Array, F: Array) -> Array:
-        """Damage index of rows by other rows; infinite if these do not determine the covariance."""
-        try:
-            learned = self._fitted(others, [])
-        except ValueError:
+    def _indices(self, learned: BaseEstimator | None, F: Array) -> Array:
+        """Damage index of rows by a fitted covariance; infinite if there is none."""
+        if learned is None:
             return np.full(len(F), np.inf)
-        return as_if_complete(self._distances(learned, F), F)
-
-    def _fitted(self, F: Array, findings: list[SkthermoWarning]) -> BaseEstimator:
-        """Mean and covariance of rows, as one of scikit-learn's covariance estimators."""
-        names = getattr(self, "feature_names_in_", None)
-        if self.covariance is None:
-            return most_likely(F, names, findings)
-        complete = F[~np.isnan(F).any(axis=1)]
-        if len(complete) < 2:
-            raise ValueError(
-                f"{len(complete)} of {len(F)} rows have every mode; expected at least 2 for the covariance "
-                f"{self.covariance!r} (covariance=None takes rows with gaps)"
-            )
-        fitted = clone(self.covariance).fit(complete)
-        check_invertible(fitted.covariance_, complete, names=names)
-        return fitted
-
-    def _distances(self, learned: BaseEstimator, F: Array) -> Array:
-        """Distances of rows in the modes that they have; NaN where there is none."""
         if self.covariance is not None and not np.isnan(F).any():
             return np.sqrt(learned.mahalanobis(F))
-        return Gaussian(learned.location_, learned.covariance_).distances(F)
+        distances = Gaussian(learned.location_, learned.covariance_).distances(F)
+        return as_if_complete(distances, F) if np.isnan(F).any() else distances
+
+    def _fitted(self, F: Array, findings: list[SkthermoWarning] | None = None) -> BaseEstimator | None:
+        """Mean and covariance of rows, as one of scikit-learn's covariance estimators.
+
+        Rows that do not determine a covariance are refused with findings, and give None without.
+        """
+        names = getattr(self, "feature_names_in_", None)
+        try:
+            if self.covariance is None:
+                return most_likely(F, names, [] if findings is None else findings)
+            complete = F[~np.isnan(F).any(axis=1)]
+            if len(complete) < 2:
+                raise ValueError(
+                    f"{len(complete)} of {len(F)} rows have every mode; expected at least 2 for the covariance "
+                    f"{self.covariance!r} (covariance=None takes rows with gaps)"
+                )
+            fitted = clone(self.covariance).fit(complete)
+            check_invertible(fitted.covariance_, complete, names=names)
+            return fitted
+        except ValueError:
+            if findings is not None:
+                raise
+            return None
 
     def _has_likelihood(self) -> bool:
         return True

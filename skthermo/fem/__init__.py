@@ -1,6 +1,6 @@
 """Finite-element models as functions of their parameters: structures, modal analysis, sampling.
 
-It uses NumPy and SciPy alone. Start with ``_protocol.py``, what a model offers, then ``affine/_affine.py``.
+It uses NumPy and SciPy alone. Start with ``_protocol.py``, the interface of a model, then ``affine/_affine.py``.
 """
 
 from skthermo.fem._evaluate import add_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample

@@ -86,7 +86,7 @@ def solve_rows(
 
 
 class Job:
-    """What is asked of a model for every chunk of rows; Dask sends it to a worker once, because it says it is large."""
+    """One question to a model for every chunk of rows; Dask sends it to a worker once, because it says it is large."""
 
     def __init__(self, model: Any, method: str, dofs: Any):
         self.model = model
@@ -113,7 +113,7 @@ class Job:
 
 
 def on_one_thread(job: Job, chunk: Array) -> tuple[tuple[Array, ...], list[SkthermoWarning]]:
-    """A job on a chunk of rows, with one thread of BLAS: its workers share the cores; and what the model warns of."""
+    """A job on a chunk of rows, with one thread of BLAS: its workers share the cores; and the model's warnings."""
     with single_blas_thread(), collected() as findings:
         return job(chunk), findings
 
@@ -333,8 +333,9 @@ def linearise_modes(
     Parameters
     ----------
     model : FE model
-        Exact derivatives come from its method ``linearised_modes`` or ``local_modes``, if it has one; else those of the
-        shapes are central differences of its method ``modes``, and those of the frequencies as from `linearise`.
+        Exact derivatives come from its method ``linearised_modes`` or ``local_modes``, if it has one; else derivatives
+        of the shapes are central differences of its method ``modes``, and `linearise` gives the derivatives of the
+        frequencies.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.
     dofs : array-like of int of shape (n_dofs,), or list of (node, direction)

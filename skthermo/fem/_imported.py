@@ -52,8 +52,8 @@ class ImportedStructure(Structure):
     ----------
     model : AffineModel
         Each member is one of its parameters, as `load_affine` gives them for a folder with one file for each member. A
-        member may be one element or several, such as all shells between two cross beams. What belongs to no member,
-        and the mass, stay as they are.
+        member may be one element or several, such as all shells between two cross beams. Stiffness of no member, and
+        the mass, stay as they are.
     nodes : mapping of node to coordinates
         (x, y) or (x, y, z) in m. Nodes at which neither members end nor supports are, are left out.
     members : mapping of str to node or sequence of nodes
@@ -67,7 +67,7 @@ class ImportedStructure(Structure):
     Attributes
     ----------
     dofs : list of (node, direction)
-        Labels of the matrices' rows, those of the model; none if it has none.
+        Labels of the matrices' rows, as in the model; none if it has none.
 
     Raises
     ------
@@ -82,7 +82,7 @@ class ImportedStructure(Structure):
 
     Examples
     --------
-    A tower of three storeys, of which a program has written the stiffness of each:
+    A tower of three storeys; a program has written the stiffness of each:
 
     >>> import numpy as np
     >>> from skthermo.fem import AffineModel, ImportedStructure
@@ -165,7 +165,7 @@ class ImportedStructure(Structure):
 def matrices_by_member(
     model: AffineModel, members: Sequence[str]
 ) -> tuple[dict[Hashable, Matrix], scipy.sparse.csc_array]:
-    """Stiffness of each member, the sum of the terms that its parameter multiplies, and of what belongs to none."""
+    """Stiffness of each member, the sum of the terms that its parameter multiplies, and the rest, of no member."""
     known, terms = model.parameter_terms, model.stiffness_terms
     unknown = [member for member in members if not known.get(member)]
     if unknown:

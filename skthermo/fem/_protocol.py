@@ -1,4 +1,4 @@
-"""The interface of FE models: what each must have, and what it may offer besides."""
+"""The interface of FE models: necessary and optional methods."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class FEModel(Protocol):
 
     See Also
     --------
-    AffineModel : Has all that a model may offer; its pages say what each method takes and returns.
+    AffineModel : Has all that a model may offer; its pages describe arguments and results of each method.
 
     Notes
     -----

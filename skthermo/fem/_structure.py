@@ -199,12 +199,12 @@ class Structure:
         Parameters
         ----------
         parameters : sequence of str, or mapping of str to group or (property, group[, matrix])
-            What theta multiplies. The name of a group means its whole stiffness; ``{"A_arch": ("A", "arches")}`` means
-            one property ("E", "A", "I_yy", "k", "m", ...) of its members, in stiffness and mass; ``("A", "arches",
-            "stiffness")`` means the stiffness alone (or ``"mass"``); ``("mass", group)`` means the whole mass of a
-            group.
+            Parameters, and the properties that theta multiplies. The name of a group means its whole stiffness;
+            ``{"A_arch": ("A", "arches")}`` means one property ("E", "A", "I_yy", "k", "m", ...) of its members, in
+            stiffness and mass; ``("A", "arches", "stiffness")`` means the stiffness alone (or ``"mass"``); ``("mass",
+            group)`` means the whole mass of a group.
         groups : sequence of str, or mapping of str to group or (property, group), optional
-            What can be damaged: the whole stiffness of a group, or the part of it that one property multiplies, as in
+            Damage groups: the whole stiffness of a group, or the part of it that one property multiplies, as in
             ``{"torsion": ("G", "girder")}``. By default all groups of the structure.
         n_modes : int, optional
             How many of the lowest modes the model gives. By default six, or all if there are fewer.

@@ -107,7 +107,7 @@ def complete_r2(y_true: ArrayLike, y_pred: ArrayLike, sample_weight: ArrayLike |
         Predicted values. Rows in which either holds NaN are ignored. Columns of two frames are paired by their
         names.
     sample_weight : array-like of shape (n_samples,), optional
-        Weight of each row; those of a series are matched to the rows of a frame by index.
+        Weight of each row; a series is matched to the rows of a frame by index.
 
     Returns
     -------

@@ -191,14 +191,17 @@ def out_of_fold(learn: Callable[[Rows], Callable[[Rows], ArrayLike]], folds: Row
     >>> out_of_fold(lambda train: lambda test: np.full(len(test), y[train].mean()), np.array([0, 0, 1, 1]))
     array([3.5, 3.5, 1.5, 1.5])
     """
+    n_rows, splits = len(folds), folds
     if isinstance(folds, np.ndarray):
-        n_rows = len(folds)
-        tests = [folds == fold for fold in np.unique(folds[folds >= 0])]
-        folds = [(np.flatnonzero(~test), np.flatnonzero(test)) for test in tests]
+        splits = []
+        for number in np.unique(folds[folds >= 0]):
+            splits.append((np.flatnonzero(folds != number), np.flatnonzero(folds == number)))
     else:
-        n_rows = 1 + max(rows.max(initial=-1) for pair in folds for rows in pair)
-    found = [(test, np.asarray(learn(train)(test), dtype=float)) for train, test in folds]
-    values = np.full((n_rows, *(found[0][1].shape[1:] if found else ())), np.nan)
-    for test, value in found:
-        values[test] = value
+        n_rows = 1 + max(int(rows.max(initial=-1)) for pair in folds for rows in pair)
+    values = np.full(n_rows, np.nan)
+    for place, (train, test) in enumerate(splits):
+        found = np.asarray(learn(train)(test), dtype=float)
+        if place == 0:
+            values = np.full((n_rows, *found.shape[1:]), np.nan)
+        values[test] = found
     return values

@@ -30,6 +30,8 @@ class Gaussian:
     def fitted(cls, rows: Array) -> Gaussian:
         """The most likely one, by expectation maximisation where modes are missing."""
         present = ~np.isnan(rows)
+        if present.all():
+            return cls(rows.mean(axis=0), np.cov(rows.T, bias=True).reshape(2 * rows.shape[1:]))
         centre, deviations = np.nanmean(rows, axis=0), np.nanstd(rows, axis=0)
         scale = np.where(deviations > 0, deviations, 1.0)
         mean, covariance, is_settled = _most_likely(np.where(present, (rows - centre) / scale, 0.0), present)
@@ -37,12 +39,14 @@ class Gaussian:
 
     def distances(self, rows: Array) -> Array:
         """Mahalanobis distances in the modes that rows have; NaN where there is none."""
-        scale = np.sqrt(np.diag(self.covariance))
-        masks, of_row = patterns(~np.isnan(rows))
         # The inverse of the covariance itself would lose modes in a small unit beside others in a large one.
-        inverses = precisions(self.covariance / np.outer(scale, scale), masks)
-        standard = np.nan_to_num(rows - self.mean) / scale
-        scaled = standard @ inverses[0] if len(masks) == 1 else np.einsum("ij,ijk->ik", standard, inverses[of_row])
+        scale = np.sqrt(np.diag(self.covariance))
+        standard, correlation = (rows - self.mean) / scale, self.covariance / np.outer(scale, scale)
+        if not np.isnan(standard).any():
+            return np.sqrt(np.maximum(np.einsum("ij,ij->i", standard @ np.linalg.inv(correlation), standard), 0.0))
+        standard = np.nan_to_num(standard)
+        masks, of_row = patterns(~np.isnan(rows))
+        scaled = np.einsum("ij,ijk->ik", standard, precisions(correlation, masks)[of_row])
         squared = np.einsum("ij,ij->i", scaled, standard)
         return np.where(masks.any(axis=1)[of_row], np.sqrt(np.maximum(squared, 0.0)), np.nan)
 
@@ -135,9 +139,6 @@ def _conditionals(covariance: Array, masks: Mask) -> tuple[Array, Array]:
 
 def _most_likely(rows: Array, present: Mask) -> tuple[Array, Array, bool]:
     """Mean and covariance of standardised rows, zero where a mode is missing, and whether they have settled."""
-    if present.all():
-        mean = rows.mean(axis=0)
-        return mean, (rows - mean).T @ (rows - mean) / len(rows), True
     masks, of_row = patterns(present)
     n_modes, counts = rows.shape[1], np.bincount(of_row).astype(float)
     sums, products = np.zeros((len(masks), n_modes)), np.zeros((len(masks), n_modes, n_modes))

@@ -1,4 +1,5 @@
-"""What changes of a structure by unknown amounts do to its parameters, and to its frequencies over some weather."""
+"""Changes of a structure by unknown amounts: their effects on its parameters, and on its frequencies over some
+weather."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 
 @dataclass(frozen=True)
 class StructuralChanges:
-    """What some amounts do to theta: they multiply its columns by 1 + direction * amount.
+    """Effects of some amounts on theta, whose columns they multiply by 1 + direction * amount.
 
     The columns are the model's parameters, then 1 - severity of each of the model's damage ``groups``, then 1 + amount
     of each of the added ``masses``. ``directions`` are (n_causes, n_columns), and ``bounds``, (n_causes, 2), the lowest
@@ -43,7 +44,7 @@ class StructuralChanges:
         return self.directions.shape[1] - len(self.groups) - len(self.masses)
 
     def factors(self, amounts: Array) -> Array:
-        """What multiplies each column, (..., n_columns), for amounts (..., n_causes)."""
+        """Factors of the columns, (..., n_columns), for amounts (..., n_causes)."""
         return np.prod(1 + self.directions * amounts[..., np.newaxis], axis=-2)
 
     def slopes(self, amounts: Array) -> Array:

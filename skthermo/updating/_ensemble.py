@@ -1,4 +1,4 @@
-"""Models drawn from what calibration leaves open, by randomised maximum a posteriori."""
+"""Models that are as likely as a calibrated one, by randomised maximum a posteriori."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -19,8 +19,8 @@ from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise
 class Ensemble:
     """Draws of a model's parameters, and of the stiffness of its damage groups, given measured modes.
 
-    ``bounds`` and ``prior`` are those of the parameters, ``groups`` the damage groups whose stiffness is not known
-    either, and ``spread`` is the standard deviation of that about 1.
+    ``bounds`` and ``prior`` belong to the parameters. The stiffness of the damage ``groups`` is unknown too, with the
+    standard deviation ``spread`` about 1.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Ensemble:
 
     @property
     def names(self) -> list[str]:
-        """What the columns of the multipliers are: parameters, then damage groups."""
+        """Columns of the multipliers: parameters, then damage groups."""
         return [*self.model.parameter_names, *self.groups]
 
     def multipliers(
@@ -52,7 +52,7 @@ class Ensemble:
         return run_jobs((delayed(search)(residuals) for residuals in drawn), n, unit="models", **options)
 
     def model_at(self, multipliers: Array) -> FEModel:
-        """The model whose theta = 1 has these multipliers; its damage groups are those of the model."""
+        """The model whose theta = 1 has these multipliers; it has the model's damage groups."""
         n_parameters = len(self.model.parameter_names)
         model: Any = self.model
         if self.groups:
@@ -60,7 +60,7 @@ class Ensemble:
         return rescaled(model, multipliers[:n_parameters])
 
     def findings(self, outcomes: Sequence[Outcome]) -> Iterator[SkthermoWarning]:
-        """Warnings about the draws, and those of the model about their parameters."""
+        """Warnings about the draws, and the model's about their parameters."""
         n = len(outcomes)
         theta = np.array([outcome.theta for outcome in outcomes])
         if unfinished := sum(not outcome.success for outcome in outcomes):

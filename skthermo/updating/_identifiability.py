@@ -128,7 +128,7 @@ def theta_or_nominal(model: FEModel, theta: ArrayLike | None) -> Array:
 
 
 class Identifiability(Bunch):
-    """What `identifiability` returns."""
+    """Result of `identifiability`."""
 
     rank: int
     n_modes: int
@@ -192,8 +192,8 @@ def identifiability(
     theta : array-like of shape (n_parameters,), optional
         Multipliers at which to differentiate; 1 by default.
     noise : float or array-like of shape (n_modes,)
-        Relative standard deviation of the measured frequencies. For a mean of n records, divide that of one record by
-        sqrt(n).
+        Relative standard deviation of the measured frequencies. For a mean of n records, divide the deviation of one
+        record by sqrt(n).
     dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
         Degrees of freedom, by position, the first being 0, or by label, where mode shapes are measured too. The model
         needs a method ``modes`` or ``local_modes``, as `~skthermo.fem.AffineModel` has.
@@ -205,7 +205,7 @@ def identifiability(
     Bunch
         With the method ``summary()``, which says the same in sentences, and the attributes
 
-        - ``rank``: number of parameters identifiable together, at most that of modes where no shapes are measured;
+        - ``rank``: number of parameters identifiable together, without measured shapes at most the number of modes;
         - ``n_modes``, ``n_dofs``: number of modes, and of degrees of freedom where their shapes are measured;
         - ``sensitivity``: d ln f / d ln theta, a frame of shape (n_modes, n_parameters);
         - ``singular_values``, ``condition_number``: of the sensitivities, each row multiplied by the root mean square

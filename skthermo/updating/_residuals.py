@@ -96,7 +96,8 @@ def read_measured(
 
 
 def _real_shapes(shapes: NDArray) -> tuple[Array, list[SkthermoWarning]]:
-    """Real parts of complex shapes, each rotated by the phase that makes its real part largest, and what is lost."""
+    """Real parts of complex shapes, each rotated by the phase that makes its real part largest, and the finding of what
+    is lost."""
     squares = np.nansum(shapes**2, axis=0)
     turned = shapes * np.exp(-0.5j * np.angle(squares))
     lengths = np.sqrt(np.nansum(np.abs(shapes) ** 2, axis=0))
@@ -233,15 +234,15 @@ def _by_shape(model: Any, measured: Measured, theta: Array) -> PairedModes:
 
 
 class Residuals:
-    """Residuals of frequencies, of the prior and of shapes, in one vector with one loss: what a search minimises.
+    """Residuals of frequencies, of the prior and of shapes, in one vector with one loss, which a search minimises.
 
     A shape's residuals are its `tangents` e, of squared length E = 1 / MAC - 1. Together they have the loss
     ((1 - sqrt(MAC)) / sqrt(MAC))^2 = (sqrt(1 + E) - 1)^2, whose slope weights them in the Gauss-Newton matrix.
     (1 - sqrt(MAC)) / sqrt(MAC) itself is quadratic in e: its derivative vanishes at the optimum.
 
     With ``noise``, residuals are in units of their standard deviations, each less a standard normal number, and their
-    loss is their square: what they would be with another measurement and another mean of the prior, as likely as the
-    given ones.
+    loss is their square: as with another measurement and another mean of the prior, which are as likely as the given
+    ones.
     """
 
     def __init__(self, model: FEModel, measured: Measured, prior: Array | None, noise: Array | None = None):

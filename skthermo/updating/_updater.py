@@ -108,7 +108,7 @@ class ModelUpdater(Estimator):
         Covariance of ``theta_``, if the weights describe the noise (see Notes). A parameter that the measurements do
         not determine has an infinite variance and NaN covariances.
     measured_ : Measured
-        What `fit` was given, with its weights.
+        Measurements that `fit` was given, with their weights.
     findings_ : list of SkthermoWarning
         The warnings of `fit`.
     has_deviations_ : bool
@@ -118,7 +118,7 @@ class ModelUpdater(Estimator):
 
     See Also
     --------
-    identifiability : What accuracy to expect before anything is measured.
+    identifiability : Accuracy to expect, before anything is measured.
 
     Notes
     -----
@@ -267,10 +267,10 @@ class ModelUpdater(Estimator):
         groups: Sequence[str] | None = None,
         random_state: int | np.random.RandomState | None = None,
     ) -> list[FEModel]:
-        """Models that are as likely as the calibrated one, given the measurements and what was known before.
+        """Models that are as likely as the calibrated one, given the measurements and the prior.
 
-        The stiffness of every damage group is unknown too, also of those that no parameter scales. What the measured
-        modes do not determine differs from model to model as much as the prior allows.
+        The stiffness of every damage group is unknown too, also of those that no parameter scales. Where measured modes
+        do not determine it, it differs from model to model as much as the prior allows.
 
         Parameters
         ----------
@@ -288,8 +288,8 @@ class ModelUpdater(Estimator):
         Returns
         -------
         list of FE model
-            ``n`` models like ``model_``: theta = 1 is the drawn stiffness; parameters, damage groups and modes are
-            those of ``model``. A model that has no method ``with_damage_parameters`` varies in its parameters only.
+            ``n`` models like ``model_``: theta = 1 is the drawn stiffness; with the parameters, damage groups and modes
+            of ``model``. A model that has no method ``with_damage_parameters`` varies in its parameters only.
 
         Raises
         ------

@@ -14,7 +14,6 @@ from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import LocalOutlierFactor
 
 from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
-from skthermo._core.arrays import check_bounds, check_prior
 from skthermo.detection import MahalanobisDetector, OutlierDetector, WindowedAlarm
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring, evaluate_modes
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
@@ -1755,8 +1754,8 @@ BY_NAME = {  # values with names, and a call that reads them by name
     "theta, a series": (1 + SHARES, TRUSS.frequencies),
     "theta, a frame": ((1 + SHARES).to_frame().T, lambda theta: fem.evaluate(TRUSS, theta).ravel()),
     "half-widths": (SHARES, lambda bounds: fem.sample(TRUSS, bounds, 4, random_state=0).theta),
-    "box": (BOX, lambda bounds: check_bounds(bounds, NAMES)),
-    "prior": (SHARES, lambda prior: check_prior(prior, NAMES)),
+    "box": (BOX, lambda bounds: fem.sample(TRUSS, bounds, 4, random_state=0).theta),
+    "prior": (SHARES, lambda prior: updated(F[:9], prior=prior, bounds=0.9).theta_),
     "severities": (SHARES, lambda damage: TRUSS.damaged(damage).frequencies(np.ones((1, 4)))),
     "severities of a scenario": (
         SHARES,

@@ -22,7 +22,6 @@ import sklearn.utils._param_validation
 import sklearn.utils.validation
 
 import skthermo
-from skthermo._core.arrays import check_noise
 from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing import RecordFindings
 from tests.bad_input import registry
@@ -297,7 +296,3 @@ def test_names_count_and_not_positions(examples, number):
 def test_labels_that_only_count_are_no_names(examples):
     numbered = (1 + examples.SHARES).reset_index(drop=True)
     np.testing.assert_array_equal(examples.TRUSS.frequencies(numbered), examples.TRUSS.frequencies(1 + examples.SHARES))
-
-
-def test_a_single_mode_may_be_unknown():
-    np.testing.assert_array_equal(check_noise([0.01, 0.9], 2), [0.01, 0.9])

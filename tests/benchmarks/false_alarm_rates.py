@@ -23,6 +23,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 from harness import arguments, compensated, shown
+from inside import estimate_false_alarms, find_events
 from scipy.signal import lfilter
 from sklearn.covariance import EmpiricalCovariance
 from sklearn.linear_model import LinearRegression
@@ -32,8 +33,6 @@ from sklearn.preprocessing import PolynomialFeatures
 from skthermo.datasets import make_fleet, make_truss_campaign
 from skthermo.detection import DirectionalDetector
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._events import find_events
-from skthermo.monitoring._threshold import estimate_false_alarms
 
 LAWS = {
     "iid": "independent, normal",

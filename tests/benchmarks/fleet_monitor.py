@@ -25,6 +25,7 @@ import sys
 import numpy as np
 import pandas as pd
 from harness import arguments, compensated, joined, shown
+from inside import find_events
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
@@ -33,7 +34,6 @@ from sklearn.preprocessing import StandardScaler
 from skthermo.datasets import make_fleet
 from skthermo.fleet import FleetPrior
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._events import find_events
 from skthermo.preprocessing import HingeFeatures, LagFeatures, SensorMeans
 from skthermo.surrogate import TemperatureMapper
 

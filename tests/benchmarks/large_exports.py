@@ -17,9 +17,7 @@ import pandas as pd
 import scipy.io
 import scipy.sparse
 from harness import arguments, peak_megabytes, shown, timed
-
-from skthermo._core.matrix_child import read
-from skthermo._core.matrix_files import form_of
+from inside import form_of, read
 
 DIRECTIONS = 6
 

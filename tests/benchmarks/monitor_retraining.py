@@ -17,6 +17,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 from harness import DATA, arguments, compensated, is_missed, joined, modes_of, shown
+from inside import ActiveDetector, Memory, begun_again, retrained
 from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
@@ -24,9 +25,6 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.monitoring import Monitor
-from skthermo.monitoring._active import ActiveDetector
-from skthermo.monitoring._records import Memory
-from skthermo.monitoring._retraining import begun_again, retrained
 from skthermo.preprocessing import HingeFeatures
 
 ASKED = 0.02  # share of healthy records above the threshold

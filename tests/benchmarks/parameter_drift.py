@@ -22,12 +22,12 @@ import sys
 import numpy as np
 import pandas as pd
 from harness import arguments, compensated, is_missed, shown, split
+from inside import GroupEffects
 from scipy import stats
 from structures import AgeingTruss
 
 from skthermo.detection import TemperatureCompensator, WindowedAlarm
 from skthermo.monitoring import Monitor, track_parameters
-from skthermo.monitoring.drift._observations import GroupEffects
 from skthermo.preprocessing import residual_trend
 from skthermo.surrogate import TemperatureMapper
 

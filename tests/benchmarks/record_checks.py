@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, shown, tower_records, z24_records
+from inside import SET_ASIDE
 from structures import slow_soil
 
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss_campaign
 from skthermo.preprocessing import HampelFilter, check_records, set_aside
-from skthermo.preprocessing.checks._record_findings import ASIDE_KINDS
 
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
@@ -246,7 +246,7 @@ def healthy_table(records):
     rows = {}
     for name, (T, F) in records:
         cleaned = set_aside(T, F, exclude={"no-rows"})
-        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(ASIDE_KINDS), 0).sum()
+        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(SET_ASIDE), 0).sum()
         counts = (1, bool(found(T, F) - ALSO), np.size(T) + np.size(F), n_values, len(cleaned.left_out))
         rows.setdefault(name, []).append(counts)
     columns = ["records", "with a false finding", "values", "of these set aside", "columns left out"]

@@ -24,14 +24,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, compensated, peak_megabytes, shown
+from inside import BridgeOutcome, Storage, known_of, pickled
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_fleet, make_truss
 from skthermo.detection import WindowedAlarm
 from skthermo.fleet import Fleet
-from skthermo.fleet._fleet import Storage
-from skthermo.fleet._workers import BridgeOutcome, known_of, pickled
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import (
     BlockedKFold,

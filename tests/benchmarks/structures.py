@@ -17,14 +17,13 @@ import numpy as np
 import pandas as pd
 import scipy.io
 from harness import DATA, autoregression, joined
+from inside import Law, SiteClimate, drawn_by_hour, memory, persistent, stream
 from scipy.signal import lfilter
 from scipy.special import ndtri
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import Bunch
 
 from skthermo.datasets import kw51_sensors, make_kw51, make_truss, make_truss_campaign
-from skthermo.datasets._fleet_site import Law, SiteClimate, drawn_by_hour, persistent, stream
-from skthermo.datasets._kw51_campaign import memory
 from skthermo.fem import AffineModel, Bar, Beam, PointMass, Spring, Structure, add_noise
 from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse

@@ -6,8 +6,7 @@ import pytest
 from skthermo.reporting import owner_report
 from skthermo.studies import sweep
 from tests.browser.reader import CUT, SMALL_TEXT, WIDTHS
-from tests.reporting.fleets import FakeFleet
-from tests.reporting.monitors import FakeMonitor, event_row
+from tests.reporting.monitors import FakeFleet, FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, fitted_chain, run_study
 from tests.studies.identified import identified
 

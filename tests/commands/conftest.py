@@ -1,8 +1,9 @@
 """A truss with a monitor made by commands alone, which no test changes."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from skthermo.commands._proposal import ANY_CHANGE, Candidate, Proposal
 from tests.commands.folders import made_bridge
 from tests.monitoring.nightly import truss_records
 
@@ -10,7 +11,8 @@ from tests.monitoring.nightly import truss_records
 @pytest.fixture
 def one_detector(monkeypatch):
     """``init`` need not choose a detector where its files are what matters."""
-    monkeypatch.setattr(Proposal, "detectors", [Candidate(ANY_CHANGE, {}, "each record for itself", "", 1.0)])
+    one = {"kind": "MahalanobisDetector", "compensator": {}, "text": "each record for itself", "finds": "", "size": 1.0}
+    monkeypatch.setattr("skthermo.commands._proposal.Proposal.detectors", [SimpleNamespace(**one)])
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,6 @@ import pandas as pd
 import pytest
 
 import skthermo.reporting
-from skthermo._core.files import alone_with
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
 from tests.commands.folders import edit, run, write_day
@@ -138,8 +137,11 @@ def test_a_line_of_transitions_that_was_cut_off_is_written_again(bridge, after, 
 
 
 def test_two_at_once(bridge, before, after, records):
-    pytest.importorskip("fcntl")
-    with alone_with(bridge / "monitor.joblib", 0):
+    fcntl = pytest.importorskip("fcntl")
+    with open(bridge / ".monitor.joblib.lock", "a+") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        lock.write("process 1")
+        lock.flush()
         for command in ("update", "fit", "acknowledge"):
             more = {"acknowledge": ["1", "--damage"], "fit": ["--replace"]}.get(command, [])
             done = run(command, bridge / "monitor.toml", *more, "--wait", "0.1")

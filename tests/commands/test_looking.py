@@ -1,5 +1,6 @@
 """Files of records in any common form are read as they were meant, to the last bit."""
 
+import tomllib
 from datetime import datetime
 
 import numpy as np
@@ -211,11 +212,9 @@ def test_columns_find_their_roles_and_units(tmp_path):
     table.to_csv(tmp_path / "all.csv")
     done = run("init", tmp_path / "all.csv", "--into", tmp_path / "b", "--reference", "station")
     assert done.code == 0, done.err
-    from skthermo.commands._settings import read_settings
-
-    records = read_settings(tmp_path / "b" / "monitor.toml").records
-    assert (records.temperatures, records.responses) == (["steel [K]", "T_soil [degF]"], ["f1"])
-    assert (records.reference, records.convert) == (["station"], {"steel [K]": "K", "T_soil [degF]": "°F"})
+    records = tomllib.loads((tmp_path / "b" / "monitor.toml").read_text(encoding="utf-8"))["records"]
+    assert (records["temperatures"], records["responses"]) == (["steel [K]", "T_soil [degF]"], ["f1"])
+    assert (records["reference"], records["convert"]) == (["station"], {"steel [K]": "K", "T_soil [degF]": "°F"})
     assert run("fit", tmp_path / "b" / "monitor.toml").code == 0
     from skthermo.monitoring import load_monitor
 

@@ -9,8 +9,6 @@ from sklearn.exceptions import NotFittedError
 
 from skthermo.plotting import DetectorsDisplay, PODCurveDisplay
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, pod_curve
-from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._simulation import Evaluation
 
 FOUND = "piers 18 %"
 
@@ -213,27 +211,6 @@ def made_study():
         decisions_=decisions,
         indices_=indices,
     )
-
-
-def test_labelled_scores_are_of_evaluated_records_from_the_onset_on():
-    given = made_study()
-    study = DetectabilityStudy(None, None, [])
-    study.findings_ = StudyFindings(
-        given.results_, given.scenarios_, evaluation=Evaluation(given.decisions_, indices=given.indices_)
-    )
-    for name in ("raw", "whitened"):
-        study.decisions_[name, "deck", "simulated"][0, :4] = np.nan
-        healthy, deck, later = (study.decisions_[name, s.name, "simulated"] for s in given.scenarios)
-        damaged = np.concatenate([deck.ravel(), later[:, 5:].ravel()])
-        is_damaged, scores = study.labelled_scores(name)
-        assert (is_damaged.sum(), (~is_damaged).sum()) == (105 - 4, 60)
-        np.testing.assert_array_equal(scores, -np.r_[healthy.ravel(), damaged[~np.isnan(damaged)]])
-        assert (scores > 0).sum() == (np.r_[healthy.ravel(), damaged] < 0).sum()
-    assert len(study.labelled_scores("raw", scenarios=["later"])[0]) == 60 + 45
-    with pytest.raises(ValueError, match="detector is 'other'"):
-        study.labelled_scores("other")
-    with pytest.raises(ValueError, match="60 healthy and 0 damaged"):
-        study.labelled_scores("raw", scenarios=["roof"])
 
 
 def test_a_curve_of_a_study_is_that_of_the_detector_that_is_named():

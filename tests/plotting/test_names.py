@@ -15,7 +15,6 @@ from skthermo.plotting import (
     PredictionDisplay,
     StructureDisplay,
 )
-from skthermo.plotting._display import label_of
 from skthermo.studies import pod_curve
 
 HOSTILE = "$E_{x$ & 50% <b>"
@@ -68,17 +67,6 @@ def test_any_name_can_be_drawn_and_leaves_room_for_the_data(draw):
     width = sum(ax.get_position().width for ax in figure.axes[:3])
     assert width > (0.7 if len(figure.axes) == 3 else 0.3)
     plt.close(figure)
-
-
-def test_names_keep_their_beginning_and_end_and_their_formulas():
-    assert label_of("f1") == "$f_{1}$"
-    assert label_of(r"$\alpha$ (1)") == r"$\alpha$ (1)"
-    assert label_of("5 $ and 6") == r"5 \$ and 6"
-    assert label_of(HOSTILE) == HOSTILE.replace("$", r"\$")
-    assert label_of("span_1") == "span_1"
-    assert label_of(LONG).startswith("a very long")
-    assert label_of(LONG).endswith("number 7")
-    assert len(label_of(LONG)) <= 35
 
 
 def test_the_onset_may_be_in_another_time_zone():

@@ -8,10 +8,9 @@ import pytest
 from scipy.special import expit
 from scipy.stats import binomtest
 from sklearn.ensemble import IsolationForest
-from sklearn.pipeline import make_pipeline
+from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._core.estimators import last_step
 from skthermo.detection import MahalanobisDetector
 from skthermo.plotting import DamageIndexDisplay, IdentifiedDamageDisplay, PODCurveDisplay
 from skthermo.studies import pod_curve
@@ -31,7 +30,7 @@ def test_points_threshold_and_onset_of_any_outlier_detector(estimator, year, lat
     for line, frame in zip(display.points_[""], (year.frequencies, F), strict=True):
         np.testing.assert_array_equal(line.get_ydata(), -detector.score_samples(frame))
         assert line.get_linestyle() == "None"
-    last = last_step(detector)
+    last = detector[-1] if isinstance(detector, Pipeline) else detector
     threshold = last.threshold_ if isinstance(last, MahalanobisDetector) else -last.offset_
     assert display.threshold_lines_[0].get_ydata()[0] == threshold
     assert display.ax_.lines[-1].get_xdata()[0] == F.index[9].to_datetime64()

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 from skthermo.reporting import owner_report
-from tests.reporting.fleets import FakeFleet
-from tests.reporting.monitors import FakeMonitor, event_row
+from tests.reporting.monitors import FakeFleet, FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
 
 LOST = {"standard_error": 0.01, "per_year": -0.03, "per_year_error": 0.005, "significant": True, "p_value": 0.001}

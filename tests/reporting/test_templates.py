@@ -10,8 +10,7 @@ import pandas as pd
 import pytest
 
 from skthermo.reporting import owner_report
-from tests.reporting.fleets import FakeFleet
-from tests.reporting.monitors import FakeMonitor, event_row
+from tests.reporting.monitors import FakeFleet, FakeMonitor, event_row
 from tests.reporting.pages import HOSTILE, QUOTED, Page
 
 pytest.importorskip("matplotlib")

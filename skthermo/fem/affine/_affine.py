@@ -532,7 +532,7 @@ class AffineModel:
         return self._with_core(self._whole.with_group_factors(scaled), names, bounds)
 
     def with_added(self, stiffness: MatrixLike | None = None, mass: MatrixLike | None = None) -> Self:
-        """A new model with further stiffness and mass, such as those of a retrofit.
+        """A new model with further stiffness and mass, such as a retrofit adds.
 
         Parameters
         ----------
@@ -544,7 +544,7 @@ class AffineModel:
         Returns
         -------
         AffineModel or ReducedModel
-            Its columns are the modes of this model's nominal state, without what is added.
+            Its columns are the modes of this model's nominal state, before the addition.
 
         Raises
         ------
@@ -596,7 +596,7 @@ class AffineModel:
         return self._with_core(self._whole.with_mass_factors(matrices), names, bounds)
 
     def with_parts(self, parts: Mapping[str, Mapping[int, MatrixLike]]) -> Self:
-        """A new model of the same matrices with further damage groups, each of which scales parts of stiffness terms.
+        """A new model of the same matrices with further damage groups, which scale parts of stiffness terms.
 
         `Structure.divide` finds the parts that belong to members.
 
@@ -604,7 +604,7 @@ class AffineModel:
         ----------
         parts : mapping of str to mapping of int to matrix
             Damage group -> position of a stiffness term -> the matrix (n_dof, n_dof), a part of that term, which the
-            group scales. What is left of a term still belongs to the groups that it is in, and so do its parts.
+            group scales. The remainder of a term still belongs to the term's groups, and so do its parts.
 
         Returns
         -------
@@ -619,7 +619,7 @@ class AffineModel:
 
         Examples
         --------
-        Two springs in a row, of which one parameter is the stiffness of both:
+        Two springs in a row, with one parameter for the stiffness of both:
 
         >>> from skthermo.fem import AffineModel
         >>> model = AffineModel({("k",): [[800.0, -400.0], [-400.0, 400.0]]}, mass=[[1.0, 0.0], [0.0, 1.0]], n_modes=2)
@@ -651,7 +651,7 @@ class AffineModel:
         Returns
         -------
         FE model
-            For searches that may pass through theta of which it would warn.
+            For searches that may pass through theta without a solution.
         """
         return self._twin(_is_quiet=True)
 
@@ -730,7 +730,7 @@ class AffineModel:
 
         Notes
         -----
-        The costs are rounded from those of lines and grids of beams with 2 to 20 parameters within 30 %.
+        The costs are within 30 % of times measured for lines and grids of beams with 2 to 20 parameters.
 
         Examples
         --------
@@ -791,7 +791,7 @@ class ReducedModel(AffineModel):
         Largest relative error of a frequency. The basis grows until the errors at fresh random
         points and corners of the box are below tol / 2.
     random_state : int, RandomState or None, default=None
-        Seed of those points, which are never those of a sample drawn with the same seed.
+        Seed of those points; a sample with the same seed has other points.
 
     Attributes
     ----------

@@ -164,7 +164,8 @@ def of_unit_energy(vectors: Array, stiffness: csc_array) -> Array:
 
 
 def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> Directions:
-    """Principal directions of vectors in the inner product of a stiffness, without those of less than some energy."""
+    """Principal directions of vectors in the inner product of a stiffness, without directions of less than some
+    energy."""
     energies, turns = scipy.linalg.eigh(vectors.T @ (stiffness @ vectors))
     kept = energies > max(least, 1e-13 * energies[-1])  # less is rounding error
     return Directions(vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept])

@@ -34,7 +34,7 @@ class PrincipalBox:
 
     @classmethod
     def around(cls, theta: Array, bounds: Array | None = None) -> PrincipalBox:
-        """The box around rows of theta, of which those with NaN do not count."""
+        """The box around rows of theta; rows with NaN do not count."""
         logs = np.log(theta[spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), 1000)])
         middle = logs.mean(axis=0)
         directions = np.linalg.svd(logs - middle, full_matrices=True)[2]
@@ -230,10 +230,10 @@ class FrequencySurface:
 
     Notes
     -----
-    The box is that of the rows along their principal directions, with a quarter of its half-width as a margin, or 2 %.
-    The difference from the polynomial of one degree less estimates the error of a row. Rows are not served outside the
-    box, where that estimate is more than half of the least one at a check point of too large an error, and where two
-    modes are within 1 %, or a polynomial of their difference leaves open which is higher.
+    The box holds the rows along their principal directions, with a quarter of its half-width as a margin, or 2 %. The
+    difference from the polynomial of one degree less estimates the error of a row. Rows are not served outside the box,
+    where that estimate is more than half of the least one at a check point of too large an error, and where two modes
+    are within 1 %, or a polynomial of their difference leaves open which is higher.
 
     Examples
     --------

@@ -56,7 +56,7 @@ def memory_in(folder: str | PathLike) -> Memory:
 def frequencies_of_row(
     parameter_names: tuple[str, ...], n_modes: int, theta: bytes, solve: Callable[[], Array]
 ) -> Array:
-    """What ``solve`` gives; the memory keeps it by the other arguments."""
+    """The result of ``solve``, which the memory keeps by the other arguments."""
     return solve()
 
 
@@ -213,7 +213,7 @@ class CallableModel:
             self._remembering()(*self._asked(key), lambda: frequencies)
 
     def _asked(self, key: bytes) -> tuple[tuple[str, ...], int, bytes]:
-        """What a kept row is recognised by."""
+        """Arguments by which the memory recognises a row."""
         return self.parameter_names, self.n_modes, key
 
     def _remembering(self) -> Any:

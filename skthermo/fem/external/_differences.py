@@ -1,4 +1,4 @@
-"""Terms from whole matrices, in each of which one parameter was multiplied: exported ones, or those of a program."""
+"""Terms from whole matrices with one parameter multiplied, which a program exports or returns."""
 
 from __future__ import annotations
 
@@ -58,8 +58,7 @@ def difference_terms(
 ) -> dict[tuple[str, ...], scipy.sparse.csc_array]:
     """Stiffness terms from whole matrices: one as built, and one with each parameter multiplied.
 
-    The term of parameter j is K_j = (K(theta_j = factor) - K(1)) / (factor - 1), and what the terms leave of K(1) is
-    constant.
+    The term of parameter j is K_j = (K(theta_j = factor) - K(1)) / (factor - 1), and the rest of K(1) is constant.
 
     Parameters
     ----------
@@ -69,7 +68,7 @@ def difference_terms(
         Parameter -> stiffness of the whole structure with that parameter, such as the modulus of a group of members,
         multiplied by ``factor``.
     factor : float or mapping of str to float, default=2.0
-        What the parameters were multiplied by: one number for all, or one for each.
+        Factor of the parameters: one number for all, or one for each.
     check : (mapping of str to float, matrix), optional
         Multipliers of some parameters, the others being 1, and the stiffness of the whole structure with these, with
         which the sum of the terms is compared. Other multipliers than ``factor``, on all parameters at once, show that
@@ -100,9 +99,9 @@ def difference_terms(
 
     Notes
     -----
-    Stiffness that is linear in moduli is a sum of parts none of which has a negative eigenvalue. A term or rest that
-    has one, below -1e-6 relative to the diagonal of the nominal stiffness, is an error. Matrices therefore need seven
-    digits or more: Nastran's DMIG in large field has them, in small field it has not.
+    Stiffness that is linear in moduli is a sum of parts without negative eigenvalues. A term or rest that has one,
+    below -1e-6 relative to the diagonal of the nominal stiffness, is an error. Matrices therefore need seven digits or
+    more: Nastran's DMIG in large field has them, in small field it has not.
 
     Examples
     --------

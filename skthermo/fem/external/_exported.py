@@ -35,8 +35,8 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     Returns
     -------
     csc_array of shape (n_dof, n_dof)
-        The whole matrix, of which the file may hold one half or all, in the units of the program; ``n_dof`` is the
-        largest row or column that occurs.
+        The whole matrix in the units of the program; the file may hold one half or all of it; ``n_dof`` is the largest
+        row or column that occurs.
 
     Raises
     ------
@@ -248,7 +248,7 @@ def more_than_the_sum(total: str, terms: Collection[str]) -> str:
 
 @dataclass(frozen=True)
 class Exports:
-    """Matrices by name that a program has written to a file or a folder, None for what is not one of numbers."""
+    """Matrices by name that a program has written to a file or a folder, None for what holds no numbers."""
 
     file: Path
     matrices: Mapping[str, Matrix | None]
@@ -289,7 +289,7 @@ class Exports:
         return found[0] if found else None
 
     def mass(self) -> str:
-        """The mass matrix: the one with a usual name, or that of all exports."""
+        """The mass matrix: the one with a usual name, or the mass of all exports."""
         found = self.usual(self.square, MASS_NAMES, "mass")
         masses = [name for name in self.square if name.endswith(MASS_OF)]
         if found is None and not masses:

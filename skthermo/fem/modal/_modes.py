@@ -289,7 +289,7 @@ def match_modes(
     model : FE model
         With a method ``local_modes``, more modes than ``n_modes`` are searched.
     frequencies : array-like or DataFrame of shape (n_records, n_measured) or (n_measured,)
-        Measured frequencies in Hz, of which the mean over records counts. NaN is allowed.
+        Measured frequencies in Hz; their mean over records counts. NaN is allowed.
     shapes : array-like of shape (n_dofs, n_measured), optional
         Measured mode shapes, real or complex, scaled in any way. The model needs a method ``local_modes``.
     dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
@@ -385,9 +385,9 @@ def shape_components(shapes: ArrayLike, reference: ArrayLike) -> Array:
     Returns
     -------
     ndarray of shape (n_samples, n_modes * n_sensors)
-        All components of the first mode, then those of the second, and so on. Each shape is turned by the phase that
-        makes its scalar product with the reference real and positive, its imaginary part is left out, and it is scaled
-        to a root mean square of 1. All components of a mode are NaN where one of them is missing, or where its shape is
+        All components of the first mode, then of the second, and so on. Each shape is turned by the phase that makes
+        its scalar product with the reference real and positive, its imaginary part is left out, and it is scaled to a
+        root mean square of 1. All components of a mode are NaN where one of them is missing, or where its shape is
         zero.
 
     Raises

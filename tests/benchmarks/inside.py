@@ -1,0 +1,26 @@
+"""What benchmarks use that is not public, in one place; imported once a benchmark asks for it."""
+
+import importlib
+
+PLACES = {
+    "_core.matrix_child": ["read"],
+    "_core.matrix_files": ["form_of"],
+    "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
+    "datasets._kw51_campaign": ["memory"],
+    "fleet._fleet": ["Storage"],
+    "fleet._workers": ["BridgeOutcome", "known_of", "pickled"],
+    "monitoring._active": ["ActiveDetector"],
+    "monitoring._events": ["find_events"],
+    "monitoring._records": ["Memory"],
+    "monitoring._retraining": ["begun_again", "retrained"],
+    "monitoring._threshold": ["estimate_false_alarms"],
+    "monitoring.drift._observations": ["GroupEffects"],
+    "preprocessing.checks._findings": ["SET_ASIDE"],
+}
+
+
+def __getattr__(name):
+    for place, names in PLACES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"skthermo.{place}"), name)
+    raise AttributeError(name)
