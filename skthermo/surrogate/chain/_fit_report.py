@@ -162,11 +162,11 @@ class FitReport(SavesFrames):
     Parameters
     ----------
     rows : FittedRows
-        Numbers of rows: ``given``, ``trained``, those that trained the temperature mapper, and ``scored``, those of
-        the errors, spread evenly over the training rows. ``left_out``, a series, has the rows that did not train by
-        reason; a row may have several reasons. ``filled``, a frame by sensor, says in how many ``rows`` temperatures
-        were filled from the other sensors, the ``standard deviation`` of what was filled, in degrees, and ``when`` they
-        are missing.
+        Numbers of rows: all that were ``given``, rows that ``trained`` the temperature mapper, and rows that are
+        ``scored`` by the errors, spread evenly over the training rows. ``left_out``, a series, has the rows that did
+        not train by reason; a row may have several reasons. ``filled``, a frame by sensor, says in how many ``rows``
+        temperatures were filled from the other sensors, the ``standard deviation`` of what was filled, in degrees, and
+        ``when`` they are missing.
     modes : DataFrame
         By mode, in percent:
 
@@ -177,7 +177,7 @@ class FitReport(SavesFrames):
         - ``scatter``: standard deviation of measured over predicted frequencies, by the median of the distances;
         - ``noise`` of the records about a regression, and ``misfit``, that about the FE model, by which a
           `PosteriorInverse` weights the mode;
-        - ``weather``: standard deviation of what it does to the FE model's frequencies;
+        - ``weather``: standard deviation of its effect on the FE model's frequencies;
         - ``discrepancy``: its root mean square over the training records;
         - ``round trip``, with an `InverseSurrogate` only: relative error of the nominal frequencies after inversion by
           it and another solution.
@@ -234,7 +234,7 @@ class FitReport(SavesFrames):
     def _sentences(self) -> list[str]:
         trained, *others = self.rows.sentences
         lines = [trained, self.solved, *others]
-        kinds = set(self.findings.table["what"])  # of which there is a summary
+        kinds = set(self.findings.table["what"])  # the summary lists them
         lines += [f"{capital(str(doubt))}." for doubt in self.warnings() if doubt.kind not in kinds]
         n_parameters, n_modes = len(self.parameters.deviations), len(self.modes)
         if n_parameters > n_modes:
@@ -336,7 +336,7 @@ def named(columns: Iterable[Any]) -> str:
 
 
 def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequence[SkthermoWarning]) -> FitReport:
-    """The report of a chain of which all else is fitted; ``found`` is what its inverse gave for the records."""
+    """The report of a chain that is fitted otherwise; its inverse has ``found`` parameters of the records."""
     modes, unexplained = modes_of(chain)
     return FitReport(
         rows=FittedRows.counted(chain.records_, chain.sensors_),
@@ -379,7 +379,7 @@ def modes_of(chain: Any) -> tuple[pd.DataFrame, float]:
 
 
 def weather_of_fleet(chain: Any) -> pd.DataFrame | None:
-    """Range of each input in the chain's own records, and in those of a fleet that its mapper has learned from."""
+    """Range of each input in the chain's own records, and in the records of the fleet that taught its mapper."""
     if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None
     own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
@@ -412,8 +412,8 @@ def unexplained_offset(hidden: Array, predicted: Array, T: Table, errors: Array)
 
     A factor common to all modes, of 10 %, hardly changes what damage does to them. Calibrated models were found to miss
     mean frequencies by 0.3 %. In units of all that, hidden offsets of a year, root mean square, are 0.1 to 0.7 for
-    right and calibrated models, 0.9 to 2.9 for stiffnesses 3 to 5 % off in several groups; those of two months, whose
-    mean weather may be far from that of the model's nominal state, are 0.5 to 2.6 for right models.
+    right and calibrated models, 0.9 to 2.9 for stiffnesses 3 to 5 % off in several groups. Two months, whose mean
+    weather may be far from the weather of the model's nominal state, give 0.5 to 2.6 for right models.
     """
     offsets = 100 * np.log1p(hidden / 100)
     known = predicted[~np.isnan(predicted).any(axis=1)]

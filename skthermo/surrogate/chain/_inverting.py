@@ -1,4 +1,4 @@
-"""M1 of a chain: what it is given of the chain, what it finds in records, and how mode shapes are read."""
+"""M1 of a chain: its settings, the parameters that it finds in records, and how mode shapes are read."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, Shape
 def prepare(
     inverse: BaseEstimator, model: FEModel, memory: str | Memory | None, reduce: Reduce, *, has_shapes: bool
 ) -> None:
-    """Give every inverse of an FE model what it has not: the chain's model, memory and choice of a reduced model."""
+    """Give every inverse of an FE model the chain's model, memory and choice of a reduced model where it has none."""
     names = list(model.parameter_names)
     for part in (inverse, *inverse.get_params().values()):
         if not isinstance(part, PosteriorInverse | InverseSurrogate):
@@ -105,8 +105,8 @@ def doubts_of_shapes(
 ) -> list[SkthermoWarning]:
     """Findings about measured shapes, beside the parameters of the records.
 
-    Complete shapes of a share of ``few`` modes are few. Shapes are ``unlike`` those of the model, at the parameters of
-    100 records, if a median component is so many standard deviations of the noise from all of them.
+    Complete shapes of a share of ``few`` modes are few. Measured and modelled shapes are ``unlike`` if a median
+    component is so many standard deviations of the noise from all shapes of the model at the parameters of 100 records.
     """
     inputs, values, findings = inverse.shape_inputs_, as_floats(aligned), []
     n_modes, n_sensors = inputs.n_modes, inputs.n_sensors

@@ -35,10 +35,10 @@ N_FOLDS = 5  # of records out of fold
 class TrainingRecords(SavesFrames):
     """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
 
-    ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, ``learned`` those that it
-    gives for the inputs, ``usable`` the frequencies without outliers, ``modelled`` the FE model's frequencies at
-    ``learned``, in the measured domain, ``weights`` those of the rows, or None, and ``parameter_names`` the columns of
-    the targets.
+    M2 has ``inputs``, lags included, and ``targets``, the parameters of the records, whose columns are
+    ``parameter_names``; for the inputs it gives the ``learned`` parameters. ``usable`` frequencies are without
+    outliers, ``modelled`` frequencies are the FE model's at ``learned``, in the measured domain. ``weights`` of the
+    rows may be None.
     """
 
     temperatures: Table
