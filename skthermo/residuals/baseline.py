@@ -30,7 +30,7 @@ from skthermo.residuals.weather import (
     weather_coordinates,
 )
 
-PSEUDO_RECORDS = 12  # weight, in independent records, of the correlations of single records beside those of one part
+PSEUDO_RECORDS = 12  # weight, in independent records, of correlations of single records beside correlations of a part
 JITTER = 1e-9  # share of its variance that each mode has of its own, also where two scatter the same
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
 MOST_SIMILAR = 500  # number of similar records that stand for all of them
@@ -78,7 +78,7 @@ class BaselineResiduals:
     def spread(self, weather: Array) -> Array:
         """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown.
 
-        Without what the mapper states of the errors of its predictions.
+        The errors that the mapper states of its predictions are left out.
         """
 
         def of_known(known: Array) -> Array:
@@ -109,8 +109,8 @@ class BaselineResiduals:
     def prediction_weights(self, weather: Array) -> Array:
         """Weight of each record in the mean of the healthy predictions over all rows, (n_records, n_modes).
 
-        The predictions count as least squares on `WeatherFunctions`, and what these leave as its mean in similar
-        weather: the mapper errs alike for a season, the most in the coldest and the warmest.
+        The predictions count as least squares on `WeatherFunctions`, and the rest as its mean in similar weather: the
+        mapper errs alike for a season, the most in the coldest and the warmest.
         """
         weights, functions = self.shares(weather), WeatherFunctions.fitted(self.weather)
         of_records = functions.values(self.weather)
@@ -127,7 +127,7 @@ class BaselineResiduals:
         return np.divide(1.0, squares, out=np.zeros(self.n_modes), where=squares > 0)
 
     def less_similar(self, values: Array) -> Array:
-        """Values of the records, (n_records, n_columns), less the mean of those in similar weather."""
+        """Values of the records, (n_records, n_columns), less the mean of the records in similar weather."""
         return values - self._similar_mean(values, self.weather)
 
     @cached_property
@@ -193,11 +193,11 @@ class BaselineResiduals:
 
     @cached_property
     def drawn(self) -> Array:
-        """What noise is drawn from: between the residuals out of fold and those of the mapper of all records.
+        """Residuals for drawing noise: the mean of the residuals out of fold and of the mapper of all records.
 
-        The former hold the errors of mappers of fewer records, beside those of the mapper that simulates; the latter
-        are too small, and do not count where it has learned noise: where they change by less than three quarters from
-        record to record.
+        The former hold the errors of mappers of fewer records besides the errors of the mapper that simulates. The
+        latter are too small, and do not count where the mapper has learned noise: where they change from record to
+        record by less than three quarters of the former.
         """
         own, out_of_fold = np.abs(np.diff(self.own, axis=0)), np.abs(np.diff(self.values, axis=0))
         is_overfitted = np.nansum(median(own)) < 0.75 * np.nansum(median(out_of_fold))
@@ -285,7 +285,7 @@ class BaselineResiduals:
     def _levels(self) -> tuple[Array, Array]:
         """Mean and standard deviation of residuals and ratios in the weather of each record, outliers left out.
 
-        They are those of the 100 records with the most similar weather.
+        The 100 records with the most similar weather give them.
         """
         columns = self.usual if self.ratios is None else np.hstack([self.usual, self.ratios])
         mean = np.nan_to_num(self._local_mean(columns, self.weather, 100, MOST_PLACES))
@@ -308,7 +308,7 @@ class BaselineResiduals:
         return result
 
     def _similar_mean(self, values: Array, weather: Array) -> Array:
-        """Mean of the records' values in weather most like that of each row, mode by mode."""
+        """Mean of the records' values in the weather most similar to each row's, mode by mode."""
         return self._local_mean(values, weather, self._n_compared, int(MOST_SIMILAR / 0.1))
 
     @property
@@ -317,7 +317,7 @@ class BaselineResiduals:
         return int(np.clip(0.1 * len(self.values), 50, MOST_SIMILAR))
 
     def _local_mean(self, values: Array, weather: Array, number: int, most: int) -> Array:
-        """Mean of the values of a number of records in weather most like that of each row, among so many at most."""
+        """Mean of the values of a number of records in the weather most similar to each row's, among ``most``."""
         wanted, used = self.coordinates.transform(weather), compared(values, most)
         rows = used.any(axis=1)
         return mean_of_nearest(self.places[rows], values[rows], used[rows], wanted, number)
@@ -352,7 +352,7 @@ class BaselineResiduals:
 
 
 def compared(values: Array, most: int) -> NDArray[np.bool_]:
-    """Which values count: all that are there or, of more records, those of the most complete one of equal parts each.
+    """Which values count: all that are there or, of more than ``most`` records, the most complete one of equal parts.
 
     All modes count in the same records, so that one search for neighbours serves them.
     """
@@ -524,7 +524,7 @@ def _correlations(matrix: Array, variances: Array) -> Array:
 
 
 def _covariance(correlations: Array, variances: Array) -> Array:
-    """The covariance with these variances whose correlations are positive definite and close to the given ones."""
+    """The covariance with these variances and with positive definite correlations close to the given ones."""
     np.fill_diagonal(correlations, 1.0)
     values, vectors = np.linalg.eigh(correlations)
     positive = vectors * np.maximum(values, 1e-3) @ vectors.T
@@ -533,7 +533,7 @@ def _covariance(correlations: Array, variances: Array) -> Array:
 
 
 def _running_sums(values: Array, kept: Array) -> Array:
-    """Sums of the values up to each row, of which the share ``kept`` comes from the row before."""
+    """Sums of the values up to each row; a share ``kept`` of the sum of the row before is added to each value."""
     if (kept[1:] == kept[-1]).all():
         return np.asarray(scipy.signal.lfilter([1.0], [1.0, -kept[-1]], values, axis=0))
     sums = values.copy()

@@ -151,7 +151,7 @@ class SensorRegression:
         return values, deviations
 
     def departures(self, temperatures: Any) -> Array:
-        """What each sensor shows minus what the others of its record predict; NaN in records with gaps."""
+        """Value of each sensor minus its prediction from the other sensors of the record; NaN in records with gaps."""
         values = as_floats(temperatures)
         departures = np.full(values.shape, np.nan)
         if self.learned.sum() > 1:
@@ -187,7 +187,7 @@ class SensorRegression:
             return []
         return [
             RecordsWarning(
-                f"{self.reach.names[sensor]!r} departs from what the other sensors predict, more than it did in "
+                f"{self.reach.names[sensor]!r} departs from the other sensors' prediction more than it did in "
                 "training. It drifts, is stuck or was moved, which moves predictions and gives false alarms. Put NaN "
                 "where it is wrong: the other sensors fill it",
                 "sensor-disagrees",
@@ -235,10 +235,10 @@ class PredictionError:
         predict: Callable[[Any], Array],
         outcome: Callable[[Array], Array] = np.asarray,
     ) -> PredictionError:
-        """What filled temperatures bring into predictions.
+        """Errors of filled temperatures in predictions.
 
-        What was filled is moved by one standard deviation up and down, sensor by sensor, and predicted again. The error
-        is that of the ``outcome`` of each prediction.
+        Filled values are moved by one standard deviation up and down, sensor by sensor, and predicted again. The error
+        of the ``outcome`` of each prediction counts.
         """
         with collected():
             middle = np.empty(0)
@@ -276,7 +276,7 @@ class PredictionError:
 
 
 NO_ERRORS = PredictionError(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
-"""Of predictions of which no error is known."""
+"""Where no error of predictions is known."""
 
 
 def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:
@@ -330,7 +330,7 @@ def _telling_rows(values: Array) -> Array:
 
 @dataclass(frozen=True)
 class WeatherFunctions:
-    """Functions of the weather, of which a sum stands for what a mapper may have mislearned.
+    """Functions of the weather, whose sum stands for the errors that a mapper may have learned.
 
     A constant, three principal coordinates of the standardised weather and their squares, and two hinges of the first
     coordinate, where the weather is cold and where it is hot.
@@ -358,7 +358,7 @@ class WeatherFunctions:
         return 2 * len(self.directions) + 3
 
     def values(self, weather: Array, *, is_clipped: bool = False) -> Array:
-        """All functions, (n_records, size); weather outside that of the records may count as the nearest of theirs."""
+        """All functions, (n_records, size); weather outside the records' range may count as its nearest edge."""
         places = (weather - self.mean) @ self.directions.T
         if is_clipped:
             places = np.clip(places, *self.reach)
@@ -385,7 +385,7 @@ def weather_axes(weather: Array, explained: float = 0.99) -> tuple[Array, Array]
 
 
 class NearestPlaces:
-    """Places, of which a number is nearest to each wanted one."""
+    """Places among which the nearest to each wanted one are searched for."""
 
     def __init__(self, places: Array, number: int) -> None:
         self.places, self.number = places, min(number, len(places))
@@ -452,7 +452,7 @@ def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, nu
 
 
 def parts(n_rows: int, numbers_per_row: int) -> Iterator[slice]:
-    """Slices of rows of which all numbers together need little memory."""
+    """Slices of rows that need little memory each."""
     step = max(NUMBERS_AT_ONCE // int(numbers_per_row), 1)
     for first in range(0, n_rows, step):
         yield slice(first, min(first + step, n_rows))
@@ -461,7 +461,7 @@ def parts(n_rows: int, numbers_per_row: int) -> Iterator[slice]:
 def one_in_each_part(n_records: int, most: int) -> NDArray[np.intp]:
     """Positions of all records or, if there are more, of one by chance in each of that many equal parts of them.
 
-    Every so-manieth record could always be that of the same hour.
+    Records at equal distances could all be of the same hour.
     """
     if n_records <= most:
         return np.arange(n_records)

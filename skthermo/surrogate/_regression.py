@@ -69,7 +69,7 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
         Purpose of the network, or its table in the paper: both networks of the truss (Table 1, 6 hidden layers), the
         inverse surrogate of the KW51 bridge (Table 4, 5 layers), its temperature mapper (Table 6, 4 layers).
     **parameters
-        Parameters of ``MLPRegressor`` that replace those of the paper.
+        Parameters of ``MLPRegressor`` that replace the paper's.
 
     Returns
     -------
@@ -141,7 +141,8 @@ class MultiplierRegressor(RegressorMixin, Estimator):
             Positive if the training multipliers were; NaN in rows where an input is missing. A frame with X's index if
             X and the training multipliers were frames.
         std : ndarray or DataFrame of shape (n_samples, n_parameters)
-            Only with ``return_std``: standard deviations of theta, to first order from those of ln theta.
+            Only with ``return_std``: standard deviations of theta, to first order from the standard deviations
+            of ln theta.
 
         Raises
         ------
@@ -163,7 +164,7 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; those of a series are matched to the rows of a frame by index.
+            Weight of each row; weights in a series are matched to the rows of a frame by index.
 
         Returns
         -------
@@ -221,8 +222,9 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         self.n_parameters_ = y.shape[1]
         self.log_inputs_, self.log_targets_ = log_inputs and bool((X > 0).all()), bool((y > 0).all())
         X, y = np.log(X) if self.log_inputs_ else X, np.log(y) if self.log_targets_ else y
-        self.inputs_ = StandardScaler().fit(X, sample_weight=weights)
-        self.targets_ = StandardScaler().fit(y, sample_weight=weights)
+        arrays = StandardScaler().set_output(transform="default")  # whatever the global setting is
+        self.inputs_ = clone(arrays).fit(X, sample_weight=weights)
+        self.targets_ = clone(arrays).fit(y, sample_weight=weights)
         X, y = self.inputs_.transform(X), self.targets_.transform(y)
         regressor = self._default_regressor() if self.regressor is None else clone(self.regressor)
         seed_parts(regressor, seeded(random_state))
@@ -307,7 +309,7 @@ class FrequencyInverse(TransformerMixin):
         Returns
         -------
         ndarray of str
-            The model's parameter names; without a model those of the columns of y, else theta1, theta2, ...
+            The model's parameter names; without a model the names of the columns of y, else theta1, theta2, ...
         """
         check_is_fitted(self)
         names = self.parameter_names_ or [f"theta{i + 1}" for i in range(self.n_parameters_)]
@@ -319,7 +321,7 @@ class FrequencyInverse(TransformerMixin):
         return self.model
 
     def _positive(self, X: ArrayLike, n_frequencies: int | None) -> Array:
-        """Columns as in `fit`, the first of which are frequencies; all if no number is given."""
+        """Columns as in `fit`, the first ``n_frequencies`` of them, by default all, checked to be positive."""
         has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
         inputs = validate_data(self, X if has_names else as_floats(X), dtype=np.float64, reset=False)
         frequencies = inputs[:, :n_frequencies]
@@ -353,7 +355,7 @@ class TemperatureMapper(MultiplierRegressor):
     inputs_, targets_ : StandardScaler
         Means and scales of the temperatures and of the parameters, or of their logarithms.
     log_inputs_, log_targets_ : bool
-        Whether logarithms of the inputs, and of the parameters, are standardised; never those of temperatures.
+        Whether logarithms of the inputs, and of the parameters, are standardised; never of temperatures.
     findings_ : list of SkthermoWarning
         Values of the records that were set aside.
     n_parameters_, parameter_names_ : int, list of str or None
@@ -402,9 +404,9 @@ class TemperatureMapper(MultiplierRegressor):
         y : array-like or DataFrame of shape (n_samples, n_parameters)
             Multipliers of the nominal parameters.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; those of a series are matched to the rows of a frame by index. A row of weight 0 counts
-            as left out. Of a pipeline as the regressor, the last step gets the weights; with metadata routing, those
-            steps that request them.
+            Weight of each row; weights in a series are matched to the rows of a frame by index. A row of weight 0
+            counts as left out. Of a pipeline as the regressor, the last step gets the weights; with metadata routing,
+            those steps that request them.
 
         Returns
         -------

@@ -31,8 +31,8 @@ def box_around(theta: Array, *, margin: float = 0.25, least_margin: float = 0.05
 class Simulator:
     """An FE model and, where there is one, its reduced model, which is accurate within a box (n_parameters, 2).
 
-    Without one, the ``reason`` says why. Many rows near those of theta that the weather gives, ``usual``, are solved by
-    a `~skthermo.fem.FrequencySurface` of the reduced model.
+    Without one, the ``reason`` says why. ``usual`` rows of theta are given by the weather; near them, a
+    `~skthermo.fem.FrequencySurface` of the reduced model solves many rows.
     """
 
     model: FEModel
@@ -87,7 +87,7 @@ class Simulator:
             return []
         return [
             ModelWarning(
-                "rows are outside the box of the reduced model: their weather is outside that of the training rows. "
+                "rows are outside the box of the reduced model: their weather is outside the training weather. "
                 "The full model solves them, which takes longer. Train on such weather, or give reduce=False",
                 "outside-reduced-model",
             )

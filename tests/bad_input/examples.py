@@ -1726,7 +1726,7 @@ WARNED_OF = [
     ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "outside-bounds"),
     ("DataInformedFEM", "1.5 times too high", lambda: chain().fit(T, F * 1.5), "differ"),
     ("DataInformedFEM", "modes swapped", lambda: chain().fit(T, F.iloc[:, [0, 1, 3, 2, 4, 5]]), "0, 1, 3, 2"),
-    ("DataInformedFEM", "few rows", lambda: chain().fit(T[:20], F[:20]), "20 complete rows"),
+    ("DataInformedFEM", "few rows", lambda: chain().fit(T[:20], F[:20]), "few-rows"),
     ("DataInformedFEM", "kelvin", lambda: CHAIN.predict(T + 273.15), "outside-training-weather"),
     ("DataInformedFEM", "Fahrenheit", lambda: CHAIN.predict(T * 1.8 + 32), "outside-training-weather"),
 ]

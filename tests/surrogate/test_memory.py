@@ -45,7 +45,9 @@ def kept(folder, kind):
 def found(memory, records, **options):
     """What the inverse finds, with the noise that it is based on."""
     fitted = inverse(memory=memory, **options).fit(records)
-    return {"noise": fitted.noise_, "prior": fitted.prior_.covariance, **fitted.invert(records)}
+    inverted = fitted.invert(records)
+    findings = [str(one) for one in inverted.pop("findings")]
+    return {"noise": fitted.noise_, "prior": fitted.prior_.covariance, "findings": findings, **inverted}
 
 
 def assert_same(one, other):

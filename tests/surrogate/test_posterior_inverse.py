@@ -376,7 +376,7 @@ def test_rows_where_the_model_fails_have_no_parameters_and_are_counted():
 
 
 def test_few_records_are_named():
-    with pytest.warns(UserWarning, match="5 records teach.*few-teaching-records"):
+    with pytest.warns(UserWarning, match="few-teaching-records"):
         PosteriorInverse(TRUSS).fit(F[:5])
 
 

@@ -294,12 +294,12 @@ def test_shapes_of_other_sensors_are_named(change):
 
 def test_a_failed_sensor_is_counted():
     message = chain_of(lambda shapes: np.where(np.arange(4) == 2, np.nan, shapes))[1][0]
-    assert message.startswith("0 of 600 measured modes have a component of their shape at each of the 4 sensors")
+    assert message.startswith("most measured modes lack a component of their shape at some sensor")
 
 
 # The parameters are random: no weather moves them.
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*no-thermal-effect")
+@pytest.mark.filterwarnings("ignore:.*(no-thermal-effect|large-discrepancy)")
 def test_modes_may_have_numbers_as_names():
     frequencies, shapes = MEASURED
     air = pd.DataFrame({"air": np.linspace(-5, 30, len(THETA))})

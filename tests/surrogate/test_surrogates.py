@@ -132,7 +132,7 @@ def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
 
 
 def test_more_parameters_than_modes_warns():
-    with pytest.warns(UserWarning, match=r"4 parameters .*3 modes.*\[underdetermined\]"):
+    with pytest.warns(UserWarning, match="more parameters than modes.*underdetermined"):
         InverseSurrogate(make_truss(n_modes=3), LinearRegression(), bounds=0.2, n_samples=20, random_state=0).fit()
 
 

@@ -285,14 +285,14 @@ def test_any_mapper_has_residuals(mapper):
     fem = chain(mapper=mapper).fit(T, F)
     lagged = 1 if hasattr(mapper, "steps") else 0
     assert fem.recorder_.residuals.values.shape == (365 - lagged, 6)
-    with pytest.warns(UserWarning, match="1 of 365 .*not-predicted") if lagged else nullcontext():
+    with pytest.warns(UserWarning, match="not-predicted") if lagged else nullcontext():
         std = fem.predict(T, return_std=True)[1]
     np.testing.assert_array_equal(std.isna().all(axis=1), np.arange(365) < lagged)
 
 
 @pytest.mark.filterwarnings("ignore:.*few-teaching-records")
 def test_few_records_have_no_residuals():
-    with pytest.warns(UserWarning, match="4 parameters.*few-rows"):
+    with pytest.warns(UserWarning, match="few-rows"):
         fem = chain().fit(T[:9], F[:9])
     with pytest.raises(ValueError, match="9 records have parameters; expected at least 10"):
         fem.predict(T[:9], return_std=True)

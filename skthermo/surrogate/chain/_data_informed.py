@@ -120,8 +120,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only. Without one,
         a `PosteriorInverse` inverts rows with gaps from the modes that are there; other inverses leave them out.
     discrepancy : "auto", regressor or None, default="auto"
-        Learns from the inputs of M2, mode by mode, what the FE model cannot follow: the ratio of measured over modelled
-        frequencies. "auto" is a `TemperatureMapper`; None is the paper's chain.
+        Learns the ratio of measured over modelled frequencies from the inputs of M2, mode by mode, because the FE model
+        cannot follow all of the weather's effects. "auto" is a `TemperatureMapper`; None is the paper's chain.
     reduce : "auto", bool or float, default="auto"
         Whether M1, predictions and simulations use a reduced model, as ``reduce`` of `PosteriorInverse` says, which
         gets this value if its own is "auto" (:doc:`/guide/costs`). ``report_`` says which model solved.
@@ -154,8 +154,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         modes that were not measured.
     recorder_ : RecordSimulator
         What draws noise, gaps and outliers as the training records have them (``noise``, ``gaps`` and ``service_of``).
-        ``residuals`` are those of the records, out of fold and relative: measured frequency over the prediction, minus
-        1; ``residuals.expected(weather(T).inputs)`` is their mean in weather like that of each row.
+        ``residuals`` of the records are out of fold and relative: measured frequency over the prediction, minus 1;
+        ``residuals.expected(weather(T).inputs)`` is their mean in similar weather.
     report_ : FitReport
         Findings of `fit`: rows left out and why, offsets of modes, errors, and doubtful data.
     sensors_ : SensorRegression
@@ -257,9 +257,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             Measured mode shapes, real or complex, of any scale, sign and phase, NaN where a mode is missing; for an
             inverse with ``dofs``, whose order the sensors have.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each record in what M2 and the discrepancy learn; those of a series are matched to the rows of a
-            frame by index. Records of weight 0 do not train them and have no residuals; imputer, aligner and M1 see all
-            alike.
+            Weight of each record in the fits of M2 and of the discrepancy; those of a series are matched to the rows of
+            a frame by index. Records of weight 0 do not train them and have no residuals; imputer, aligner and M1 see
+            all alike.
 
         Returns
         -------
@@ -314,6 +314,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
             findings = [*records.doubts, *findings, *of_mapper, *of_model]
+            findings += [] if is_auto(self.reduce) else self.simulator_.doubts()
             self.report_ = report_of(self, found, records.findings, findings)
         stages.end()
         warn_each(self.report_.warnings())
@@ -371,9 +372,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Warns
         -----
         UserWarning
-            If temperatures were filled, rows cannot be predicted or are in weather far outside that of the training
-            records, or a sensor departs from what the others predict; `predict`, `predict_interval` and `simulate`
-            warn of the same.
+            If temperatures were filled, rows cannot be predicted or are in weather far outside the training range, or a
+            sensor departs from the other sensors' predictions; `predict`, `predict_interval` and `simulate` warn of the
+            same.
         """
         with collected() as findings:
             weather = self.weather(X)
@@ -413,7 +414,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         has_std = check_flag(return_std, "return_std")
         with collected() as findings:
             weather = self.weather(X)
-            frequencies = self.thermal_.simulated(weather)
+            solved = self.simulator_.frequencies(weather.theta, self.n_jobs)
+            frequencies = self.thermal_.measured(solved, weather)
             if has_std:
                 residuals = self.recorder_.residuals
                 deviations = np.hypot(residuals.spread(weather.inputs), self.thermal_.known_deviations(weather))
@@ -470,7 +472,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
         with collected() as findings:
             weather, residuals = self.weather(X), self.recorder_.residuals
-            frequencies = self.thermal_.simulated(weather)
+            solved = self.simulator_.frequencies(weather.theta, self.n_jobs)
+            frequencies = self.thermal_.measured(solved, weather)
             margin = residuals.quantiles(confidence) * residuals.spread(weather.inputs)
             margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self.thermal_.known_deviations(weather))
             findings += residuals.findings
@@ -519,10 +522,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             the training records; a number is the share of the values, each by itself. By default, modes are missing
             with ``noise="fitted"`` only, as in the record that the noise of a row is of.
         outliers : float, "fitted" or array-like of shape (n_training_records, n_modes), optional
-            Values that are far off: with "fitted", those of the training records, in the same modes together, and for
-            as many records; a number is the share of the values whose noise is ten times as large. If the training
-            records were cleaned, give the frequencies before that: what cleaning has changed or removed comes back. By
-            default they come with ``noise="fitted"`` only, one record at a time.
+            Values that are far off: with "fitted", the outliers of the training records, in the same modes together,
+            and for as many records; a number is the share of the values whose noise is ten times as large. If the
+            training records were cleaned, give the frequencies before that: what cleaning has changed or removed comes
+            back. By default they come with ``noise="fitted"`` only, one record at a time.
         random_state : int, RandomState or None, default=None
             Seed of the noise.
 
@@ -564,7 +567,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         Weather
             With the temperatures that are ``given`` and ``filled`` from the other sensors, the ``inputs`` of M2, and
-            what it gives.
+            its parameters ``theta``.
         """
         check_is_fitted(self)
         return self.thermal_.weather(X, validate_data(self, X, dtype=np.float64, reset=False))
@@ -622,7 +625,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         y : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies in Hz; of one mode, also a vector.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each record; those of a series are matched to the rows of a frame by index.
+            Weight of each record; weights in a series are matched to the rows of a frame by index.
 
         Returns
         -------
@@ -660,7 +663,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return ratio_regressor() if is_auto(getattr(self, name)) else None
 
     def _part(self, name: str) -> Any:
-        """A clone of a part, or what it is by default."""
+        """A clone of a part, or the default part."""
         part = getattr(self, name)
         return self._default_part(name) if part is None or is_auto(part) else clone(part)
 
@@ -756,9 +759,9 @@ def refitted(
     fem : DataInformedFEM
         Fitted; it is unchanged.
     X : array-like or DataFrame of shape (n_samples, n_sensors), optional
-        Temperatures in degrees Celsius; by default those of `DataInformedFEM.fit`.
+        Temperatures in degrees Celsius; by default as in `DataInformedFEM.fit`.
     y : array-like or DataFrame of shape (n_samples, n_modes), optional
-        Frequencies in Hz; by default those of `DataInformedFEM.fit`.
+        Frequencies in Hz; by default as in `DataInformedFEM.fit`.
     model : FE model, optional
         With the parameters, damage groups and modes of the chain's, such as
         `~skthermo.updating.ModelUpdater.sample_models` gives; by default the same.
@@ -815,7 +818,7 @@ def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | 
     -------
     DataInformedFEM
         With a temperature mapper, a discrepancy, ``records_``, ``parameters_`` and fitted noise of its own; all else,
-        such as ``report_``, is that of the chain.
+        such as ``report_``, is the chain's.
 
     Notes
     -----

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -84,30 +84,23 @@ class FittedRows(SavesFrames):
     def warnings(self, n_parameters: int, *, knows_fleet: bool, per_parameter: int = 10) -> Iterator[SkthermoWarning]:
         """Warnings that few rows train, fewer than so many ``per_parameter``, or that most have a filled sensor."""
         if 2 * self.trained < self.given:
-            reasons = "; ".join(f"{count} rows: {reason}" for reason, count in self.left_out.items())
             yield FewRecordsWarning(
-                f"only {self.trained} of {self.given} rows trained the temperature mapper ({reasons}). The chain has "
-                "learned little of the others' weather. Fill gaps of temperatures, use fewer lags, or fill missing "
-                "modes by imputer=KNNGapImputer()",
+                "most rows did not train the temperature mapper (report_.rows says why). The chain has learned little "
+                "of their weather. Fill gaps of temperatures, use fewer lags, or fill missing modes by "
+                "imputer=KNNGapImputer()",
                 "rows-left-out",
             )
         if self.trained < per_parameter * n_parameters and not knows_fleet:
             yield FewRecordsWarning(
-                f"{self.trained} complete rows train {n_parameters} parameters (expected "
-                f"{per_parameter * n_parameters} or more). The fit is unreliable. Give a season or a year of "
-                "records",
+                f"fewer than {per_parameter} complete rows for each parameter train the temperature mapper. The fit is "
+                "unreliable. Give a season or a year of records",
                 "few-rows",
             )
-        mostly = self.filled[2 * self.filled["rows"] > self.given]
+        mostly = self.filled.index[2 * self.filled["rows"] > self.given]
         if len(mostly):
-            listed = ", ".join(
-                f"{name!r} is missing in {rows} of {self.given} rows ({when}; standard deviation {deviation:.2g} "
-                "degrees)"
-                for name, rows, deviation, when in mostly.itertuples()
-            )
             yield RecordsWarning(
-                f"temperatures were filled from the other sensors in more than half of the rows: {listed}. Repair "
-                "these sensors, or leave them out",
+                f"temperatures were filled from the other sensors in more than half of the rows: {named(mostly)}. "
+                "Repair these sensors, or leave them out",
                 "mostly-filled",
             )
 
@@ -169,11 +162,11 @@ class FitReport(SavesFrames):
     Parameters
     ----------
     rows : FittedRows
-        Numbers of rows: ``given``, ``trained``, those that trained the temperature mapper, and ``scored``, those of
-        the errors, spread evenly over the training rows. ``left_out``, a series, has the rows that did not train by
-        reason; a row may have several reasons. ``filled``, a frame by sensor, says in how many ``rows`` temperatures
-        were filled from the other sensors, the ``standard deviation`` of what was filled, in degrees, and ``when`` they
-        are missing.
+        Numbers of rows: all that were ``given``, rows that ``trained`` the temperature mapper, and rows that are
+        ``scored`` by the errors, spread evenly over the training rows. ``left_out``, a series, has the rows that did
+        not train by reason; a row may have several reasons. ``filled``, a frame by sensor, says in how many ``rows``
+        temperatures were filled from the other sensors, the ``standard deviation`` of what was filled, in degrees, and
+        ``when`` they are missing.
     modes : DataFrame
         By mode, in percent:
 
@@ -184,7 +177,7 @@ class FitReport(SavesFrames):
         - ``scatter``: standard deviation of measured over predicted frequencies, by the median of the distances;
         - ``noise`` of the records about a regression, and ``misfit``, that about the FE model, by which a
           `PosteriorInverse` weights the mode;
-        - ``weather``: standard deviation of what it does to the FE model's frequencies;
+        - ``weather``: standard deviation of its effect on the FE model's frequencies;
         - ``discrepancy``: its root mean square over the training records;
         - ``round trip``, with an `InverseSurrogate` only: relative error of the nominal frequencies after inversion by
           it and another solution.
@@ -241,7 +234,7 @@ class FitReport(SavesFrames):
     def _sentences(self) -> list[str]:
         trained, *others = self.rows.sentences
         lines = [trained, self.solved, *others]
-        kinds = set(self.findings.table["what"])  # of which there is a summary
+        kinds = set(self.findings.table["what"])  # the summary lists them
         lines += [f"{capital(str(doubt))}." for doubt in self.warnings() if doubt.kind not in kinds]
         n_parameters, n_modes = len(self.parameters.deviations), len(self.modes)
         if n_parameters > n_modes:
@@ -293,61 +286,57 @@ class FitReport(SavesFrames):
         yield from self.doubts
         yield from self.rows.warnings(len(self.parameters.deviations), knows_fleet=self.fleet is not None)
         modes, far = self.modes, self.findings.outliers.to_numpy()
-        chain, mean = modes["MAPE"].mean(), modes["MAPE of the mean"].mean()
-        if chain > 1.2 * mean:
+        if modes["MAPE"].mean() > 1.2 * modes["MAPE of the mean"].mean():
             worst = (modes["MAPE"] / modes["MAPE of the mean"]).idxmax()
             yield ModelWarning(
-                f"the chain misses its own training frequencies by {chain:.2g} % on average, their mean by only "
-                f"{mean:.2g} % (the worst mode is {worst!r}). Its parameters cannot follow these modes. See the "
-                "offsets in report_.modes, update the model, or use the default aligner and discrepancy",
+                f"the chain misses its own training frequencies by more than their mean does, {worst!r} the most. Its "
+                "parameters cannot follow these modes. See the offsets in report_.modes, update the model, or use the "
+                "default aligner and discrepancy",
                 "worse-than-mean",
             )
         if self.unexplained_offset > 1:
-            hidden = modes["hidden offset"]
-            large = hidden[hidden.abs() >= 0.3]
-            offsets = ", ".join(f"{name!r} {offset:+.1f} %" for name, offset in large.items())
+            large = modes.index[modes["hidden offset"].abs() >= 0.3]
             yield ModelWarning(
-                f"the aligner hides offsets between measurement and model that weather does not explain ({offsets}). "
-                "Simulated damage moves the modes too much or too little, so that detection rates and severities are "
-                "wrong by more than their noise. Update the model to these records (ModelUpdater). Give studies "
-                "models=updater.sample_models(20) or uncertainty=(..., 'model')",
+                "the aligner hides offsets between measurement and model that weather does not explain, of "
+                f"{named(large)} (see report_.modes). Simulated damage moves the modes too much or too little, so that "
+                "detection rates and severities are wrong by more than their noise. Update the model to these records "
+                "(ModelUpdater). Give studies models=updater.sample_models(20) or uncertainty=(..., 'model')",
                 "hidden-offsets",
             )
         if far.sum() > 0.05 * far.size:
             yield RecordsWarning(
-                f"{far.sum()} of {far.size} frequencies are outliers and train nothing (expected at most 5 "
-                "%). They may be of other modes, or of another state. See report_.findings",
+                "more than 5 % of the frequencies are outliers and train nothing. They may be of other modes, or of "
+                "another state. See report_.findings",
                 "many-outliers",
             )
         # on nine bridges with models that are 2 to 5 % off, the discrepancy is up to 0.26 of what weather does to the
         # model; on the truss, whose thermal zones cut across the groups of its parameters, 1.4 of it
         is_large = modes["discrepancy"] > np.maximum(2 * modes["weather"], 0.5)
         if is_large.any():
-            listed = ", ".join(
-                f"{name!r} ({weather:.2g} % by the model, discrepancy {size:.2g} %)"
-                for name, weather, size in modes.loc[is_large, ["weather", "discrepancy"]].itertuples()
-            )
             yield ModelWarning(
-                f"the FE model cannot follow what the weather does to {listed}. Predictions rely on the discrepancy, "
-                "and simulated damage on a model that is not calibrated. Update the model (ModelUpdater), or give it "
-                "parameters that this weather changes",
+                f"the FE model cannot follow what the weather does to {named(modes.index[is_large])} (see "
+                "report_.modes). Predictions rely on the discrepancy, and simulated damage on a model that is not "
+                "calibrated. Update the model (ModelUpdater), or give it parameters that this weather changes",
                 "large-discrepancy",
             )
         if "round trip" in modes:
             shares = modes["round trip"].abs() / modes["scatter"].clip(lower=0.1)  # less is not seen in single records
-            worst = shares.idxmax()
-            if shares[worst] > 1:
+            if shares.max() > 1:
                 yield ModelWarning(
-                    f"the inverse turns the model's nominal frequencies into parameters that miss {worst!r} by "
-                    f"{modes.loc[worst, 'round trip']:+.2g} %. Measurements scatter around the predictions by only "
-                    f"{modes.loc[worst, 'scatter']:.2g} %, so that detectors take this error for damage. Raise "
-                    "n_samples, or use the default inverse",
+                    f"the inverse turns the model's nominal frequencies into parameters that miss {shares.idxmax()!r} "
+                    "by more than measurements scatter around the predictions (see report_.modes). Detectors take this "
+                    "error for damage. Raise n_samples, or use the default inverse",
                     "round-trip-error",
                 )
 
 
+def named(columns: Iterable[Any]) -> str:
+    """Names of columns, one after the other."""
+    return ", ".join(map(repr, columns))
+
+
 def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequence[SkthermoWarning]) -> FitReport:
-    """The report of a chain of which all else is fitted; ``found`` is what its inverse gave for the records."""
+    """The report of a chain that is fitted otherwise; its inverse has ``found`` parameters of the records."""
     modes, unexplained = modes_of(chain)
     return FitReport(
         rows=FittedRows.counted(chain.records_, chain.sensors_),
@@ -358,7 +347,7 @@ def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequen
         findings=findings,
         fleet=weather_of_fleet(chain),
         pooling_probability=getattr(last_step(chain.mapper_), "pooling_probability_", None),
-        doubts=list({doubt.kind: doubt for doubt in [*doubts, *chain.simulator_.doubts()]}.values()),
+        doubts=list({doubt.kind: doubt for doubt in doubts}.values()),
     )
 
 
@@ -390,7 +379,7 @@ def modes_of(chain: Any) -> tuple[pd.DataFrame, float]:
 
 
 def weather_of_fleet(chain: Any) -> pd.DataFrame | None:
-    """Range of each input in the chain's own records, and in those of a fleet that its mapper has learned from."""
+    """Range of each input in the chain's own records, and in the records of the fleet that taught its mapper."""
     if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
         return None
     own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
@@ -423,8 +412,8 @@ def unexplained_offset(hidden: Array, predicted: Array, T: Table, errors: Array)
 
     A factor common to all modes, of 10 %, hardly changes what damage does to them. Calibrated models were found to miss
     mean frequencies by 0.3 %. In units of all that, hidden offsets of a year, root mean square, are 0.1 to 0.7 for
-    right and calibrated models, 0.9 to 2.9 for stiffnesses 3 to 5 % off in several groups; those of two months, whose
-    mean weather may be far from that of the model's nominal state, are 0.5 to 2.6 for right models.
+    right and calibrated models, 0.9 to 2.9 for stiffnesses 3 to 5 % off in several groups. Two months, whose mean
+    weather may be far from the weather of the model's nominal state, give 0.5 to 2.6 for right models.
     """
     offsets = 100 * np.log1p(hidden / 100)
     known = predicted[~np.isnan(predicted).any(axis=1)]

@@ -1,4 +1,4 @@
-"""M1 of a chain: what it is given of the chain, what it finds in records, and how mode shapes are read."""
+"""M1 of a chain: its settings, the parameters that it finds in records, and how mode shapes are read."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, Shape
 def prepare(
     inverse: BaseEstimator, model: FEModel, memory: str | Memory | None, reduce: Reduce, *, has_shapes: bool
 ) -> None:
-    """Give every inverse of an FE model what it has not: the chain's model, memory and choice of a reduced model."""
+    """Give every inverse of an FE model the chain's model, memory and choice of a reduced model where it has none."""
     names = list(model.parameter_names)
     for part in (inverse, *inverse.get_params().values()):
         if not isinstance(part, PosteriorInverse | InverseSurrogate):
@@ -50,11 +50,8 @@ def take_noise(inverse: BaseEstimator, noise: Array) -> None:
             part.set_params(noise=noise)
 
 
-def invert(inverse: BaseEstimator, aligned: Table, names: list[str], *, scarce: float = 0.25) -> Bunch:
-    """``theta`` of aligned records and ``findings`` and, of a `PosteriorInverse`, all that its ``invert`` gives.
-
-    Information is ``scarce`` if the mean weight of records is less: with four of six modes missing in each, say.
-    """
+def invert(inverse: BaseEstimator, aligned: Table, names: list[str]) -> Bunch:
+    """``theta`` of aligned records and ``findings`` and, of a `PosteriorInverse`, all that its ``invert`` gives."""
     last = last_step(inverse)
     if not isinstance(last, PosteriorInverse):
         with collected() as findings:
@@ -64,11 +61,11 @@ def invert(inverse: BaseEstimator, aligned: Table, names: list[str], *, scarce: 
         return Bunch(theta=theta, findings=findings)
     found = last.invert(inputs_of_last_step(inverse, aligned))
     known = found.weight[found.weight > 0]
-    if len(known) and known.mean() < scarce:
+    if len(known) and known.mean() < 0.25:  # with four of six modes missing in each, say
         found.findings.append(
             FewRecordsWarning(
-                f"because of gaps, a record carries on average {known.mean():.0%} of the parameter precision of a "
-                "complete one. Estimates are drawn towards the model's nominal state. Track more modes, or use "
+                "because of gaps, records carry on average less than a quarter of the parameter precision of complete "
+                "ones. Estimates are drawn towards the model's nominal state. Track more modes, or use "
                 "imputer=KNNGapImputer()",
                 "sparse-modes",
             )
@@ -108,8 +105,8 @@ def doubts_of_shapes(
 ) -> list[SkthermoWarning]:
     """Findings about measured shapes, beside the parameters of the records.
 
-    Complete shapes of a share of ``few`` modes are few. Shapes are ``unlike`` those of the model, at the parameters of
-    100 records, if a median component is so many standard deviations of the noise from all of them.
+    Complete shapes of a share of ``few`` modes are few. Measured and modelled shapes are ``unlike`` if a median
+    component is so many standard deviations of the noise from all shapes of the model at the parameters of 100 records.
     """
     inputs, values, findings = inverse.shape_inputs_, as_floats(aligned), []
     n_modes, n_sensors = inputs.n_modes, inputs.n_sensors
@@ -120,8 +117,8 @@ def doubts_of_shapes(
     if n_shapes < few * found.sum():
         findings.append(
             RecordsWarning(
-                f"{n_shapes} of {found.sum()} measured modes have a component of their shape at each of the "
-                f"{n_sensors} sensors. The other shapes are not used. Leave sensors that failed out of dofs",
+                "most measured modes lack a component of their shape at some sensor. Their shapes are not used. Leave "
+                "sensors that failed out of dofs",
                 "few-shapes",
             )
         )
@@ -136,10 +133,9 @@ def doubts_of_shapes(
     if excess[mode, sensor] > unlike:
         findings.append(
             ModelWarning(
-                f"measured shapes of {names[mode]!r} are unlike those of the model at the parameters of the records. "
-                f"At sensor {sensor} the median component is {middle[mode, sensor]:.2f}, by the model "
-                f"{lowest[mode, sensor]:.2f} to {highest[mode, sensor]:.2f}. They distort the parameters. Check the "
-                "modes, and order, signs and gains of the sensors (dofs), or raise shape_noise",
+                f"measured shapes of {names[mode]!r} are unlike those of the model at the parameters of the records, "
+                f"the most at sensor {sensor}. They distort the parameters. Check the modes, and order, signs and "
+                "gains of the sensors (dofs), or raise shape_noise",
                 "foreign-shapes",
             )
         )

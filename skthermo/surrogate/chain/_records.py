@@ -35,10 +35,10 @@ N_FOLDS = 5  # of records out of fold
 class TrainingRecords(SavesFrames):
     """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
 
-    ``inputs`` are those of M2, lags included, ``targets`` the parameters that it learned, ``learned`` those that it
-    gives for the inputs, ``usable`` the frequencies without outliers, ``modelled`` the FE model's frequencies at
-    ``learned``, in the measured domain, ``weights`` those of the rows, or None, and ``parameter_names`` the columns of
-    the targets.
+    M2 has ``inputs``, lags included, and ``targets``, the parameters of the records, whose columns are
+    ``parameter_names``; for the inputs it gives the ``learned`` parameters. ``usable`` frequencies are without
+    outliers, ``modelled`` frequencies are the FE model's at ``learned``, in the measured domain. ``weights`` of the
+    rows may be None.
     """
 
     temperatures: Table
@@ -245,12 +245,11 @@ def doubts_of_modes(
             ]
     if not len(far):
         return []
-    listed = ", ".join(f"{name!r} by {offset:+.0f} %" for name, offset in far.items())
     return [
         RecordsWarning(
-            f"measured modes differ from the model's nominal frequencies: {listed} (expected at most {large:g} %). "
-            "They may be other modes, or in another unit. Give Hz and the modes of the model in their order, or update "
-            "the model",
+            f"measured modes differ from the model's nominal frequencies by more than {large:g} %: "
+            f"{', '.join(map(repr, far.index))} (see report_.modes). They may be other modes, or in another unit. Give "
+            "Hz and the modes of the model in their order, or update the model",
             "mode-offsets",
         )
     ]

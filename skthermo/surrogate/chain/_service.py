@@ -76,7 +76,7 @@ class ServiceRecords:
     def draw(
         self, places: Array, random_state: np.random.RandomState, *, mean_length: float = 25, many: int = 10_000
     ) -> NDArray[np.intp]:
-        """Positions of the records whose faults rows of weather in order of time have, (n_rows,).
+        """Positions, (n_rows,), of the records from which rows of weather in order of time take their faults.
 
         A row takes the record after the one that the row before it took, so that faults last as long as in training.
         Now and then, after a run of ``mean_length`` records in the mean, a record with the same faults and similar
@@ -165,8 +165,8 @@ def places_of(residuals: BaselineResiduals, weather: Array) -> Array:
 class RecordSimulator(SavesFrames):
     """Draws what monitoring adds to the frequencies of a thermal model, as its training records show it.
 
-    ``gaps_and_outliers`` are those of other records, where these have been drawn themselves. Arguments ``noise``,
-    ``gaps``, ``outliers`` and ``random_state`` are those of `DataInformedFEM.simulate`, weather comes from
+    Records that were drawn themselves have the ``gaps_and_outliers`` of other records. `DataInformedFEM.simulate`
+    describes the arguments ``noise``, ``gaps``, ``outliers`` and ``random_state``; weather comes from
     `DataInformedFEM.weather`.
     """
 

@@ -220,7 +220,8 @@ class ThermalModel(SavesFrames):
         stiffness: MatrixLike | None = None,
         mass: MatrixLike | None = None,
     ) -> Array:
-        """Frequencies of the changed structure, without noise; those of other modes are in the numerical domain."""
+        """Frequencies of the changed structure, without noise; frequencies of other modes are in the numerical
+        domain."""
         simulator, theta = self.simulator, weather.theta
         if modes is not None:
             simulator = simulator.changed("with_modes", modes)
@@ -236,8 +237,10 @@ class ThermalModel(SavesFrames):
                 simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
                 theta = np.hstack([theta, 1 - severities])
         frequencies = simulator.frequencies(theta, self.n_jobs)
-        if modes is not None:
-            return frequencies
+        return self.measured(frequencies, weather) if modes is None else frequencies
+
+    def measured(self, frequencies: Array, weather: Weather) -> Array:
+        """Frequencies of a model in the measured domain, times the discrepancy."""
         return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(weather.delta)
 
     def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]]) -> list[Array]:
@@ -247,10 +250,10 @@ class ThermalModel(SavesFrames):
         simulator = self.simulator.with_damage_parameters(groups, severities.min(), severities.max())
         theta = np.hstack([theta, np.repeat(1 - severities, len(weather), axis=0)])
         parts = np.split(simulator.frequencies(theta, self.n_jobs), len(draws))
-        return [as_floats(self.aligner.inverse_transform(part)) * np.exp(weather.delta) for part in parts]
+        return [self.measured(part, weather) for part in parts]
 
     def propagated(self, theta: Array, deviations: Array, *, step: float = 0.01) -> Array:
-        """Relative standard deviations of frequencies in the measured domain from those of theta, (n_rows, n_modes).
+        """Relative standard deviations of frequencies in the measured domain, (n_rows, n_modes), given those of theta.
 
         The slope of the aligner is that over a relative ``step`` of the frequencies; exact for shifts and scales.
         """

@@ -42,8 +42,8 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     model : FE model, optional
         Needed unless `fit` gets frequencies and parameters.
     regressor : regressor, optional
-        Learns the standardised logarithms of the parameters from those of the frequencies, a nearly linear relation;
-        one of a single output is fitted once for each parameter. By default a small ``MLPRegressor``; see
+        Learns the standardised logarithms of the parameters from the logarithms of the frequencies, a nearly linear
+        relation; one of a single output is fitted once for each parameter. By default a small ``MLPRegressor``; see
         `paper_network` for the paper's.
     bounds : float, array-like of shape (n_parameters, 2) or mapping, default=0.3
         Box of multipliers: a half-width, or lowest and highest multiplier of each parameter, or a mapping from each
@@ -51,7 +51,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     n_samples : int, default=1000
         Number of simulations.
     noise : "auto", float or array-like of shape (n_modes,), default="auto"
-        Relative standard deviation of Gaussian noise added to the simulated frequencies: that of the measurement.
+        Relative standard deviation of Gaussian noise added to the simulated frequencies, as the measurement has it.
         "auto" is what a `DataInformedFEM` estimates of its records, else 0.
     memory : str or joblib.Memory, optional
         Folder for simulations and regressor, so that searches and cross-validation make each only once
@@ -79,7 +79,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     noise_ : ndarray of shape (n_modes,)
         If there is a model: the relative standard deviations of the noise.
     n_parameters_, parameter_names_ : int, list of str or None
-        Number of parameters, and their names: the model's, or those of the frame that `fit` saw.
+        Number of parameters, and their names: the model's, or the columns of the frame that `fit` saw.
     y_is_vector_ : bool
         Whether `fit` saw one parameter as a vector.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -92,8 +92,8 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     Notes
     -----
     Frequencies cannot determine more parameters than there are modes, and an estimate is an effective stiffness, not a
-    material property. Trained on simulations without noise, a regressor amplifies that of the measurement; with it, it
-    gives the posterior mean in the box. :doc:`/accuracy_regressors` compares regressors.
+    material property. Trained on simulations without noise, a regressor amplifies the noise of the measurement;
+    trained with noise, it gives the posterior mean in the box. :doc:`/accuracy_regressors` compares regressors.
 
     Examples
     --------
@@ -245,8 +245,8 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
     ) -> float:
         """Coefficient of determination R2, averaged over parameters: without y, for new simulations.
 
-        Without y, the score is that of the logarithms of the parameters of 500 simulations that the regressor was not
-        trained on, from the same bounds and with the same noise. With y, it is that of `predict`, over complete rows.
+        Without y, the logarithms of the parameters of 500 simulations are scored, from the same bounds and with the
+        same noise; the regressor was not trained on them. With y, `predict` is scored over complete rows.
 
         Parameters
         ----------
@@ -255,7 +255,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         y : array-like or DataFrame of shape (n_samples, n_parameters), optional
             Multipliers of each row of X.
         sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; those of a series are matched to the rows of a frame by index. Without y ignored.
+            Weight of each row; weights in a series are matched to the rows of a frame by index. Without y ignored.
 
         Returns
         -------
@@ -270,7 +270,7 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         Notes
         -----
         The 500 simulations are always the same, so that scores of different regressors and numbers of samples can be
-        compared; those of different ``bounds`` or ``noise`` cannot. One fold is enough.
+        compared; scores for different ``bounds`` or ``noise`` cannot. One fold is enough.
 
         Examples
         --------
@@ -327,19 +327,18 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         return remembered(self.memory, drawn_samples, *settings, ignore=["n_jobs"])
 
     def _doubts_of_size(self) -> list[SkthermoWarning]:
-        n_parameters, n_modes = len(self.parameter_names_), self.model.n_modes
-        if n_parameters <= n_modes:
+        if len(self.parameter_names_) <= self.model.n_modes:
             return []
         return [
             FewRecordsWarning(
-                f"{n_parameters} parameters and {n_modes} modes: frequencies cannot distinguish all parameters. Use "
-                "more modes or fewer parameters, or a PosteriorInverse",
+                "there are more parameters than modes: frequencies cannot distinguish all parameters. Use more modes "
+                "or fewer parameters, or a PosteriorInverse",
                 "underdetermined",
             )
         ]
 
     def _check_columns(self, X: ArrayLike | None) -> None:
-        """Check number and names of the columns; without X, they are those of an array."""
+        """Check number and names of the columns; without X, they have no names."""
         found = validate_data(self, np.ones((1, self.model.n_modes)) if X is None else X).shape[1]
         if found != self.model.n_modes:
             raise ValueError(f"X has {found} columns; expected the {self.model.n_modes} modes of {self.model!r}")

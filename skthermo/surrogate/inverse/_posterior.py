@@ -65,7 +65,7 @@ LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the relative noise that records 
 class ThermalPrior:
     """Gaussian prior of ln theta about the nominal state, N(0, common^2 11' + diag(own^2)).
 
-    ``common`` is the standard deviation of a factor of all parameters, ``own`` those of each parameter by itself.
+    ``common`` is the standard deviation of a factor of all parameters, ``own`` holds one of each parameter by itself.
     """
 
     names: tuple[str, ...]
@@ -164,7 +164,7 @@ class LinearRecords:
         return read(minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
     def _likelihood(self, prior: ThermalPrior, noise: Array) -> tuple[float, Array, Array]:
-        """Logarithm of the likelihood, and its derivatives by those of the deviations of the prior and of the noise.
+        """Logarithm of the likelihood, and its derivatives by the logarithms of the prior's deviations and the noise.
 
         The derivatives are those expected given each record (Fisher's identity).
         """
@@ -198,9 +198,9 @@ def least_noise(log_frequencies: Array) -> Array:
 class ThermalPosterior:
     """ThermalPosterior modes of records, by an FE model or by a surface in its place.
 
-    ``noise`` is that of all observations, frequencies and components of shapes, (n_observations,). Rows start where the
-    response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes no steps of its own,
-    and was run ``n_runs`` times.
+    ``noise`` holds standard deviations of all observations, frequencies and components of shapes, (n_observations,).
+    Rows start where the response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes
+    no steps of its own, and was run ``n_runs`` times.
     """
 
     simulator: Simulator
@@ -244,7 +244,7 @@ class ThermalPosterior:
                 return found
             start = found.local.x
         size = 8 * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
-        blocks = [slice(first, first + size) for first in range(0, n_rows, size)]
+        blocks = map(slice, range(0, n_rows, size), range(size, n_rows + size, size))
         refine_block = partial(self._refine_block, objective, start, n_jobs)
         parts = with_progress(map(refine_block, blocks), n_rows, None, count=Refined.__len__, unit="records")
         return Refined.together([*parts])
@@ -317,7 +317,7 @@ def taught(
         return first
     n_parameters = len(first.prior.own)
     at_nominal = first.linearise(first.simulator, n_jobs)(np.ones((1, n_parameters)))
-    nominal = [np.repeat(part, len(rows), axis=0) for part in at_nominal]
+    nominal = [*map(partial(np.repeat, repeats=len(rows), axis=0), at_nominal)]
     now, x = first, np.zeros((len(rows), n_parameters))
     objective = replace(first.objective(inputs[rows], n_jobs), linearise=lambda _: nominal)
     least = first.noise.copy()
@@ -370,7 +370,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
 
     Steps on the model, from its nominal state, minimise squared misfits in standard deviations of the noise plus those
     of ln theta by its prior. The records teach both: the prior, how much temperature moves all parameters together and
-    each by itself, and the noise of each mode, in which what the model cannot follow counts, too.
+    each by itself, and the noise of each mode, in which effects count that the model cannot follow.
 
     Parameters
     ----------
@@ -414,6 +414,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         With ``dofs``: how columns of shapes are read (``reference`` holds the nominal shapes at the sensors).
     n_runs_ : int
         How often a program without derivatives was run.
+    taught_by_ : tuple or None
+        What it has learned from, by which a memory knows its inversions; None without a memory.
     findings_ : list of SkthermoWarning
         What is doubtful about the records of `fit`.
     n_parameters_, parameter_names_ : int, list of str
@@ -523,7 +525,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         asked = first, in_order, self.reduce, learns_prior, learns_noise
         with collected() as self.findings_:
             known = remembered(self.memory, taught, *asked, self.n_jobs, ignore=["n_jobs"])
-        self._taught_by = None if self.memory is None else asked
+        self.taught_by_ = None if self.memory is None else asked
         self.simulator_ = replace(known.simulator, model=model)  # not a copy that was read
         self.posterior_ = replace(known, simulator=self.simulator_)
         self.prior_, self.noise_ = known.prior, known.noise[: model.n_modes]
@@ -531,8 +533,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         if n_records < 10 and (learns_prior or learns_noise.any()):
             self.findings_.append(
                 FewRecordsWarning(
-                    f"{n_records} records teach the prior of the parameters and the noise of the modes; expected at "
-                    "least 10. Both stay near 1 to 3 %. Give prior and noise",
+                    "fewer than 10 records teach the prior of the parameters and the noise of the modes. Both stay "
+                    "near 1 to 3 %. Give prior and noise",
                     "few-teaching-records",
                 )
             )
@@ -611,7 +613,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_is_fitted(self)
         inputs = self._read(X)
         with collected() as findings:
-            asked = self._taught_by, inputs, self.posterior_, self.n_jobs
+            asked = self.taught_by_, inputs, self.posterior_, self.n_jobs
             found = remembered(self.memory, inverted, *asked, ignore=["posterior", "n_jobs"])
         findings += doubts_of(found)
         theta = frame_like(X, found.theta, self.parameter_names_)

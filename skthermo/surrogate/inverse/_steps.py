@@ -140,7 +140,7 @@ class Rows:
     def together(cls, parts: Sequence[Self]) -> Self:
         """The rows of all parts, one after the other."""
         joined = []
-        for column in zip(*[vars(part).values() for part in parts], strict=True):
+        for column in zip(*map(dict.values, map(vars, parts)), strict=True):
             is_nested = isinstance(column[0], Rows)
             joined.append(type(column[0]).together(column) if is_nested else np.concatenate(column))
         return cls(*joined)
@@ -271,14 +271,14 @@ def refine(
 
 
 def doubtful(objective: Objective, found: Refined, misfit: float) -> NDArray[np.intp]:
-    """Rows that have not converged, or whose misfit is larger than that."""
+    """Rows that have not converged, or have a larger misfit."""
     return np.flatnonzero(~found.converged | (objective.misfit(found.local) > misfit))
 
 
 def start_again(
     objective: Objective, found: Refined, rows: NDArray[np.intp], start: Array | Local, n_steps: int
 ) -> None:
-    """Take steps from another start, and keep what they reach in rows whose objective is smaller there."""
+    """Take steps from another start, and keep their end in rows with a smaller objective there."""
     if not rows.size:
         return
     there = minimise(objective.some(rows), start, n_steps)
@@ -310,7 +310,7 @@ def minimise(
     for remaining in range(n_steps, -1, -1):
         here, problem = found.some(active), objective.some(active)
         undamped = here.step(np.zeros(len(active)))
-        # residuals and objective after a small step are those of the linearised model
+        # after a small step, the linearised model gives residuals and objective
         change = np.einsum("smp,sp->sm", here.sensitivity, undamped)
         gain, residual = here.gain(undamped), np.where(problem.missing, 0.0, here.residual - change)
         last = replace(here, x=here.x + undamped, value=here.value - gain, residual=residual)
