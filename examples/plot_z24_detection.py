@@ -72,8 +72,8 @@ print(f"{len(records.damaged)} after damage began. Every detector is asked for 2
 # frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates the residuals.
 # With "regimes", records are divided at the temperature where the scatter of the residuals changes. "Softening" and
 # "directions of the model" are a :class:`~skthermo.detection.DirectionalDetector` of piecewise-linear residuals. Each
-# threshold comes from the baseline by one rule: its records are scored by what was learned without them and without
-# their neighbours in time. (:doc:`plot_detectors` explains each detector.) The last two columns count as others do:
+# threshold comes from the baseline by one rule: its records are scored by what was learned from other
+# blocks of time. (:doc:`plot_detectors` explains each detector.) The last two columns count as others do:
 # another publication takes the first 12 of the damaged records for healthy.
 
 candidates = detectors()
@@ -142,8 +142,8 @@ fig.legend(loc="outside upper center", markerscale=3, ncols=3)
 
 # %%
 # .. image:: /images/z24_spread.png
-#    :alt: Residuals of the second mode over the temperature of the deck, with twice the standard deviation of all records
-#          and of each regime
+#    :alt: Residuals of the second mode over the temperature of the deck, with twice the standard deviation of all
+#          records and of each regime
 #
 # The damage index over time, for four of them. The Mahalanobis distance of raw frequencies hides the damage in the
 # range that frost has opened. Neighbours among the raw records show it, since no healthy record looks like a damaged
@@ -300,7 +300,8 @@ plot_indices(
 
 # %%
 # .. image:: /images/z24_days.png
-#    :alt: Damage index of means of 24 hours and of 24 records; after the first damaged days, it lies above the threshold
+#    :alt: Damage index of means of 24 hours and of 24 records; after the first damaged days, it lies above the
+#          threshold
 #
 # This damage is so large that single records show it first, and means later. Damage was done little by little. By
 # day, in percent of its records:
