@@ -9,12 +9,12 @@ from sklearn.ensemble import GradientBoostingRegressor, IsolationForest
 from sklearn.linear_model import LinearRegression
 from sklearn.mixture import GaussianMixture
 from sklearn.multioutput import MultiOutputRegressor
-from sklearn.neighbors import KNeighborsRegressor, LocalOutlierFactor, NearestNeighbors
+from sklearn.neighbors import LocalOutlierFactor, NearestNeighbors
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import OneClassSVM
 
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector
 from skthermo.surrogate import TemperatureMapper
 
 
@@ -61,6 +61,29 @@ class SpecificFactors(OutlierMixin, BaseEstimator):
         return -np.linalg.norm((X - common) / np.sqrt(self.factors_.noise_variance_), axis=1)
 
 
+class ConditionalCovariance(OutlierMixin, BaseEstimator):
+    """Minus the Mahalanobis distance among the records whose temperatures, all but the last columns, are nearest."""
+
+    def __init__(self, n_targets, n_neighbors=50):
+        self.n_targets = n_targets
+        self.n_neighbors = n_neighbors
+
+    def fit(self, X, y=None):
+        T, self.F_ = np.split(np.asarray(X), [-self.n_targets], axis=1)
+        self.scaler_ = StandardScaler().fit(T)
+        self.weather_ = NearestNeighbors(n_neighbors=self.n_neighbors).fit(self.scaler_.transform(T))
+        return self
+
+    def score_samples(self, X):
+        T, F = np.split(np.asarray(X), [-self.n_targets], axis=1)
+        near = self.F_[self.weather_.kneighbors(self.scaler_.transform(T), return_distance=False)]
+        mean = near.mean(axis=1)
+        centred = near - mean[:, np.newaxis]
+        covariance = np.einsum("nki,nkj->nij", centred, centred) / (self.n_neighbors - 1)
+        distance = (F - mean)[:, np.newaxis] @ np.linalg.solve(covariance, (F - mean)[:, :, np.newaxis])
+        return -np.sqrt(distance[:, 0, 0])
+
+
 class Cointegration(OutlierMixin, BaseEstimator):
     """Minus the deviation of the most stationary combination of the columns, by Johansen's procedure."""
 
@@ -82,7 +105,8 @@ class Cointegration(OutlierMixin, BaseEstimator):
 def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.02, block=None):
     """Detectors by name, not fitted: those named "raw" see frequencies only, the others temperatures beside them.
 
-    `targets` names the frequency columns. An `estimator`, such as the chain of the structure, compensates as well.
+    `targets` names the frequency columns, the last ones. An `estimator`, such as the chain of the structure,
+    compensates as well. With "regimes", records are divided where the scatter of the residuals changes.
     Thresholds come from blocks of time that are left out. `block` is their length for outlier detectors: hourly records
     of one winter want "1D", or whole spells of frost are left out, and the threshold hides damage.
     """
@@ -107,16 +131,16 @@ def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.
     def outlier(name):
         return OutlierDetector(make_pipeline(StandardScaler(), novelties[name]), contamination, block=block)
 
-    def compensated(regressor, whiten=None, detector=None):
-        compensator = TemperatureCompensator(regressor, targets=targets, whiten=whiten)
-        return make_pipeline(compensator, detector or MahalanobisDetector(contamination))
+    def compensated(regressor, detector=None, regimes=None):
+        detector = detector or MahalanobisDetector(contamination)
+        return CompensatedDetector(detector, regressor, targets=targets, regimes=regimes)
 
     detectors = {"raw, Mahalanobis": MahalanobisDetector(contamination)}
     detectors |= {f"raw, {name}": outlier(name) for name in novelties}
     for name, regressor in regressors.items():
-        detectors |= {name: compensated(regressor), f"{name}, whitened": compensated(regressor, "local")}
+        detectors |= {name: compensated(regressor), f"{name}, regimes": compensated(regressor, regimes="auto")}
     for name in ("isolation forest", "20 neighbours"):
-        detectors[f"piecewise-linear, {name}"] = compensated(regressors["piecewise-linear"], detector=outlier(name))
-    nearby = make_pipeline(StandardScaler(), KNeighborsRegressor(50))
-    detectors["conditional covariance"] = compensated(nearby, "local")
+        detectors[f"piecewise-linear, {name}"] = compensated(regressors["piecewise-linear"], outlier(name))
+    nearby = ConditionalCovariance(len(targets))
+    detectors["conditional covariance"] = OutlierDetector(nearby, contamination, block=block)
     return detectors

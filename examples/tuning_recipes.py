@@ -6,16 +6,16 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign, steel_modulus
-from skthermo.detection import TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.preprocessing import LagFeatures
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 
 PER_DAY = 8  # records
 LIMIT = 0.02  # of false alarms
 GRID = {
-    "temperaturecompensator__estimator__lagfeatures__lags": [1, 4, 8],
-    "temperaturecompensator__whiten": ["global", "local"],
-    "windowedalarm__window": ["3h", "24h"],
+    "regressor__lagfeatures__lags": [1, 4, 8],
+    "regimes": [None, "auto"],
+    "window": [None, "24h"],
 }
 
 
@@ -42,9 +42,9 @@ def fitted_chain(T, F, seed=0):
 
 
 def detector(targets):
-    """Before it is tuned: no lags, one covariance for all weather, single records."""
+    """Before it is tuned: one lag, one regime for all weather, single records."""
     regression = make_pipeline(LagFeatures(1), TemperatureMapper(LinearRegression()))
-    return make_pipeline(TemperatureCompensator(regression, targets=targets, whiten="global"), WindowedAlarm("3h"))
+    return CompensatedDetector(MahalanobisDetector(), regression, targets=targets, regimes=None)
 
 
 def true_score(fitted, T, tables):

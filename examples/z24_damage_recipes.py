@@ -2,11 +2,11 @@
 
 from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import make_pipeline
-from z24_recipes import FREQUENCIES, Records, bridge_model, chain, compensate
+from z24_recipes import FREQUENCIES, bridge_model, chain, residuals
 
 from skthermo.preprocessing import BiasAligner
 from skthermo.studies import identify_damage
-from skthermo.surrogate import PosteriorInverse, TemperatureMapper
+from skthermo.surrogate import PosteriorInverse
 
 FROST = 2.0  # pavement below this, in degrees Celsius, may hold ice
 
@@ -27,10 +27,8 @@ def in_parameters(records):
 
 
 def changes(measured, names):
-    """Change of every parameter from the compensator's prediction, in percent: means of days."""
-    residuals, _ = compensate(measured, TemperatureMapper(), targets=names)
-    relative = (100 * r / (m[names] - r) for m, r in zip(measured, residuals, strict=True))
-    return Records(*(frame.groupby(frame.index.floor("D")).mean() for frame in relative))
+    """Change of every parameter from what the weather explains, in percent: means of days."""
+    return residuals(measured, names).each(lambda frame: frame.groupby(frame.index.floor("D")).mean())
 
 
 def identify(bridge):

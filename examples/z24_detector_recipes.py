@@ -2,12 +2,10 @@
 
 import pandas as pd
 from detector_recipes import field_detectors
-from sklearn.pipeline import make_pipeline
-from z24_recipes import FREQUENCIES, Records, bridge_model, chain
+from z24_recipes import FREQUENCIES, Records, bridge_model, chain, compensated
 
-from skthermo.detection import DirectionalDetector, TemperatureCompensator
+from skthermo.detection import DirectionalDetector
 from skthermo.studies import DetectabilityStudy, Scenario, sweep
-from skthermo.surrogate import TemperatureMapper
 
 ASSUMED = {"soil": 0.18}  # damage that one may have expected of a pier that is to be lowered
 DAMAGED = "pier lowered"
@@ -20,10 +18,8 @@ def detectors():
     model = bridge_model()
     found = field_detectors(FREQUENCIES, chain(model), block="1D")
     for name, directions in {"softening": "softening", "directions of the model": model}.items():
-        for label, whiten in {"": None, ", whitened": "local"}.items():
-            compensator = TemperatureCompensator(TemperatureMapper(), targets=FREQUENCIES, whiten=whiten)
-            last = DirectionalDetector(directions)
-            found[f"{name}{label}"] = make_pipeline(compensator, last)
+        for label, regimes in {"": None, ", regimes": "auto"}.items():
+            found[f"{name}{label}"] = compensated(DirectionalDetector(directions), regimes=regimes)
     return found
 
 

@@ -12,7 +12,7 @@ from sklearn.ensemble import GradientBoostingRegressor
 from sklearn.multioutput import MultiOutputRegressor
 
 from skthermo.datasets import load_z24, make_z24
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import CompensatedDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
@@ -29,8 +29,7 @@ MODES = [f"$f_{i}$ ({kind})" for i, kind in enumerate(MOTIONS, 1)]
 FREQUENCIES = ["f1", "f2", "f3", "f4"]
 PAVEMENT = "TP"
 KINDS = {"baseline": ("healthy, baseline", GREY), "later": ("healthy, hold-out", BLUE), "damaged": ("damaged", ORANGE)}
-PLAIN, WHITENED = "residuals", "residuals whitened by weather"
-WHITENINGS = {PLAIN: None, WHITENED: "local"}
+REGIMES = {"one regime": None, "two regimes": "auto"}
 
 
 def boosting():
@@ -127,10 +126,16 @@ class Records(NamedTuple):
         return cls(T.join(F), T_test.join(F_test), bridge.T_damaged.join(bridge.F_damaged))
 
 
-def compensate(records, estimator, whiten=None, cv=None, targets=FREQUENCIES):
-    """Residuals, those of the baseline out of fold, and the compensator."""
-    compensator = TemperatureCompensator(estimator, targets=targets, whiten=whiten, cv=cv)
-    return records.each(compensator.transform, compensator.fit_transform(records.baseline)), compensator
+def residuals(records, targets=FREQUENCIES):
+    """What the default regression leaves of the records, of the baseline out of fold, in percent."""
+    compensator = TemperatureCompensator(targets=targets)
+    baseline = 100 * compensator.fit_transform(records.baseline)
+    return records.each(lambda frame: 100 * compensator.transform(frame), baseline)
+
+
+def compensated(detector=None, regressor=None, targets=FREQUENCIES, **options):
+    """A detector of residuals, by the Mahalanobis distance where none is named."""
+    return CompensatedDetector(detector or MahalanobisDetector(), regressor, targets=targets, **options)
 
 
 def alarms(detector, frame):
@@ -138,20 +143,19 @@ def alarms(detector, frame):
     return 100 * float((detector.predict(frame) == -1).mean())
 
 
-def alarm_table(inputs, detector=None):
+def alarm_table(records, detectors):
     """Alarms on healthy hold-out records and on damaged ones, in percent."""
     rows = {}
-    for label, (baseline, later, damaged) in inputs.items():
-        fitted = (detector or MahalanobisDetector()).fit(baseline)
-        rows[label] = {"false alarms": alarms(fitted, later), "damage found": alarms(fitted, damaged)}
+    for label, detector in detectors.items():
+        detector.fit(records.baseline)
+        rows[label] = {"false alarms": alarms(detector, records.later), "damage found": alarms(detector, records.damaged)}
     return pd.DataFrame(rows).T
 
 
-def found_by_day(inputs):
+def found_by_day(records, detector):
     """Number of records on each damaged day, and share of them that raise an alarm, in percent."""
-    baseline, _, damaged = inputs["piecewise-linear", WHITENED]
-    alarm = pd.Series(MahalanobisDetector().fit(baseline).predict(damaged) == -1)
-    days = alarm.groupby(damaged.index.floor("D").strftime("%m-%d"))
+    alarm = pd.Series(detector.fit(records.baseline).predict(records.damaged) == -1)
+    days = alarm.groupby(records.damaged.index.floor("D").strftime("%m-%d"))
     return pd.DataFrame({"records": days.size(), "found": 100 * days.mean()}).T
 
 

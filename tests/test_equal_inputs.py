@@ -26,12 +26,11 @@ from sklearn.svm import OneClassSVM
 import skthermo
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import (
+    CompensatedDetector,
     DirectionalDetector,
-    FusedDetector,
     MahalanobisDetector,
     OutlierDetector,
     TemperatureCompensator,
-    WindowedAlarm,
 )
 from skthermo.fleet import FleetMapper, FleetPrior
 from skthermo.monitoring import Monitor
@@ -67,7 +66,8 @@ NOMINAL, SHAPES = (values[0] for values in TRUSS.modes(np.ones((1, 4))))
 LINEAR = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=50, noise=0.01, random_state=0)
 CHAIN = DataInformedFEM(TRUSS, inverse=LINEAR, mapper=TemperatureMapper(Ridge()), random_state=0)
 COMPENSATOR = TemperatureCompensator(Ridge(), targets=MODES)
-COMPENSATED = make_pipeline(COMPENSATOR, MahalanobisDetector())
+COMPENSATED = CompensatedDetector(MahalanobisDetector(), Ridge(), targets=MODES)
+PIPELINE = make_pipeline(COMPENSATOR, MahalanobisDetector())
 
 
 @dataclass
@@ -128,7 +128,6 @@ TRANSFORMED = after_fit("transform")
 DETECTED = after_fit("predict", "score_samples", "damage_index")
 BY_POSITION = TemperatureCompensator(Ridge(), targets=[3])
 STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, uncertainty="noise", random_state=0)
-FUSED = FusedDetector([("any direction", MahalanobisDetector()), ("softening", DirectionalDetector())])
 CASES = {
     "lags": Case(LagFeatures(3), (BOTH,), TRANSFORMED),
     "means": Case(ExponentialMeans([3]), (BOTH,), TRANSFORMED),
@@ -152,11 +151,10 @@ CASES = {
     "softening": Case(DirectionalDetector(), (FEW,), DETECTED, is_slow=True),
     "directions": Case(DirectionalDetector(TRUSS), (GAPPED,), DETECTED),
     "novelty": Case(OutlierDetector(OneClassSVM()), (F,), DETECTED),
-    "window": Case(WindowedAlarm(3), (F,), DETECTED),
-    "fused": Case(FUSED, (FEW,), DETECTED, is_slow=True),
     "compensator by position": Case(BY_POSITION, (BOTH,), TRANSFORMED, is_slow=True),
     "compensator": Case(COMPENSATOR, (BOTH,), TRANSFORMED, needs_frames=True, is_slow=True),
-    "compensated": Case(COMPENSATED, (BOTH,), after_fit("predict", "score_samples"), needs_frames=True, is_slow=True),
+    "pipeline": Case(PIPELINE, (BOTH,), after_fit("predict", "score_samples"), needs_frames=True, is_slow=True),
+    "compensated": Case(COMPENSATED, (BOTH,), DETECTED, needs_frames=True, is_slow=True),
     "monitor": Case(
         Monitor(MahalanobisDetector(), targets=list(FEW)), (STAMPED[:60],), evaluated, needs_frames=True, is_slow=True
     ),
@@ -216,25 +214,12 @@ FRAMES = {  # equal to a frame in C order
     "CSV": from_csv,
     "Parquet": from_parquet,
 }
-BY_COLUMNS = ("Fortran order", "Fortran", "columns of their own", "CSV", "Parquet")
 IN_SHORT = {"Fortran order", "lists", "columns of their own", "float32", "polars"}  # of cases that are slow
-LAYOUT = "sums follow the layout of a table in memory, which is not copied to C order first"
-SINGLE = "a table of float32 is not copied to float64 first"
-ADDRESS = "residuals are known by the address of their numbers"
-FAILS = (
-    {(case, form): LAYOUT for case in ("shift", "scale", "chain") for form in BY_COLUMNS}
-    | {(case, "float32"): SINGLE for case in ("means", "gaps", "shift", "scale")}
-    | {("compensator by position", "lists"): "a list of rows is taken for a frame, because it has an attribute index"}
-)
 
 
 def marked(case, form):
-    marks = []
-    if CASES[case].is_slow and form not in IN_SHORT:
-        marks.append(pytest.mark.nightly)
-    if (case, form) in FAILS:
-        marks.append(pytest.mark.xfail(reason=FAILS[case, form], strict=True))
-    return pytest.param(case, form, id=f"{case}, {form}", marks=marks)
+    is_nightly = CASES[case].is_slow and form not in IN_SHORT
+    return pytest.param(case, form, id=f"{case}, {form}", marks=[pytest.mark.nightly] * is_nightly)
 
 
 def each(forms, needs_frames=False):
@@ -268,7 +253,7 @@ def test_every_public_estimator_has_a_case():
     public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
     classes = {thing for thing in public if isinstance(thing, type) and not inspect.isabstract(thing)}
     estimators = {thing for thing in classes if issubclass(thing, BaseEstimator)}
-    assert estimators <= {type(case.estimator) for case in CASES.values()} | {TemperatureCompensator}
+    assert estimators <= {type(case.estimator) for case in CASES.values()}
 
 
 @each(ARRAYS)
@@ -344,8 +329,6 @@ DETECTORS = {
     "softening": DirectionalDetector(),
     "directions": DirectionalDetector(TRUSS),
     "novelty": OutlierDetector(OneClassSVM()),
-    "window": WindowedAlarm(3),
-    "fused": FUSED,
 }
 
 
@@ -363,20 +346,15 @@ def of_residuals(name):
     return evaluated_residuals(name, lambda R: R)
 
 
-KNOWN = pytest.mark.xfail(reason=ADDRESS, strict=True)
-BY_ADDRESS = {"Mahalanobis", "softening", "directions", "fused"}
-
-
 @pytest.mark.parametrize("form", COPIES)
-@pytest.mark.parametrize("name", [pytest.param(one, marks=[KNOWN] * (one in BY_ADDRESS)) for one in DETECTORS])
+@pytest.mark.parametrize("name", DETECTORS)
 def test_copies_of_residuals_give_equal_results(name, form):
     assert_same(evaluated_residuals(name, COPIES[form]), of_residuals(name))
 
 
-@KNOWN
 def test_a_step_that_writes_into_residuals_changes_no_result():
     def indices(copy):
-        step = StandardScaler(with_mean=False, copy=copy)
+        step = StandardScaler(with_std=False, copy=copy)
         return make_pipeline(clone(COMPENSATOR), step, DirectionalDetector()).fit(BOTH).score_samples(BOTH)
 
     np.testing.assert_array_equal(indices(copy=False), indices(copy=True))

@@ -35,13 +35,18 @@ def single_blas_thread() -> AbstractContextManager[Any]:
     return _blas().limit(limits=1)
 
 
+def n_blas_threads() -> int:
+    """Number of threads that BLAS takes now."""
+    return max((library["num_threads"] for library in _blas().info()), default=1)
+
+
 def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> Generator[Result, None, None]:
     """Map with as many Python threads as BLAS has threads, each limited to one BLAS thread.
 
     Limits on BLAS (``OMP_NUM_THREADS``, threadpoolctl, joblib's workers) apply to these Python threads too. Closing
     the iterator waits for the items that are running and skips the rest.
     """
-    n_threads = max((library["num_threads"] for library in _blas().info()), default=1) if len(items) > 1 else 1
+    n_threads = n_blas_threads() if len(items) > 1 else 1
     with single_blas_thread():
         if n_threads < 2:
             yield from map(function, items)

@@ -18,7 +18,7 @@ import pandas as pd
 import skthermo
 from skthermo._core.files import alone_with
 from skthermo._core.text import counted, plain
-from skthermo._core.warnings import reported_by_caller, warn_user
+from skthermo._core.warnings import warn_user, without_kinds
 from skthermo.commands._new_records import (
     NewFile,
     Taken,
@@ -244,7 +244,7 @@ def update(bridge: Bridge, done: Done, files: Sequence[Path] = ()) -> None:
         monitor, taken = bridge.load(), Taken.read(bridge.taken_file)
         before = monitor.counts_
         new = _given(bridge, files, monitor, done) if files else _found(bridge, taken, monitor, done)
-        with reported_by_caller({"not-evaluated"}):  # said below, with all reasons
+        with without_kinds({"not-evaluated"}):  # said below, with all reasons
             evaluated, handed = _taken_in(monitor, new, bridge, done)
         if len(evaluated):
             monitor.save(bridge.monitor_file)

@@ -313,8 +313,8 @@ def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple
     if far.any():
         findings.append(
             RecordsWarning(
-                f"values of {', '.join(map(repr, table.index[far.any(axis=0)]))} are far from all others of their column. "
-                "They count as missing (report_ has their number). Put NaN where a value is missing",
+                f"values of {', '.join(map(repr, table.index[far.any(axis=0)]))} are far from all others there. They "
+                "count as missing (report_ has their number). Put NaN where a value is missing",
                 "set-aside",
             )
         )

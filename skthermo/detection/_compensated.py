@@ -404,4 +404,5 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
 
 def as_frame(X: Any, values: Any) -> pd.DataFrame:
     """Values of records as a frame on their index."""
-    return values if isinstance(values, pd.DataFrame) else pd.DataFrame(values, getattr(X, "index", None))
+    index = X.index if isinstance(X, pd.DataFrame) else None
+    return values if isinstance(values, pd.DataFrame) else pd.DataFrame(values, index)

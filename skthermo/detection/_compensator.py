@@ -449,7 +449,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.targets_ = positions_of(self.targets, values.shape[1], getattr(X, "columns", ()))
         T, F = split_columns(X, values, self.targets_)
         names = _check_feature_names_in(self, None)
-        named_T = pd.DataFrame(as_floats(T), getattr(X, "index", None), np.delete(names, self.targets_))
+        index = X.index if isinstance(X, pd.DataFrame) else None
+        named_T = pd.DataFrame(as_floats(T), index, np.delete(names, self.targets_))
         named_F = pd.DataFrame(as_floats(F), named_T.index, names[self.targets_])
         # inputs need not be temperatures, and may be constant
         inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"constant"})

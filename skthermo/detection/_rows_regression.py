@@ -100,10 +100,11 @@ def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:
         takes_columns = F.shape[1] > 1 or not get_tags(last_step(estimator)).target_tags.single_output
         targets = rows_of(F, usable)
         return fit_outputs(estimator, rows_of(inputs, usable), targets if takes_columns else targets.squeeze(axis=1))
-    each = MultiOutputRegressor(estimator)
+    one = estimator.estimator if isinstance(estimator, MultiOutputRegressor) else estimator
+    each = MultiOutputRegressor(one)
     named = hasattr(F, "iloc")  # so that a regressor may know which target it learns
     each.estimators_ = [
-        clone(estimator).fit(rows_of(inputs, own), F.iloc[own, k] if named else F[own, k])
+        clone(one).fit(rows_of(inputs, own), F.iloc[own, k] if named else F[own, k])
         for k, own in enumerate(rows.T)
     ]
     return each

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pickle
 import sys
+import threading
 import time
 import traceback
+import warnings
 import zlib
 from collections import Counter
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from itertools import islice
@@ -25,10 +27,8 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
 import skthermo
-from skthermo._core.answers import content_of
 from skthermo._core.estimators import seed_parts
 from skthermo._core.parallel import single_blas_thread
-from skthermo._core.warnings import counted_warnings
 from skthermo.metrics import mape
 from skthermo.monitoring import Monitor, MonitorStatus
 
@@ -130,7 +130,7 @@ class BridgeFit:
     def __call__(self) -> Result:
         """What was found, and fitted objects as bytes; those of what is known stay as they were."""
         start, stage, outcome = time.perf_counter(), "records", BridgeOutcome(self.name)
-        with _on_its_own() as counts:
+        with _on_its_own() as caught:
             try:
                 T, F = pair(call(self.records), self.name)
                 outcome = replace(outcome, facts=_facts(T, F))
@@ -151,9 +151,9 @@ class BridgeFit:
             except (Exception, SystemExit) as error:
                 failure, fitted = Failure.of(stage, error), None
                 if not outcome.content:
-                    return self.lost(failure, outcome.facts, warned(counts))
+                    return self.lost(failure, outcome.facts, warned(caught))
                 outcome = BridgeOutcome(self.name, facts=outcome.facts, failures=(failure,))
-        return Result(replace(outcome, warnings=warned(counts), seconds=time.perf_counter() - start), fitted)
+        return Result(replace(outcome, warnings=warned(caught), seconds=time.perf_counter() - start), fitted)
 
     def _watched(
         self, outcome: BridgeOutcome, chain: BaseEstimator, T: Table, F: Table
@@ -195,7 +195,7 @@ class BridgeUpdate:
     def __call__(self) -> Result:
         """What is known now, fitted objects as bytes, and evaluations."""
         stage = "new records"
-        with _on_its_own() as counts:
+        with _on_its_own() as caught:
             try:
                 new = call(self.records)
                 new = joined(*new) if isinstance(new, tuple) else new
@@ -207,8 +207,8 @@ class BridgeUpdate:
                 fitted = pickled((chain, monitor))
                 known = known_of(monitor)
             except (Exception, SystemExit) as error:
-                return self.lost(Failure.of(stage, error), warned(counts))
-        known |= {"failures": (), "late_warnings": warned(counts), "n_bytes": len(fitted)}
+                return self.lost(Failure.of(stage, error), warned(caught))
+        known |= {"failures": (), "late_warnings": warned(caught), "n_bytes": len(fitted)}
         return Result(replace(self.outcome, **known), fitted, _answers(self.name, answers))
 
     def lost(self, failure: Failure, warnings: tuple[Warned, ...] = ()) -> Result:
@@ -225,13 +225,17 @@ def not_evaluated(outcome: BridgeOutcome, failure: Failure, warnings: tuple[Warn
     return replace(outcome, standing=standing, failures=(failure,), late_warnings=warnings)
 
 
+_turn = threading.RLock()  # held by the job of this process whose warnings are counted
+
+
 @contextmanager
-def _on_its_own() -> Iterator[Counter[tuple[str, str]]]:
-    """Work of one bridge: one core, its own warnings."""
-    with ExitStack() as stack:
-        stack.enter_context(parallel_config("sequential"))
-        stack.enter_context(single_blas_thread())
-        yield stack.enter_context(counted_warnings())
+def _on_its_own() -> Iterator[list[warnings.WarningMessage]]:
+    """Work of one bridge: one core, its own warnings; jobs of one process take turns, as filters belong to it."""
+    with parallel_config("sequential"), single_blas_thread(), _turn, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("ignore")
+        for category in (UserWarning, RuntimeWarning, FutureWarning):  # others are for developers
+            warnings.simplefilter("always", category)
+        yield caught
 
 
 def call(given: Any) -> Any:
@@ -326,8 +330,12 @@ def _no_answer(name: Hashable, failure: Failure) -> pd.DataFrame:
     return pd.DataFrame([row | {"revised": False}])
 
 
-def warned(counts: Counter[tuple[str, str]]) -> tuple[Warned, ...]:
-    """Kind, text and number of warnings, in the order in which they first came."""
+def warned(caught: list[warnings.WarningMessage]) -> tuple[Warned, ...]:
+    """Kind, text and number of warnings, in the order in which they first came; of other packages, the class."""
+    counts: Counter[tuple[str, str]] = Counter()
+    for one in caught:
+        kind = getattr(one.message, "kind", one.category.__name__)
+        counts[kind, str(one.message.args[0]) if hasattr(one.message, "kind") else str(one.message)] += 1
     return tuple((kind, text, times) for (kind, text), times in counts.items())
 
 
@@ -349,6 +357,19 @@ def by_value(thing: Any) -> bytes:
 def seed_of(base: int, name: Hashable) -> int:
     """The seed of a bridge, whatever the others are."""
     return int.from_bytes(sha256(f"{base} {name!r}".encode()).digest()[:4], "big")
+
+
+def content_of(*parts: Any) -> str:
+    """A text that is the same in every process for equal contents; of tables, values and labels count."""
+    return str(joblib.hash([values_and_labels(part) for part in parts], coerce_mmap=True))
+
+
+def values_and_labels(part: Any) -> Any:
+    """A frame without the caches of its index; anything else as it is."""
+    if not isinstance(part, pd.DataFrame):
+        return part
+    index = np.asarray(getattr(part.index, "asi8", part.index))
+    return np.ascontiguousarray(part), index, str(part.index.dtype), list(part.columns)
 
 
 def content_or_code(part: Any) -> str:

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import BaseSearchCV, last_step
 from skthermo._core.frames import DAY, check_duration, usual_step
 from skthermo._core.saved_frames import SavesFrames
-from skthermo._core.warnings import reported_by_caller, warn_user, without_warnings
+from skthermo._core.warnings import warn_user, without_kinds, without_warnings
 from skthermo.detection import (
     CompensatedDetector,
     DirectionalDetector,
@@ -174,7 +173,7 @@ class ActiveDetector(SavesFrames):
         damage = estimate_false_alarms(index, monitor.false_alarms_per_year, smallest_at=smallest_at, **options)
         estimates = {DAMAGE: damage}
         if monitor.watch_per_year is not None:
-            with reported_by_caller(KINDS_OF_ESTIMATE):  # for the higher threshold
+            with without_kinds(KINDS_OF_ESTIMATE):  # for the higher threshold
                 per_year = monitor.watch_per_year
                 watch = estimate_false_alarms(index, per_year, **options, name="watch_per_year")
             lower = min(watch.rule.threshold, damage.rule.threshold)
@@ -250,7 +249,6 @@ class ActiveDetector(SavesFrames):
         self._check_memory()
         self._check_monotone()
 
-    @answers_kept()
     def _check_monotone(self) -> None:
         """Refuse a detector by which a response that changes more is in alarm less; warn where no change is seen."""
         times, blind = self.trained.index.asi8, []

@@ -11,7 +11,6 @@ import pandas as pd
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 
-from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array
 from skthermo._core.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
 from skthermo._core.text import capital, counted
@@ -436,7 +435,6 @@ def _medians(old: Array, new: Array) -> list[Any]:
     return [*medians, medians[1] - medians[0], np.nan, False]
 
 
-@answers_kept()
 def smallest_changes(active: ActiveDetector, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
     """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import gamma, nbinom
 
-from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array
 from skthermo._core.frames import DAY, YEAR, correlation_time
 from skthermo._core.text import counted_number, duration_text, percent
@@ -134,7 +133,6 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-@answers_kept()  # of the weather, which is the same in all calls
 def smallest_by_threshold(
     index_of: Callable[[pd.DataFrame], Array],
     records: pd.DataFrame,

@@ -18,7 +18,7 @@ import sys
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, joined, modes_of, recipes, shown, z24_records
+from harness import arguments, compensated, joined, last_step, modes_of, recipes, shown, z24_records
 from sklearn.compose import ColumnTransformer
 from sklearn.ensemble import IsolationForest
 from sklearn.impute import SimpleImputer
@@ -139,8 +139,8 @@ def z24(options):
     for baseline, tables in z24_folds():
         for what, detector in detectors(make_z24(), modes_of(baseline)).items():
             found.setdefault(what, []).append(indices(detector.fit(baseline), tables))
-            if hasattr(detector[-1], "threshold_"):
-                own.setdefault(what, []).append(by_threshold(detector[-1], found[what][-1]))
+            if hasattr(last_step(detector), "threshold_"):
+                own.setdefault(what, []).append(by_threshold(last_step(detector), found[what][-1]))
     rows = {what: over_folds(folds) for what, folds in found.items()}
     table = pd.DataFrame(rows).T.rename_axis("detector")
     for name in ("false alarms", "found"):

@@ -32,7 +32,7 @@ HALF = 182  # days, in which the season is warm
 
 
 def default_residuals(targets, model):
-    """Detectors of the default residuals, which are whitened by weather."""
+    """Detectors as a user takes them by default, with regimes where the scatter changes."""
     return {
         "directions of the FE model": compensated(targets, DirectionalDetector(model)),
         "falls, no model": compensated(targets, DirectionalDetector()),
@@ -60,7 +60,7 @@ def z24(_):
 
 def seasons(_):
     recipe = recipes("z24_detector")
-    names = ["piecewise-linear", "piecewise-linear, whitened", "raw, 20 neighbours", "raw, isolation forest"]
+    names = ["piecewise-linear", "piecewise-linear, regimes", "raw, 20 neighbours", "raw, isolation forest"]
     candidates = {name: one for name, one in recipe.detectors().items() if name in names}
     known = default_residuals(recipe.FREQUENCIES, make_z24()) | candidates
     table = recipe.short_baselines(z24_records(), known).rename_axis("detector")
@@ -109,7 +109,7 @@ def years(options):
             baseline, healthy, damaged, model = daily(seed, **settings)
             targets = modes_of(baseline)
             for name, detector in (default_residuals(targets, model) | field_detectors(targets)).items():
-                if "trees" in name or "whitened" in name:
+                if "trees" in name or "regimes" in name:
                     continue
                 sees = targets if name.startswith("raw") else list(baseline)
                 detector.fit(baseline[sees])
@@ -136,9 +136,11 @@ def frost(options):
         mapper, raw = lagged(TemperatureMapper()), field_detectors(targets, block="1D")
         detectors = {
             "directions of the FE model": compensated(targets, DirectionalDetector(bridge.model), mapper),
-            "Mahalanobis, whitened by weather": compensated(targets, None, mapper),
-            "not whitened": compensated(targets, None, mapper, whiten=None),
-            "not whitened, contiguous folds": compensated(targets, None, mapper, whiten=None, cv="contiguous"),
+            "Mahalanobis": compensated(targets, None, mapper),
+            "Mahalanobis, one regime": compensated(targets, None, mapper, regimes=None),
+            "Mahalanobis, one regime, contiguous folds": compensated(
+                targets, None, mapper, regimes=None, cv="contiguous"
+            ),
         }
         detectors |= {f"{name}, days left out": raw[name] for name in ("raw, 20 neighbours", "raw, Gaussian mixture")}
         for name, detector in detectors.items():

@@ -21,27 +21,17 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from structures import SOIL_GROUPS, Footbridge, slow_soil
 
-from skthermo import detection
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector
+from skthermo.detection import DirectionalDetector, OutlierDetector
 
 RATES = (0.005, 0.01, 0.02)
 
 
-def whole(targets, last, window):
-    """The detector of residuals that a user would take."""
-    if hasattr(detection, "CompensatedDetector"):
-        return detection.CompensatedDetector(last, targets=targets, window=window)
-    if window is not None:
-        last = detection.WindowedAlarm(window, detector=last)
-    return compensated(targets, last)
-
-
 def detectors(model, targets, window):
-    found = {} if model is None else {"directions": whole(targets, DirectionalDetector(model), window)}
+    found = {} if model is None else {"directions": compensated(targets, DirectionalDetector(model), window=window)}
     found |= {
-        "softening": whole(targets, DirectionalDetector(), window),
-        "Mahalanobis": whole(targets, MahalanobisDetector(), window),
+        "softening": compensated(targets, DirectionalDetector(), window=window),
+        "Mahalanobis": compensated(targets, window=window),
     }
     if window is None:
         neighbours = OutlierDetector(recipes("detector").NeighbourDistance())

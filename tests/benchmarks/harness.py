@@ -21,8 +21,8 @@ from scipy.signal import lfilter
 from sklearn.pipeline import make_pipeline
 from versions import CACHE, OtherVersion, has_failed, side_by_side
 
+from skthermo import detection
 from skthermo.datasets import load_z24
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.surrogate import TemperatureMapper
 
 DATA = Path(os.environ["SKTHERMO_DATA"]) if os.environ.get("SKTHERMO_DATA") else None
@@ -203,10 +203,22 @@ def modes_of(records):
 
 
 def compensated(targets, last=None, regressor=None, **options):
-    """A detector, by default by the Mahalanobis distance, of what a regression on temperatures leaves."""
+    """A detector, by default by the Mahalanobis distance, of what a regression on temperatures leaves.
+
+    Options are those of `CompensatedDetector`; version 0.2 has a pipeline in its place.
+    """
     regressor = TemperatureMapper() if regressor is None else regressor
-    last = MahalanobisDetector() if last is None else last
-    return make_pipeline(TemperatureCompensator(regressor, targets=list(targets), **options), last)
+    last = detection.MahalanobisDetector() if last is None else last
+    if hasattr(detection, "CompensatedDetector"):
+        return detection.CompensatedDetector(last, regressor, targets=list(targets), **options)
+    if options.get("window") is not None:
+        last = detection.WindowedAlarm(options["window"], detector=last)
+    return make_pipeline(detection.TemperatureCompensator(regressor, targets=list(targets)), last)
+
+
+def last_step(detector):
+    """A detector, or the last step of a pipeline."""
+    return detector[-1] if hasattr(detector, "steps") else detector
 
 
 def z24_records(folder=DATA):

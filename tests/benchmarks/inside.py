@@ -15,7 +15,7 @@ PLACES = {
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._threshold": ["estimate_false_alarms"],
     "monitoring.drift._observations": ["GroupEffects"],
-    "preprocessing.checks._findings": ["SET_ASIDE"],
+    "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }
 
 

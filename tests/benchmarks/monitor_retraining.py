@@ -35,7 +35,7 @@ MOST_REFUSED, LEAST_REFUSED = 0.05, 0.95  # shares of healthy and of changed str
 
 def limit(detector):
     """The threshold that the share asked for of a baseline's records exceeds."""
-    return float(np.nanquantile(detector[-1].baseline_index_, 1 - ASKED))
+    return float(np.nanquantile(detector.baseline_index_, 1 - ASKED))
 
 
 class ByRecords(ActiveDetector):
@@ -131,11 +131,10 @@ def refit(seeds):
 
 def shifted_only(monitor, own, targets):
     """The old detector on frequencies moved by the mean of what its regression leaves of the new days."""
-    compensator = clone(monitor.detector_[0]).set_params(whiten=None).fit(monitor.trained_)
-    left = pd.DataFrame(np.asarray(compensator.transform(own)), own.index, targets)  # in Hz
+    left = monitor.detector_.residuals(own).mean()  # relative
 
     def moved(records):
-        return records.assign(**{name: records[name] - left[name].mean() for name in targets})
+        return records.assign(**{name: records[name] * np.exp(-left[name]) for name in targets})
 
     return moved
 

@@ -3,7 +3,7 @@
     pip install pyod mapie smt
     OMP_NUM_THREADS=1 python tests/benchmarks/other_tools.py
 
-PyOD's nearest neighbours in place of the Mahalanobis distance, on the same whitened residuals, and both beside an
+PyOD's nearest neighbours in place of the Mahalanobis distance, on the same residuals, and both beside an
 isolation forest on raw frequencies; MAPIE's split conformal intervals of each frequency, calibrated on a second healthy
 year, beside `predict_interval`; SMT's Kriging beside scikit-learn's Gaussian process as inverse surrogate, without
 refining.
@@ -11,7 +11,7 @@ refining.
 
 import numpy as np
 import pandas as pd
-from harness import arguments, joined, shown
+from harness import arguments, compensated, joined, shown
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.compose import make_column_transformer
 from sklearn.ensemble import IsolationForest
@@ -21,9 +21,9 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.fem import sample
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate
 
 CONFIDENCE = 0.9
 
@@ -73,11 +73,10 @@ def detectors(seed):
 
     baseline, targets = records(seed)
     found = {}
-    whitened = TemperatureCompensator(TemperatureMapper(), targets=targets, whiten="global")
     raw = make_column_transformer((StandardScaler(), targets))
     for name, alarm in {
-        "whitened, MahalanobisDetector": make_pipeline(whitened, MahalanobisDetector()),
-        "whitened, PyOD's KNN": make_pipeline(whitened, OutlierDetector(KNN())),
+        "compensated, MahalanobisDetector": compensated(targets),
+        "compensated, PyOD's KNN": compensated(targets, OutlierDetector(KNN())),
         "raw, MahalanobisDetector": make_pipeline(raw, MahalanobisDetector()),
         "raw, PyOD's KNN of 20": make_pipeline(raw, OutlierDetector(KNN(n_neighbors=20))),
         "raw, isolation forest": make_pipeline(raw, OutlierDetector(IsolationForest(random_state=seed))),

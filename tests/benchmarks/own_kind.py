@@ -35,7 +35,7 @@ def main():
     bridge = z24.Bridge(z24.find(DATA))
     records, model, targets, sensors = z24.Records.of(bridge), z24.bridge_model(), z24.FREQUENCIES, list(bridge.T)
     chains = {f"simulated, {name}": z24.chain(model).set_params(mapper=mapper) for name, mapper in kinds().items()}
-    detectors = {name: compensated(targets, regressor=one, whiten="local") for name, one in kinds().items()}
+    detectors = {name: compensated(targets, regressor=one) for name, one in kinds().items()}
     detectors[RAW] = recipes("detector").field_detectors(targets, block="1D")[RAW]
     for name, detector in detectors.items():
         detector.fit(records.baseline[targets] if name == RAW else records.baseline)

@@ -26,7 +26,7 @@ from inside import GroupEffects
 from scipy import stats
 from structures import AgeingTruss
 
-from skthermo.detection import TemperatureCompensator, WindowedAlarm
+from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring import Monitor, track_parameters
 from skthermo.preprocessing import residual_trend
 from skthermo.surrogate import TemperatureMapper
@@ -79,11 +79,10 @@ def regression(fem, T, F):
     days = F.index.floor("D")
     both = pd.concat([T, F], axis=1).groupby(days).mean().dropna()
     year = both.index < both.index[0] + pd.Timedelta(days=365)
-    compensator = TemperatureCompensator(TemperatureMapper(), targets=list(F), whiten=None)
+    compensator = TemperatureCompensator(TemperatureMapper(), targets=list(F))
     residuals = np.vstack([compensator.fit_transform(both[year]), compensator.transform(both[~year])])
     trends = residual_trend(pd.DataFrame(residuals, both.index, F.columns))
-    usual = both[F.columns].mean()
-    change, errors = trends["change"] / usual, trends["standard_error"] / usual
+    change, errors = trends["change"], trends["standard_error"]  # relative, as the residuals
     found = stats.chi2.sf(((change / errors) ** 2).sum(), len(change)) <= LEVEL
     effects = GroupEffects.of(fem, T, F, None)
     groups = list(AgeingTruss.groups)  # the others hardly move these frequencies
@@ -159,7 +158,7 @@ def monitor_table(seeds):
             T, F = split(records)
             begin, onset = records.index[0] + pd.DateOffset(years=3), records.index[0] + ONSET
             fem = truss.chain().fit(T[:n_first], F[:n_first])
-            alarm = compensated(list(F), WindowedAlarm("7D"), whiten="global")
+            alarm = compensated(list(F), window="7D")
 
             def fitted(records=records, alarm=alarm, **options):
                 return Monitor(alarm, sensors=False, random_state=0, **options).fit(records[:YEAR])

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, shown, tower_records, z24_records
-from inside import SET_ASIDE
+from inside import ASIDE_KINDS
 from structures import slow_soil
 
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss_campaign
@@ -246,7 +246,7 @@ def healthy_table(records):
     rows = {}
     for name, (T, F) in records:
         cleaned = set_aside(T, F, exclude={"no-rows"})
-        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(SET_ASIDE), 0).sum()
+        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(ASIDE_KINDS), 0).sum()
         counts = (1, bool(found(T, F) - ALSO), np.size(T) + np.size(F), n_values, len(cleaned.left_out))
         rows.setdefault(name, []).append(counts)
     columns = ["records", "with a false finding", "values", "of these set aside", "columns left out"]

@@ -29,7 +29,6 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_fleet, make_truss
-from skthermo.detection import WindowedAlarm
 from skthermo.fleet import Fleet
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import (
@@ -108,7 +107,7 @@ def defaults(T, F, n_replicates=10):
 
 
 def detector_of(F):
-    return compensated(F, WindowedAlarm("24h"), make_pipeline(HingeFeatures(), Ridge()))
+    return compensated(F, None, make_pipeline(HingeFeatures(), Ridge()), window="24h")
 
 
 def service(T, F):

@@ -28,7 +28,7 @@ import pandas as pd
 import scipy.io
 import scipy.signal  # which the library loads once it is used
 import scipy.sparse.linalg
-from harness import DATA, arguments, draw, joined, peak_megabytes, processor_seconds, recipes, shown, split
+from harness import DATA, arguments, compensated, draw, joined, peak_megabytes, processor_seconds, recipes, shown, split
 from sklearn.impute import KNNImputer
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
@@ -37,7 +37,7 @@ from structures import Footbridge, building_frame, footbridge, frame_bridge, lag
 from versions import OtherVersion, run_present
 
 from skthermo.datasets import make_kw51, make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import MahalanobisDetector
 from skthermo.fem import add_noise, sample
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import BlockedKFold, KNNGapImputer, LagFeatures
@@ -213,9 +213,8 @@ def footbridge_study(clock, quick, title, **options):
     fem = DataInformedFEM(model, random_state=0).fit(*split(records))
     damages = [("side span", 0.06), ("side span", 0.12), ("main stays", 0.03), ("main stays", 0.06)]
     scenarios = [{}, *({group: s} for group, s in [*damages, ("bearings", 0.1), ("pylon", 0.15)])]
-    compensator = TemperatureCompensator(lagged(TemperatureMapper()), targets=bridge.modes)
-    lasts = {"single": MahalanobisDetector(), "day": WindowedAlarm("1D")}
-    detectors = {name: make_pipeline(compensator, last) for name, last in lasts.items()}
+    mapper, windows = lagged(TemperatureMapper()), {"single": None, "day": "1D"}
+    detectors = {name: compensated(bridge.modes, None, mapper, window=one) for name, one in windows.items()}
     study = DetectabilityStudy(fem, detectors, scenarios[:3] if quick else scenarios, random_state=0, **options)
     with clock.work():
         study.run(later)
@@ -226,7 +225,7 @@ def many_detectors(clock, quick):
     fem, year, later = truss_years()
     everyone = field_detectors(list(year.frequencies))
     names = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "raw, Gaussian mixture"]
-    names += ["linear regression", "piecewise-linear", "piecewise-linear, whitened", "conditional covariance"]
+    names += ["linear regression", "piecewise-linear", "piecewise-linear, regimes", "conditional covariance"]
 
     def run(*chosen):
         detectors = {name: everyone[name] for name in chosen}
@@ -261,8 +260,7 @@ def hourly_monitor(n_years=2):
     campaign = make_truss_campaign(n_years, samples_per_year=8760, samples_per_day=24, random_state=0)
     records = joined(campaign)
     weather = make_pipeline(LagFeatures([0, 6, 24], freq="1h"), LinearRegression())
-    compensator = TemperatureCompensator(weather, targets=list(campaign.frequencies))
-    return Monitor(make_pipeline(compensator, WindowedAlarm("24h")), random_state=0), records
+    return Monitor(compensated(campaign.frequencies, None, weather, window="24h"), random_state=0), records
 
 
 def monitor_update_later(clock, quick):

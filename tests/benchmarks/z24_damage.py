@@ -14,16 +14,13 @@ import pandas as pd
 from explained_damage import least_squares
 from harness import arguments, recipes, shown
 
-from skthermo.surrogate import TemperatureMapper
-
 damage, z24 = map(recipes, ("z24_damage", "z24"))
 N_EXPLANATIONS = 6
 
 
 def alarms(records, targets):
-    """False alarms and damage found by whitened residuals."""
-    inputs, _ = z24.compensate(records, TemperatureMapper(), "local", targets=targets)
-    return z24.alarm_table({"": inputs}).iloc[0]
+    """False alarms and damage found by the Mahalanobis distance of residuals."""
+    return z24.alarm_table(records, {"": z24.compensated(targets=targets)}).iloc[0]
 
 
 def parameters(measured, names):
@@ -62,7 +59,7 @@ def main():
     measured, names = damage.in_parameters(records)
     shown("Z24: parameters from each record, change of day means, %", parameters(measured, names), 1)
     both = {"four parameters": alarms(measured, names), "four frequencies": alarms(records, z24.FREQUENCIES)}
-    shown("Z24: alarms of a detector, whitened, %", pd.DataFrame(both).T.rename_axis("of"), 1)
+    shown("Z24: alarms of a detector, %", pd.DataFrame(both).T.rename_axis("of"), 1)
     return int(found.table["probability"].idxmax() != "soil")
 
 

@@ -1,9 +1,15 @@
-"""Mistakes in the file of settings are named with their line."""
+"""The file of settings makes what Python makes, and mistakes in it are named with their line."""
 
 import re
+import shutil
 
 import pytest
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
 
+from skthermo.detection import CompensatedDetector, DirectionalDetector, MahalanobisDetector
+from skthermo.monitoring import Monitor, load_monitor
+from skthermo.preprocessing import ExponentialMeans, HingeFeatures
 from tests.commands.folders import run
 
 
@@ -23,6 +29,38 @@ def fit(tmp_path, proposed):
         return run("fit", file)
 
     return fitting
+
+
+def by_python(detector, *steps, compensated=None, **parameters):
+    regression = make_pipeline(*steps)
+    targets = ["f1", "f2", "f3", "f4", "f5", "f6"]
+    parameters = {"false_alarms_per_year": 1.0, "watch_per_year": 12.0, "units": "Hz", "random_state": 0} | parameters
+    return Monitor(CompensatedDetector(detector, regression, targets=targets, **(compensated or {})), **parameters)
+
+
+def test_the_file_makes_what_python_makes(fitted, tmp_path):
+    made = load_monitor(fitted / "monitor.joblib")
+    assert repr(made) == repr(by_python(DirectionalDetector(), HingeFeatures(), Ridge()))
+    folder = shutil.copytree(fitted, tmp_path / "bridge")
+    file = folder / "monitor.toml"
+    text = file.read_text(encoding="utf-8")
+    changes = {
+        'class = "DirectionalDetector"': 'class = "MahalanobisDetector"',
+        "# window = ...": 'window = "5D"',
+        '# regimes = "auto"': 'regimes = "none"',
+        '[[features]]\nclass = "H': '[[features]]\nclass = "ExponentialMeans"\ntime_constants = ["2D", "20D"]\n\n'
+        '[[features]]\nclass = "H',
+        "# persistence = 3": 'persistence = 5\nmax_delay = "3D"',
+    }
+    for old, new in changes.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    file.write_text(text, encoding="utf-8")
+    done = run("fit", file, "--replace")
+    assert done.code == 0, done.err
+    steps = ExponentialMeans(["2D", "20D"]), HingeFeatures(), Ridge()
+    given = {"compensated": {"window": "5D", "regimes": None}, "persistence": 5, "max_delay": "3D"}
+    assert repr(load_monitor(folder / "monitor.joblib")) == repr(by_python(MahalanobisDetector(), *steps, **given))
 
 
 @pytest.mark.parametrize(

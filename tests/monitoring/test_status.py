@@ -7,10 +7,8 @@ from dataclasses import fields
 
 import pandas as pd
 import pytest
-from hypothesis import strategies as st
 
 from skthermo.monitoring import load_monitor
-from skthermo.monitoring._events import Event
 from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
 
 SPOILT = slice(FIRST + 5, FIRST + 20)  # records in which a thermometer repeats its value
@@ -130,11 +128,3 @@ def test_what_an_owner_does_is_a_transition(monitor, records):
     for wrong in (-1, len(monitor.transitions()) + 1, True, "1"):
         with pytest.raises(ValueError, match="after"):
             monitor.transitions(wrong)
-
-
-@st.composite
-def events(draw):
-    """Events of one kind one after the other, the last of which may be open."""
-    times = sorted(draw(st.sets(st.integers(0, 40), max_size=8)))
-    pairs = [(start, end) for start, end in zip(times[::2], [*times[1::2], None], strict=False)]
-    return [Event("damage", start, end, 2.0, start, "f1", (), 3) for start, end in pairs]

@@ -4,7 +4,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import CompensatedDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.studies import DetectabilityStudy
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
@@ -19,6 +19,13 @@ WITHIN = {"rtol": 0, "atol": 2e-3}
 def compensated(last=None):
     """A detector that compensates for temperature by linear regression."""
     return make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), last or MahalanobisDetector())
+
+
+def windowed(window=None, regression=None, targets=MODES, **options):
+    """A detector of trailing means over a window of what linear regression leaves."""
+    regression = LinearRegression() if regression is None else regression
+    options = {"detector": MahalanobisDetector(), "regimes": None} | options
+    return CompensatedDetector(regressor=regression, targets=targets, window=window, **options)
 
 
 def study_of(fem, detectors, scenarios, **options):

@@ -12,16 +12,9 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import (
-    DirectionalDetector,
-    FusedDetector,
-    MahalanobisDetector,
-    OutlierDetector,
-    TemperatureCompensator,
-    WindowedAlarm,
-)
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.studies import Scenario, compare_extensions, sweep
-from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of
+from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of, windowed
 
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
 
@@ -119,23 +112,22 @@ class Counted(LinearRegression):
         return super().fit(X, y, sample_weight)
 
 
-def n_fits_of(fem, study_memory=None, **detectors):
-    before = Counted.n_fits
-    study_of(fem, detectors, SCENARIOS[:1], memory=study_memory).run(WEATHER)
-    return Counted.n_fits - before
+def test_a_memory_remembers_regressions_that_detectors_share(fem, tmp_path):
+    def counted(last=None, memory=None):
+        compensator = TemperatureCompensator(Counted(), targets=MODES)
+        return make_pipeline(compensator, last or MahalanobisDetector(), memory=memory)
 
+    def n_fits_of(memory=None, **detectors):
+        before = Counted.n_fits
+        study_of(fem, detectors, SCENARIOS[:1], memory=memory).run(WEATHER)
+        return Counted.n_fits - before
 
-def test_regressions_that_detectors_share_are_fitted_once_and_a_memory_remembers_them(fem, tmp_path):
-    def whitened(whiten, memory=None):
-        compensator = TemperatureCompensator(Counted(), targets=MODES, whiten=whiten)
-        return make_pipeline(compensator, MahalanobisDetector(), memory=memory)
-
-    once = n_fits_of(fem, one=whitened(None))
+    once = n_fits_of(one=counted())
     assert once > 1
-    assert n_fits_of(fem, one=whitened(None), two=whitened("global")) == once
-    memory = str(tmp_path)
-    assert n_fits_of(fem, one=whitened(None, memory)) == once
-    assert n_fits_of(fem, one=whitened(None, memory)) == 0
+    of_pipeline, of_study = str(tmp_path / "pipeline"), str(tmp_path / "study")
+    assert n_fits_of(one=counted(memory=of_pipeline)) == once
+    assert n_fits_of(one=counted(memory=of_pipeline), two=counted(DirectionalDetector(), of_pipeline)) == 0
+    assert n_fits_of(of_study, one=counted(), two=counted(DirectionalDetector())) == once
 
 
 class CountedForest(IsolationForest):
@@ -151,7 +143,7 @@ class CountedForest(IsolationForest):
 def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fem, tmp_path):
     forest = OutlierDetector(CountedForest(n_estimators=10))
     several = {"raw": forest, "residuals": compensated(forest), "distance": compensated()}
-    several["falls"] = compensated(DirectionalDetector())  # which has to know what residuals are made of
+    several["falls"] = compensated(DirectionalDetector())
     without = study_of(fem, several, SCENARIOS)
     without.run(WEATHER, SIDE_BY_SIDE)
     once = CountedForest.n_fits
@@ -160,42 +152,11 @@ def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fe
         pd.testing.assert_frame_equal(study.run(WEATHER, baseline), without.results_, check_exact=True)
         for key, decisions in without.decisions_.items():
             np.testing.assert_array_equal(study.decisions_[key], decisions)
-        assert study.detectors_["residuals"][0] is study.detectors_["distance"][0]
         baseline.index.resolution  # noqa: B018 -- which pandas keeps in the index
     assert CountedForest.n_fits == 2 * once
     study.set_params(random_state=1).run(WEATHER, SIDE_BY_SIDE)
     study.run(WEATHER, SIDE_BY_SIDE[:-1])
     assert CountedForest.n_fits == 4 * once
-
-
-def test_detectors_that_begin_alike_share_these_steps_and_their_residuals(fem, monkeypatch):
-    counts = Counter()
-
-    def counted(name):
-        original = getattr(TemperatureCompensator, name)
-
-        def count(self, *arguments):
-            counts[name] += 1
-            return original(self, *arguments)
-
-        monkeypatch.setattr(TemperatureCompensator, name, count)
-
-    lasts = {"single": MahalanobisDetector(), "few": MahalanobisDetector(0.01), "week": WindowedAlarm(7)}
-    several = {name: compensated(last) for name, last in lasts.items()}
-    in_hertz = TemperatureCompensator(LinearRegression(), targets=MODES, whiten=None)
-    several["other"] = make_pipeline(in_hertz, MahalanobisDetector())
-    alone = {name: study_of(fem, {name: one}, SCENARIOS).run(WEATHER) for name, one in several.items()}
-    counted("fit_transform")
-    counted("transform")
-    study = study_of(fem, several, SCENARIOS)
-    together = study.run(WEATHER)
-    for name, one in alone.items():
-        pd.testing.assert_frame_equal(together[together["detector"] == name].reset_index(drop=True), one)
-    assert counts["fit_transform"] == 2
-    n_damaged, n_repeats = len(SCENARIOS) - 1, study.n_repeats
-    assert counts["transform"] == n_repeats * (2 * (len(SCENARIOS) + 1) + n_damaged)  # calibration, and transitions
-    assert study.detectors_["single"][0] is study.detectors_["week"][0]
-    assert study.detectors_["single"][0] is not study.detectors_["other"][0]
 
 
 def test_the_truth_is_asked_once_for_all_detectors(fem):
@@ -236,8 +197,7 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
     sees = {
         "raw": (MahalanobisDetector(), MODES),
         "lines": (compensated(), list(SIDE_BY_SIDE)),
-        "fused": (FusedDetector([("lines", compensated()), ("again", compensated())]), list(SIDE_BY_SIDE)),
-        "week": (compensated(WindowedAlarm(7)), list(SIDE_BY_SIDE)),
+        "week": (windowed(7), list(SIDE_BY_SIDE)),
     }
     study = study_of(fem, {name: detector for name, (detector, _) in sees.items()}, SCENARIOS, n_repeats=1)
     results = study.run(WEATHER, SIDE_BY_SIDE)
@@ -245,7 +205,7 @@ def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
     for name, (_, columns) in sees.items():
         assert study.columns_[name] == columns
     few = study.run(WEATHER, YEAR.frequencies)
-    assert few["error"].str.contains("baseline has none").sum() == 3  # those that compensate
+    assert few["error"].str.contains("baseline has none").sum() == 2  # those that compensate
     assert (few.loc[few["detector"] == "raw", "error"] == "").all()
 
 

@@ -13,11 +13,11 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator, WindowedAlarm
+from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.metrics import probability_of_detection, time_to_detection
 from skthermo.studies import ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
 from skthermo.surrogate import DataInformedFEM
-from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, WITHIN, YEAR, compensated, study_of
+from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, WITHIN, YEAR, compensated, study_of, windowed
 from tests.surrogate.chains import chain
 
 ONLY = "MahalanobisDetector"  # name of the only detector of a study
@@ -212,7 +212,7 @@ def test_changes_that_are_no_damage_can_be_detected_too(fem):
         make_pipeline(StandardScaler(), IsolationForest(random_state=0, contamination=0.02)),
         make_pipeline(StandardScaler(), MahalanobisDetector()),
         OutlierDetector(IsolationForest()),
-        WindowedAlarm(7),
+        windowed(7),
     ],
 )
 def test_any_outlier_detector_can_be_studied(fem, detector):
@@ -268,7 +268,7 @@ def test_records_that_cannot_be_evaluated_do_not_count():
     weather.iloc[5:15] = np.nan
     detector = OutlierDetector(IsolationForest())
     study = study_of(gappy, detector, [Scenario("healthy")])
-    with pytest.warns(UserWarning, match="10 of 365 .*not-predicted") as caught:
+    with pytest.warns(UserWarning, match="without any temperature .*not-predicted") as caught:
         results = study.run(weather)
     assert len(caught) == 1
     n_records, n_not_evaluated = results.loc[0, ["n_records", "n_not_evaluated"]]
@@ -390,9 +390,13 @@ def test_the_time_is_estimated_before_the_work(fem, capsys):
 
 
 @pytest.mark.one_case
-@pytest.mark.parametrize("detector", [WindowedAlarm(7), MahalanobisDetector(), OutlierDetector(IsolationForest())])
+@pytest.mark.parametrize(
+    "detector",
+    [windowed(7), compensated(), compensated(OutlierDetector(IsolationForest()))],
+    ids=["week", "distance", "forest"],
+)
 def test_records_evaluated_together_have_the_decisions_of_each_alone(fem, detector, monkeypatch):
-    study = study_of(fem, compensated(detector), sweep(fem, (0.1, 0.2), ["bottom", "top"]))
+    study = study_of(fem, detector, sweep(fem, (0.1, 0.2), ["bottom", "top"]))
     together = study.run(WEATHER)
     decisions = study.decisions_
     monkeypatch.setattr("skthermo.studies.detectability._simulation.MOST_ROWS", 1)

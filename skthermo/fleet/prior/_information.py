@@ -142,7 +142,9 @@ class RowNoise:
         squares = np.nan_to_num(gaussian.distances(scaled)) ** 2
         usual = chi2.ppf(USUAL, (~np.isnan(scaled)).sum(axis=1))
         robust = np.minimum(1.0, usual / np.maximum(squares, 1e-300))
-        products = np.einsum("t,tij->ij", robust, gaussian.second_moments(scaled))
+        complete, (roots, of_row) = np.nan_to_num(gaussian.completed(scaled)[0]), gaussian.error_roots(scaled)
+        errors = (roots @ roots.transpose(0, 2, 1))[of_row]  # of what is filled in
+        products = np.einsum("t,ti,tj->ij", robust, complete, complete) + np.einsum("t,tij->ij", robust, errors)
         products *= n_rows / max(n_rows - self.memory * dof, LEAST_LEFT * n_rows)
         if expected is None:  # a bridge of the fleet: only so much that its covariance can be inverted
             expected, count = np.diag(np.diag(products)) / n_rows, float(n_seen)

@@ -23,7 +23,7 @@ from skthermo._core.arrays import (
 )
 from skthermo._core.frames import Table, check_same_rows, column_names
 from skthermo._core.parallel import run_jobs, single_blas_thread
-from skthermo._core.warnings import reported_by_caller, warn_user, warnings_once, without_warnings
+from skthermo._core.warnings import warn_user, warnings_once, without_kinds, without_warnings
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
 from skthermo.studies._scenarios import Scenario
@@ -149,7 +149,7 @@ class Arrangement:
 def _a90(severities: Any, n_detected: Any, n_records: Any) -> float:
     """a90 of the curve; without a finite slope, the middle of its bracket; infinite where damage is not found."""
     try:
-        with reported_by_caller({"separated-severities", "poor-curve-fit"}):
+        with without_kinds({"separated-severities", "poor-curve-fit"}):
             curve = pod_curve(severities, n_detected, n_records)
     except ValueError:  # the rate does not increase with severity, or nothing could be evaluated
         return np.inf

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 from scipy.stats import t
 
-from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array, as_floats, positive_integer
 from skthermo._core.frames import Table, column_names, frame_like, has_stamps, row_times
 from skthermo._core.parallel import run_jobs, single_blas_thread
-from skthermo._core.warnings import checked_once, warn_user, without_warnings
+from skthermo._core.warnings import warn_user, without_warnings
 from skthermo.exceptions import ModelWarning, ResultWarning
 from skthermo.fem import FEModel
 from skthermo.metrics import minimum_detectable_damage
@@ -394,7 +393,7 @@ def _rates_of_replicate(simulation: Simulation, replicates: Replicates, number: 
     random = np.random.RandomState([replicates.seeds[number] if replicates.with_noise else 0, N_DRAWS])
     seeds = random.randint(LARGEST_SEED, size=(N_DRAWS, 2))
     here, steps, drawn = simulation, [], []
-    with without_warnings(), answers_kept(), checked_once(), single_blas_thread():
+    with without_warnings(), single_blas_thread():
         try:
             for part, chain, T in replicates.replicate(number):
                 if not drawn or here.T is not T:

@@ -17,13 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import Array, as_columns, as_floats, is_real
 from skthermo._core.estimators import _num_samples, last_step, seed_parts
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.memory import remembered
 from skthermo._core.parallel import run_jobs, single_blas_thread
-from skthermo._core.warnings import warnings_of_detector, without_warnings
+from skthermo._core.warnings import collected, warn_each, without_warnings
 from skthermo.detection import DamageDetector
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._rates import EvaluatedRecords, rate_of
@@ -141,7 +140,7 @@ def fitted_to(detector: BaseEstimator, table: Table) -> BaseEstimator:
 class Candidate:
     """A detector that has learned the healthy structure, and which columns it sees.
 
-    Its ``head``, the steps before its ``last`` one, may be those of other detectors too; what is no pipeline has none.
+    Its ``head`` are the steps before its ``last`` one; what is no pipeline has none.
     A decision depends on ``memory`` records, up to the evaluated one: those of the longest window.
     """
 
@@ -163,14 +162,14 @@ class Candidate:
     ) -> Candidate:
         """A fitted clone; the random state, of which a copy is used, seeds parts without a seed of their own.
 
-        A memory keeps what is fitted, and the steps before the last one are shared by all pipelines that begin alike.
+        A memory keeps what is fitted, and the steps before the last one by themselves: pipelines may begin alike.
         """
         view, healthy = read_baseline(fem, detector, baseline)
         fitted, head, seen = clone(detector), (), healthy
         seed_parts(fitted, deepcopy(random_state))
         is_pipeline = isinstance(fitted, Pipeline) and len(fitted) > 1
         if is_pipeline:
-            before = Pipeline([*fitted.steps[:-1], (fitted.steps[-1][0], "passthrough")], memory=fitted.memory)
+            before = Pipeline([*fitted.steps[:-1], ("last", "passthrough")], memory=fitted.memory)
             before, seen = remembered(memory, transformed_by, before, healthy)
             head = tuple(step for _, step in before.steps[:-1])
         last = fitted[-1] if is_pipeline else fitted
@@ -299,8 +298,10 @@ def ask_each(
     asked, found, errors = [name for name in detectors if name not in errors], {}, dict(errors)
     for name in asked:
         try:
-            with warnings_of_detector(name if len(asked) > 1 else None):
+            with collected() as told:
                 found[name] = question(name)
+            named = f"detector {name!r}: " if len(asked) > 1 else ""
+            warn_each(type(one)(named + str(one.args[0]), one.kind) for one in told)
         except Exception as error:
             errors[name] = error
     if not found:
@@ -336,8 +337,7 @@ class Records:
         return self._known[memory]
 
     def entering(self, candidate: Candidate) -> Table:
-        """What the last step of a detector sees, computed once for all that see the same columns and whose steps before
-        it are the same."""
+        """What the last step of a detector sees."""
         view, known = candidate.view, self._known
         seen = (*view.positions, view.is_frame)
         if seen not in known:
@@ -438,13 +438,13 @@ class Simulation:
         size = max(MOST_ROWS // (len(self.T) * (len(self.scenarios) + 1)), 1)
         repeats = list(zip(numbers, seeds[numbers.start : numbers.stop], strict=True))
         some = (repeats[first : first + size] for first in range(0, len(repeats), size))
-        with without_warnings(), answers_kept():
+        with without_warnings():
             jobs = (delayed(self._some_repeats)(part) for part in some)
             options = {"count": lambda one: one.n_repeats, "unit": "repeats", "n_jobs": n_jobs, "verbose": verbose}
             return run_jobs(jobs, len(numbers), **options)
 
     def _some_repeats(self, repeats: Sequence[Repeat]) -> Evaluation:
-        with without_warnings(), answers_kept(), single_blas_thread():
+        with without_warnings(), single_blas_thread():
             return self.evaluated(repeats, {})
 
     def _measured(self, measured: Mapping[str, Table]) -> Iterator[Records]:

@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._core.answers import answers_kept
 from skthermo._core.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
 from skthermo._core.estimators import Stages, held, last_step, seeded
 from skthermo._core.parallel import single_blas_thread
-from skthermo._core.warnings import checked_once, warn_each, warnings_once
+from skthermo._core.warnings import warn_each, warnings_once
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
@@ -258,7 +257,6 @@ class DetectabilityStudy(BaseEstimator):
     uncertainty_summary = _of_findings(StudyFindings.uncertainty_summary)
     detector_name = _of_findings(StudyFindings.detector_name)
 
-    @answers_kept()
     def run(
         self,
         T: ArrayLike | Sequence[ArrayLike],
@@ -337,11 +335,12 @@ class DetectabilityStudy(BaseEstimator):
         replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T = replicates.years[0]
         stages = Stages(self, 5 + bool(replicates.parts))
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"), checked_once():
+        with stages.stage("detectors"), warnings_once("in the fits of the detectors"):
             learned = partial(Candidate.learned, self.fem, baseline, seeded(self.random_state), self.memory)
             candidates, errors = ask_each(detectors, lambda name: learned(detectors[name]), {})
         with warnings_once("in the simulations of this study") as texts, single_blas_thread():
             with stages.stage("frequencies"):
+                warn_each(self.fem.thermal_.doubts(self.fem.weather(T)))
                 clean = clean_frequencies(self.fem, scenarios, T, most_repeats)
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
             simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)

@@ -26,7 +26,7 @@ from skthermo._core.arrays import (
 from skthermo._core.estimators import BaseSearchCV, _num_samples, last_step
 from skthermo._core.frames import Table, has_stamps, row_times, time_of
 from skthermo._core.parallel import single_blas_thread
-from skthermo._core.warnings import reported_by_caller, warn_each, warn_user, warnings_once
+from skthermo._core.warnings import warn_each, warn_user, warnings_once, without_kinds
 from skthermo.exceptions import ResultWarning, WeatherWarning
 from skthermo.preprocessing import set_aside
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
@@ -131,7 +131,7 @@ class TaskScorer:
             raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
         order = np.argsort(rows, kind="stable")
         state, values = self.state[rows[order]], []
-        with warnings_once("in other states of the task"), reported_by_caller(FIRST_ROWS):
+        with warnings_once("in other states of the task"), without_kinds(FIRST_ROWS):
             for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
                 values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
         repeat, scenario = np.divmod(state, self.n_scenarios)

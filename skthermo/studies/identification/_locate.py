@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from skthermo._core.arrays import Array, as_random_state
-from skthermo._core.warnings import reported_by_caller, warn_user, without_warnings
+from skthermo._core.warnings import warn_user, without_kinds, without_warnings
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import Structure
 from skthermo.fem.damage import read_groups
@@ -145,7 +145,7 @@ def locate_damage(
     structure.divide(fem.model, {name: {} for own in contents.values() for name in own})
     random = as_random_state(random_state)
     measured = {"shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
-    with reported_by_caller(OF_WHOLE_GROUPS):
+    with without_kinds(OF_WHOLE_GROUPS):
         found = identify_damage(fem, T, F, contents, noise=noise, prior=prior, random_state=random, **measured)
     with without_warnings():  # identify_damage has given them
         seen = observe(fem, T, F, noise)
@@ -370,7 +370,7 @@ class MeasuredShift:
         changes = StructuralChanges.of_damage(twin.model, question.names)
         mode_is_known = np.where(np.isnan(self.shift.mean), np.nan, 1.0)[np.newaxis]
         effects = FrequencyEffects.averaged(twin, self.theta, mode_is_known, changes)
-        with reported_by_caller(["foreign-shapes"]):
+        with without_kinds(["foreign-shapes"]):
             comparison = compared(effects, self.shift, self.shapes, self.dofs, self.shape_noise)
         observed = comparison.observed(self.prior.model_error)
         return observed, Curves.of_stretches(comparison.effects, question.incidence, observed.rotation)

@@ -741,7 +741,7 @@ def imputed(imputer: BaseEstimator, T: Table, F: Table) -> Table:
 
 def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
     """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
-    return pd.DataFrame(theta, index=getattr(T, "index", None), columns=names, copy=False)
+    return pd.DataFrame(theta, T.index if isinstance(T, pd.DataFrame) else None, names, copy=False)
 
 
 def refitted(

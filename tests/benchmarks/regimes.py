@@ -1,6 +1,6 @@
-"""Ways to whiten residuals, by false alarms and damage found.
+"""Regimes where the scatter of residuals changes, by false alarms and damage found.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/whitening.py [--parts z24 winters]
+    OMP_NUM_THREADS=1 python tests/benchmarks/regimes.py [--parts z24 winters]
 
 - z24: four folds, in each of which a quarter of the healthy records, a contiguous one, is held back. The data are in
   the folder that SKTHERMO_DATA names.
@@ -15,30 +15,30 @@ import sys
 import numpy as np
 import pandas as pd
 from directions import by_threshold, indices, over_folds, z24_folds
-from harness import arguments, compensated, joined, modes_of, shown
+from harness import arguments, compensated, joined, last_step, modes_of, shown
 
 from skthermo.datasets import make_fleet, make_z24
 from skthermo.detection import DirectionalDetector
 
 SEEDS = 0, 1, 7
-WAYS = {'"auto", default': "auto", '"local"': "local", '"global"': "global", "None": None}
+WAYS = {'"auto", default': "auto", "None": None}
 LAST = {"directions of the FE model": lambda: DirectionalDetector(make_z24()), "Mahalanobis": lambda: None}
 
 
 def z24():
     found = {}
     for baseline, tables in z24_folds():
-        for way, whiten in WAYS.items():
+        for way, regimes in WAYS.items():
             for what, last in LAST.items():
-                detector = compensated(modes_of(baseline), last(), whiten=whiten).fit(baseline)
+                detector = compensated(modes_of(baseline), last(), regimes=regimes).fit(baseline)
                 one = indices(detector, tables)
-                found.setdefault(f"{what}, {way}", []).append((one, by_threshold(detector[-1], one)))
+                found.setdefault(f"{what}, {way}", []).append((one, by_threshold(last_step(detector), one)))
     rows = {}
     for what, folds in found.items():
         own = pd.DataFrame([one for _, one in folds]).mean().add_prefix("own threshold, ")
         rows[what] = over_folds([one for one, _ in folds]) | own.to_dict()
     title = "Z24, four quarters held back in turn: damaged records found at measured false alarms, %"
-    shown(title, pd.DataFrame(rows).T.rename_axis("detector and whitening"), 1)
+    shown(title, pd.DataFrame(rows).T.rename_axis("detector and regimes"), 1)
     return False
 
 
@@ -53,15 +53,15 @@ def winters():
                 (92, "2025-03-01", {bridge.groups[0]: 0.2}),
             )
         )
-        for way, whiten in WAYS.items():
-            detector = compensated(modes_of(baseline), whiten=whiten).fit(baseline)
+        for way, regimes in WAYS.items():
+            detector = compensated(modes_of(baseline), regimes=regimes).fit(baseline)
             decisions = [detector.predict(records) for records in later]
             rates.setdefault(way, []).append([100 * (one[one != 0] == -1).mean() for one in decisions])
     rows = {}
     for way, each in rates.items():
         false, found = np.transpose(each)
         rows[way] = {"false alarms": false.mean(), "of the worst bridge": false.max(), "damage found": found.mean()}
-    table = pd.DataFrame(rows).T.rename_axis("whitening")
+    table = pd.DataFrame(rows).T.rename_axis("regimes")
     shown("Thirty bridges, six weeks of winter learned: alarms in the spring, Mahalanobis, 2 % asked for, %", table, 1)
     false, _, found = table.iloc[0]
     return false > 4 or found < 50
