@@ -16,7 +16,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor, load_monitor, track_parameters
 from skthermo.plotting import MonitorDisplay, PredictionDisplay
 from skthermo.preprocessing import HingeFeatures
@@ -51,14 +51,15 @@ baseline, later = records[:"2025"], records["2026":]
 # %%
 # A detector, an FE model, a number of false alarms
 # -------------------------------------------------
-# The detector is any of ``skthermo.detection``: here residuals of piecewise-linear regression, evaluated by the
-# mean of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a
+# The detector is any of ``skthermo.detection``: here the Mahalanobis distance of residuals of piecewise-linear
+# regression, as means of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a
 # share of the records, but what an owner asks for: one false alarm a year.
 
 fem = DataInformedFEM(make_truss(), random_state=0)
 fem.fit(baseline[campaign.temperatures.columns], baseline[modes])
-compensator = TemperatureCompensator(make_pipeline(HingeFeatures(), Ridge()), targets=modes)
-monitor = Monitor(make_pipeline(compensator, WindowedAlarm("1D")), fem=fem, false_alarms_per_year=1)
+regression = make_pipeline(HingeFeatures(), Ridge())
+detector = CompensatedDetector(MahalanobisDetector(), regression, targets=modes, window="1D")
+monitor = Monitor(detector, fem=fem, false_alarms_per_year=1)
 monitor.fit(baseline)
 print(monitor.false_alarm_estimate_)
 

@@ -17,7 +17,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_kw51_campaign
-from skthermo.detection import TemperatureCompensator, WindowedAlarm
+from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
 from skthermo.plotting import MonitorDisplay
 from skthermo.preprocessing import HingeFeatures
@@ -35,8 +35,9 @@ modes = list(campaign.frequencies)
 records = campaign.temperatures.join(campaign.frequencies)["2018-11-22":].iloc[::4]
 works_begin, works_end = (campaign.state.index[campaign.state == state][0] for state in ("during", "after"))
 
-compensator = TemperatureCompensator(make_pipeline(HingeFeatures(), Ridge()), targets=modes)
-monitor = Monitor(make_pipeline(compensator, WindowedAlarm("2D"))).fit(records[records.index < works_begin])
+regression = make_pipeline(HingeFeatures(), Ridge())
+detector = CompensatedDetector(MahalanobisDetector(), regression, targets=modes, window="2D")
+monitor = Monitor(detector).fit(records[records.index < works_begin])
 print(monitor.false_alarm_estimate_)
 
 # %%

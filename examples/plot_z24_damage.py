@@ -25,10 +25,9 @@ import pandas as pd
 from page_recipes import save_figures
 from z24_damage_recipes import FROST, changes, identify, in_parameters
 from z24_detector_recipes import DAMAGED, agreement, choose, compare, detectors, side_by_side
-from z24_recipes import GREY, PAVEMENT, WHITENINGS, Records, alarm_table, compensate, plot_kinds, read_arguments
+from z24_recipes import GREY, PAVEMENT, REGIMES, Records, alarm_table, compensated, plot_kinds, read_arguments
 
 from skthermo.plotting import DetectorsDisplay, IdentifiedDamageDisplay
-from skthermo.surrogate import TemperatureMapper
 
 bridge, folder = read_arguments()
 warnings.filterwarnings("ignore", ".*outside-training-weather")
@@ -44,12 +43,9 @@ records = Records.of(bridge)
 #    :pyobject: in_parameters
 
 measured, names = in_parameters(records)
-residuals = {
-    ("piecewise-linear", label): compensate(measured, TemperatureMapper(), whiten, targets=names)[0]
-    for label, whiten in WHITENINGS.items()
-}
+ways = {label: compensated(targets=names, regimes=regimes) for label, regimes in REGIMES.items()}
 print("Alarms in percent")
-print(alarm_table(residuals).round(1).to_string())
+print(alarm_table(measured, ways).round(1).to_string())
 
 # %%
 # .. code-block:: none

@@ -33,21 +33,19 @@ from z24_recipes import (
     KINDS,
     MODES,
     PAVEMENT,
-    PLAIN,
-    WHITENED,
-    WHITENINGS,
+    REGIMES,
     Records,
     boosting,
-    compensate,
+    compensated,
     found_by_day,
     plot_kinds,
     read_arguments,
+    residuals,
 )
 
-from skthermo.detection import MahalanobisDetector, WindowedAlarm
+from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.metrics import time_to_detection
 from skthermo.plotting import DamageIndexDisplay
-from skthermo.surrogate import TemperatureMapper
 
 bridge, folder = read_arguments()
 for expected in (
@@ -70,10 +68,10 @@ print(f"{len(records.damaged)} after damage began. Every detector is asked for 2
 #
 # The field's detectors
 # ---------------------
-# "Raw" ones see frequencies only. For the others, a :class:`~skthermo.detection.TemperatureCompensator` explains the
-# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates the residuals;
-# "whitened", residuals are divided by their spread in similar weather. "Softening" and "directions of the model" are a
-# :class:`~skthermo.detection.DirectionalDetector` of piecewise-linear residuals. Each threshold comes from the
+# "Raw" ones see frequencies only. The others are a :class:`~skthermo.detection.CompensatedDetector`: it explains the
+# frequencies by temperatures, with the regressor that is named, and a Mahalanobis distance evaluates the residuals.
+# With "regimes", records are divided at the temperature where the scatter of the residuals changes. "Softening" and
+# "directions of the model" are a :class:`~skthermo.detection.DirectionalDetector` of piecewise-linear residuals. Each threshold comes from the
 # baseline by one rule: its records are scored by what was learned without them and without their neighbours in time.
 # (:doc:`plot_detectors` explains each detector.) The last two columns count as others do: another publication takes the
 # first 12 of the damaged records for healthy.
@@ -118,44 +116,49 @@ print(measured_table(records, candidates).round(1).to_string())
 # Knowing temperatures is no merit by itself: linear regression, which has no knee at 0 °C, raises 12 to 24 % false
 # alarms in spring. Nor is seeing none: a local outlier factor raises 17 %.
 #
-# Why whiten?
+# Two regimes
 # -----------
-# In frost, residuals scatter several times as much as in mild weather. One spread for all weather is too small there,
-# and too large on all other days, when damage hides in it. Residuals of the second mode:
+# In frost, residuals scatter several times as much as in mild weather. One covariance for all weather is too large in
+# mild weather, and damage hides in it. By default, a detector looks for the temperature above and below which the
+# scatter differs. Residuals of the second mode:
 
-inputs = {("none", "raw frequencies"): records.each(lambda frame: frame[FREQUENCIES])}
-for name, estimator in (("piecewise-linear", TemperatureMapper()), ("boosted trees", boosting())):
-    for label, whiten in WHITENINGS.items():
-        inputs[name, label] = compensate(records, estimator, whiten)[0]
+divided = compensated().fit(records.baseline)
+sensor, limit = divided.regime_
+print(f"Regimes: {sensor} up to {limit:.1f} °C, and above; {divided.shares_[0]:.0%} of the baseline is in the first")
 
+left, temperature = residuals(records), records.each(lambda frame: frame[sensor])
 fig, ax = plt.subplots(figsize=(10, 4.6), layout="constrained")
-pavement = records.each(lambda frame: frame[PAVEMENT])
-plot_kinds(ax, pavement, inputs["piecewise-linear", PLAIN].each(lambda frame: frame["f2"]), ms=3)
-for whiten, style, label in (("global", "--", "of all records"), ("local", "-", "of records in similar weather")):
-    compensator = compensate(records, TemperatureMapper(), whiten)[1]
-    weather = records.baseline.drop(columns=FREQUENCIES)
-    deviation = pd.Series(compensator.spread_.deviations(weather)[:, 1], weather.index)
-    deviation = deviation.groupby(pavement.baseline.round()).median()
-    ax.plot(2 * deviation, style, color="black", label=f"± 2 standard deviations {label}")
-    ax.plot(-2 * deviation, style, color="black")
-ax.set(xlabel="pavement temperature (°C)", ylabel=f"residual of {MODES[1]} (Hz)")
+plot_kinds(ax, temperature, left.each(lambda frame: frame["f2"]), ms=3)
+colder, ends = temperature.baseline <= limit, (temperature.baseline.min(), limit, temperature.baseline.max())
+for style, rows, label in (("--", colder | ~colder, "all records"), ("-", colder, "each regime"), ("-", ~colder, None)):
+    deviation = 2 * left.baseline["f2"][rows].std()
+    start, end = temperature.baseline[rows].min(), temperature.baseline[rows].max()
+    label = label and f"± 2 standard deviations of {label}"
+    ax.plot([start, end, np.nan, start, end], deviation * np.array([1, 1, 1, -1, -1]), style, color="black", label=label)
+ax.set(xlabel=f"temperature {sensor} of the deck (°C)", ylabel=f"residual of {MODES[1]} (%)")
 fig.legend(loc="outside upper center", markerscale=3, ncols=3)
 
 # %%
 # .. image:: /images/z24_spread.png
-#    :alt: Residuals of the second mode over the temperature of the pavement, with twice the standard deviation of all
-#          records and that in similar weather
+#    :alt: Residuals of the second mode over the temperature of the deck, with twice the standard deviation of all records
+#          and of each regime
 #
 # The damage index over time, for four of them. The Mahalanobis distance of raw frequencies hides the damage in the
 # range that frost has opened. Neighbours among the raw records show it, since no healthy record looks like a damaged
 # one, and so do residuals.
 
 
+def baseline_index(detector):
+    """Damage index of the baseline, each record evaluated by others."""
+    return pd.Series(detector.baseline_index_, records.baseline.index)
+
+
 def plot_indices(panels, **options):
     """Damage index over time, a panel for each detector and the records that it sees."""
     indices, thresholds = {}, {}
-    for title, (detector, seen) in panels.items():
-        index = seen.each(detector.fit(seen.baseline).damage_index)
+    for title, (detector, columns) in panels.items():
+        seen = records.each(lambda frame, columns=columns: frame[columns])
+        index = seen.each(detector.fit(seen.baseline).damage_index, baseline_index(detector))
         indices[title] = {label: getattr(index, kind) for kind, (label, _) in KINDS.items()}
         thresholds[title] = detector.threshold_
     options = {"onset": records.onset, "colours": dict(KINDS.values()), **options}
@@ -163,12 +166,13 @@ def plot_indices(panels, **options):
     display.axes_[-1].set_xlabel("time, by the hour counter of the records")
 
 
+everything = list(records.baseline)
 plot_indices(
     {
-        "raw frequencies": (MahalanobisDetector(), inputs["none", "raw frequencies"]),
-        "raw frequencies, 20 neighbours": (candidates["raw, 20 neighbours"], inputs["none", "raw frequencies"]),
-        "piecewise-linear residuals": (MahalanobisDetector(), inputs["piecewise-linear", PLAIN]),
-        "piecewise-linear residuals, whitened": (MahalanobisDetector(), inputs["piecewise-linear", WHITENED]),
+        "raw frequencies": (MahalanobisDetector(), FREQUENCIES),
+        "raw frequencies, 20 neighbours": (candidates["raw, 20 neighbours"], FREQUENCIES),
+        "piecewise-linear residuals": (compensated(regimes=None), everything),
+        "piecewise-linear residuals, two regimes": (compensated(), everything),
     },
     label="damage index",
 )
@@ -186,7 +190,7 @@ plot_indices(
 # other detectors than the Mahalanobis distance. Quantiles of the baseline's own scores leave nothing out.
 
 chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "raw, local outlier factor"]
-chosen += ["piecewise-linear", "piecewise-linear, whitened"]
+chosen += ["piecewise-linear", "piecewise-linear, regimes"]
 changed = {
     "blocks of a day": {"block": "1D"},
     "correlation times": {"block": None},
@@ -196,7 +200,7 @@ tables = {}
 for kind, parameters in changed.items():
     others = {name: clone(candidates[name]) for name in chosen}
     for detector in others.values():
-        last = detector[-1] if hasattr(detector, "steps") else detector
+        last = getattr(detector, "detector", detector)
         last.set_params(**{key: value for key, value in parameters.items() if key in last.get_params()})
     tables[kind] = measured_table(records, others)[["false alarms", "found of 130"]]
 print(pd.concat(tables, axis=1).round(1).to_string())
@@ -223,11 +227,11 @@ pavement = records.baseline[PAVEMENT]
 edges = [-np.inf, *pavement.quantile([0.2, 0.4, 0.6, 0.8, 1.0]), np.inf]
 classes = records.each(lambda frame: pd.cut(frame[PAVEMENT].to_numpy(), edges, precision=1))
 columns = {("records", kind): pd.Series(getattr(classes, kind)).value_counts(sort=False) for kind in KINDS}
-for label in WHITENINGS:
-    residuals = inputs["piecewise-linear", label]
-    detector = MahalanobisDetector().fit(residuals.baseline)
+for label, regimes in REGIMES.items():
+    detector = compensated(regimes=regimes).fit(records.baseline)
+    index = records.each(detector.damage_index, baseline_index(detector))
     for kind in KINDS:
-        alarm = pd.Series(detector.predict(getattr(residuals, kind)) == -1)
+        alarm = (getattr(index, kind) > detector.threshold_).reset_index(drop=True)
         columns[label, kind] = 100 * alarm.groupby(getattr(classes, kind), observed=False).mean()
 print(pd.DataFrame(columns).rename_axis("pavement, °C").round(1).to_string())
 
@@ -246,17 +250,17 @@ print(pd.DataFrame(columns).rename_axis("pavement, °C").round(1).to_string())
 #
 # A day's records together
 # ------------------------
-# A :class:`~skthermo.detection.WindowedAlarm` evaluates the records of a day together, and a day by its last window.
-# For comparison, one of the compensators has learned forward in time, from the past alone.
+# With a window, a :class:`~skthermo.detection.CompensatedDetector` evaluates trailing means of residuals, and a day by
+# its last window. For comparison, one of them has learned forward in time, from the past alone.
 
-forward = compensate(records, TemperatureMapper(), "local", TimeSeriesSplit(5))[0]
-seen = {name: inputs[name, WHITENED] for name in ("piecewise-linear", "boosted trees")}
-seen["piecewise-linear, forward in time"] = forward
-windows = {f"{width}, {rule}": WindowedAlarm(width, rule=rule) for width in ("24h", 24) for rule in ("mean", "m-of-n")}
+seen = {"piecewise-linear": {}, "boosted trees": {"regressor": boosting()}}
+seen["piecewise-linear, forward in time"] = {"cv": TimeSeriesSplit(5)}
+windows = {"single records": None, "means of 24h": "24h", "means of 24": 24}
 rows = {}
-for name, residuals in seen.items():
-    for label, detector in {"single records": MahalanobisDetector(), **windows}.items():
-        index = detector.fit(residuals.baseline).damage_index(residuals.stream())
+for name, parameters in seen.items():
+    for label, window in windows.items():
+        detector = compensated(**parameters, window=window).fit(records.baseline)
+        index = detector.damage_index(records.stream())
         day = (index > detector.threshold_).groupby(index.index.floor("D")).last()
         healthy = day.index < records.onset.floor("D")
         delay = time_to_detection(index, detector.threshold_, records.onset)
@@ -289,20 +293,19 @@ print(pd.DataFrame(rows).T.to_string())
 
 plot_indices(
     {
-        title: (WindowedAlarm("24h", rule=rule), inputs["piecewise-linear", WHITENED])
-        for rule, title in (("mean", "mean of a day's records"), ("m-of-n", "half of a day's records"))
+        "means of 24 hours": (compensated(window="24h"), everything),
+        "means of 24 records": (compensated(window=24), everything),
     },
-    label="damage index of a day",
+    label="damage index",
 )
 
 # %%
 # .. image:: /images/z24_days.png
-#    :alt: Damage index of days, by the mean of a day's records and by half of them; damaged days lie above the
-#          threshold
+#    :alt: Damage index of means of 24 hours and of 24 records; after the first damaged days, it lies above the threshold
 #
 # Damage was done little by little. By day, in percent of its records:
 
-print(found_by_day(inputs).round(1).to_string())
+print(found_by_day(records, compensated()).round(1).to_string())
 
 # %%
 # .. code-block:: none
@@ -316,7 +319,7 @@ print(found_by_day(inputs).round(1).to_string())
 # What if monitoring had ended earlier? Baselines of the first part of the healthy records, false alarms on the fifth of
 # them that follows, and damage found, for the residuals and their strongest simple competitors:
 
-chosen = ["raw, isolation forest", "raw, 20 neighbours", "piecewise-linear", "piecewise-linear, whitened"]
+chosen = ["raw, isolation forest", "raw, 20 neighbours", "piecewise-linear", "piecewise-linear, regimes"]
 print(short_baselines(records, {name: candidates[name] for name in chosen}).round(1).to_string())
 
 # %%
@@ -334,14 +337,14 @@ print(short_baselines(records, {name: candidates[name] for name in chosen}).roun
 # has the frost, whitening finds 2 to 5 points more than plain residuals and raises up to 1.2 points more false alarms.
 # Boosted trees need it: of their plain residuals, 21 % of the damage is found, and of whitened ones 90 %.
 #
-# The compensator says beforehand which records lie in weather that it does not know, in percent of that fifth, and how
+# A :class:`~skthermo.detection.TemperatureCompensator` says beforehand which records lie in weather that it does not know, in percent of that fifth, and how
 # many of these more than a quarter of the known range beyond it:
 
 healthy = pd.concat([records.baseline, records.later])
 fifth, rows = len(healthy) // 5, {}
 for share in (0.4, 0.5, 0.6, 0.8):
     n = round(share * len(healthy))
-    compensator = compensate(Records(healthy[:n], healthy[n : n + fifth], records.damaged), TemperatureMapper())[1]
+    compensator = TemperatureCompensator(targets=FREQUENCIES).fit(healthy[:n])
     beyond = compensator.extrapolation_distance(healthy[n : n + fifth])
     rows[f"first {share:.0%}"] = {
         "beyond known weather": 100 * (beyond > 0).any(axis=1).mean(),

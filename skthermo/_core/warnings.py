@@ -49,14 +49,14 @@ def collected(*, drop_others: bool = False) -> Iterator[list[SkthermoWarning]]:
 
 @contextmanager
 def without_warnings() -> Iterator[None]:
-    """The caller has told what the parts within would tell."""
+    """No warning of the parts within: their caller warns of the same, or has done so."""
     with collected(drop_others=True):
         yield
 
 
 @contextmanager
 def without_kinds(kinds: Collection[str]) -> Iterator[None]:
-    """The caller tells of some kinds itself."""
+    """Warnings of the parts within, but for the kinds that their caller gives itself."""
     with collected() as findings:
         yield
     warn_each(one for one in findings if one.kind not in kinds)

@@ -74,6 +74,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     usual_deviation_ : ndarray of shape (n_targets,)
         Median standard deviation of the predictions of the baseline, as a ``predict`` that takes ``return_std`` states
         it; else 0.
+    regression_ : object
+        The estimator behind its first transformers, which takes the rows that have all inputs.
+    normal_ : object
+        Normal distribution of the residuals of the baseline, of which `score` is the likelihood.
     sensors_ : object
         Regression of each of the other columns on the others: ``sensors_.fill(T)`` and ``sensors_.departures(T)``.
     training_range_ : object
@@ -331,34 +335,38 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.sensors_ = SensorRegression.fitted(T)
         inputs, filled = self._filled(T)
         Y, folds = as_floats(F), read_folds(self.cv, inputs)
-        self.training_range_ = TrainingRange.spanned(inputs, ~np.isnan(Y).all(axis=1))
-        self.relative_ = (np.fmin.reduce(Y) > 0) & (np.nanstd(Y, axis=0) < np.nanmean(Y, axis=0) / 3)
         self.folds_ = np.full(len(Y), -1)
         for number, (_, test) in enumerate(folds):
             self.folds_[test] = number
-        predicted, told = self._regress(inputs, F, folds)
+        self.training_range_ = TrainingRange.spanned(inputs, ~np.isnan(Y).all(axis=1))
+        self.relative_ = (np.fmin.reduce(Y) > 0) & (np.nanstd(Y, axis=0) < np.nanmean(Y, axis=0) / 3)
+        predicted, doubts = self._regress(inputs, F, folds)
         residuals = self._difference(Y, predicted)
-        far = np.abs(residuals - median(residuals)) > 8 * robust_deviation(residuals)
-        if far.any():
-            predicted, told = self._regress(inputs, frame_like(F, np.where(far, np.nan, Y)), folds)
-            residuals = self._difference(Y, predicted)
-        self.estimator_, self.scale_ = self.regression_.estimator, robust_deviation(residuals)
-        self.usual_deviation_ = median(self._deviations(predicted))
+        self.scale_, self.usual_deviation_ = robust_deviation(residuals), median(self._deviations(predicted))
         residuals = self._shrunk(residuals, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
-        unknown = np.isnan(residuals).all(axis=1) & ~np.isnan(Y).all(axis=1) & (self.folds_ >= 0)
-        told += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
+        unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
         text = unpredicted_text(unknown, as_floats(inputs))
-        return [*findings, *filled, *told, *as_findings(UnevaluatedRowsWarning, text, "not-predicted")], frame_like(
-            F, residuals
-        )
+        findings += [*filled, *doubts, *as_findings(UnevaluatedRowsWarning, text, "not-predicted")]
+        findings += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
+        return findings, frame_like(F, residuals)
 
     def _regress(self, T: Any, F: Any, folds: list[tuple[Rows, Rows]]) -> tuple[Array, list[SkthermoWarning]]:
-        """Fit the regression; predictions out of fold with standard deviations, and findings of the estimator."""
-        estimator = self._default_part("estimator") if self.estimator is None else self.estimator
-        with collected() as found:
-            self.regression_ = RowsRegression.fitted(estimator, T, F)
-            predicted = self.regression_.out_of_fold(estimator, T, F, folds)
+        """Fit the regression; predictions out of fold with standard deviations, and findings of the estimator.
+
+        Targets that are far from a first regression do not train the second one.
+        """
+        estimator, Y = self._default_part("estimator") if self.estimator is None else self.estimator, as_floats(F)
+        for _ in range(2):
+            with collected() as found:
+                self.regression_ = RowsRegression.fitted(estimator, T, F)
+                predicted = self.regression_.out_of_fold(estimator, T, F, folds)
+            residuals = self._difference(Y, predicted)
+            far = np.abs(residuals - median(residuals)) > 8 * robust_deviation(residuals)
+            if not far.any():
+                break
+            F = frame_like(F, np.where(far, np.nan, Y))
+        self.estimator_ = self.regression_.estimator
         return predicted, found
 
     def inputs(self, X: ArrayLike) -> tuple[Any, list[SkthermoWarning]]:

@@ -38,15 +38,13 @@ class OutlierDetector(DamageDetector):
         How the threshold is set:
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the indices that the n baseline records
-          have by clones fitted on others: five more fits, each without a fifth of the blocks of time, and without the
-          records within two correlation times of them.
+          have by clones fitted on others: five more fits, each without a fifth of fifty blocks of time.
         - ``"quantile"``: the (1 - contamination) quantile of the indices of the records that the estimator was fitted
           on, in one fit. Estimators that score such records better than new ones, as ``LocalOutlierFactor`` does, then
           raise more false alarms than asked for.
     block : int or duration, optional
-        Length of the blocks of time of the conformal threshold, as in `~skthermo.preprocessing.BlockedKFold`; only the
-        block itself is then left out. By default five correlation times, or a fiftieth of the records where that is
-        longer.
+        Length of the blocks of time of the conformal threshold, as in `~skthermo.preprocessing.BlockedKFold`. By
+        default a fiftieth of the records.
 
     Attributes
     ----------
@@ -56,7 +54,11 @@ class OutlierDetector(DamageDetector):
         Damage index of the baseline, with the conformal threshold by clones that were not fitted on the record; NaN
         where a mode is missing.
     n_independent_ : float
-        How many independent records the baseline counts as: its number of complete records over their correlation time.
+        Number of independent records that the indices of the baseline are worth.
+    report_ : DataFrame
+        As what each column was read, and in how many rows a value was set aside, as `DamageDetector` has it.
+    findings_ : list of SkthermoWarning
+        What `fit` has warned of.
     threshold_, offset_ : float
         A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
     n_features_in_, feature_names_in_ : int, ndarray of str
@@ -70,8 +72,8 @@ class OutlierDetector(DamageDetector):
     -----
     The scale of the damage index is the estimator's: ``EllipticEnvelope`` gives the *squared* Mahalanobis distance,
     ``IsolationForest`` a number between 0 and 1. Indices of different estimators cannot be compared, but their alarms
-    can. Estimators that measure distances, such as ``OneClassSVM``, give high modes more weight, because these vary
-    more in Hz; ``make_pipeline(StandardScaler(), OneClassSVM())`` as the estimator weights all modes alike.
+    can. The estimator gets relative frequencies. One that measures distances, such as ``OneClassSVM``, gives modes that
+    scatter more a larger weight; ``make_pipeline(StandardScaler(), OneClassSVM())`` weights all modes alike.
 
     Rows with a missing mode are left out of the baseline and cannot be evaluated: their damage index is NaN, and
     ``predict`` gives 0. :doc:`/guide/detectors_theory` has the false alarms of several estimators, and when to set

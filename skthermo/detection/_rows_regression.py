@@ -104,8 +104,7 @@ def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:
     each = MultiOutputRegressor(one)
     named = hasattr(F, "iloc")  # so that a regressor may know which target it learns
     each.estimators_ = [
-        clone(one).fit(rows_of(inputs, own), F.iloc[own, k] if named else F[own, k])
-        for k, own in enumerate(rows.T)
+        clone(one).fit(rows_of(inputs, own), F.iloc[own, k] if named else F[own, k]) for k, own in enumerate(rows.T)
     ]
     return each
 

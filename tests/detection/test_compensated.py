@@ -9,6 +9,7 @@ from sklearn.base import clone
 from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import GridSearchCV
+from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss, make_truss_campaign
@@ -121,9 +122,10 @@ def test_any_outlier_detector_serves_and_grids_reach_its_parameters():
     assert isinstance(forest.detectors_[0], OutlierDetector)
     assert rate(forest, LATER) < 0.06
     assert not hasattr(forest, "pod")
-    grid = {"detector__contamination": [0.02, 0.1], "regressor__fit_intercept": [True, False], "window": [None, 3]}
-    search = GridSearchCV(whole(MahalanobisDetector()), grid, cv=BlockedKFold(2)).fit(YEAR)
-    assert search.best_params_["regressor__fit_intercept"]
+    grid = {"detector__contamination": [0.02, 0.1], "regressor__n_neighbors": [1, 15]}
+    neighbours = CompensatedDetector(MahalanobisDetector(), KNeighborsRegressor(), targets=MODES)
+    search = GridSearchCV(neighbours, grid, cv=BlockedKFold(2)).fit(YEAR)
+    assert search.best_params_["regressor__n_neighbors"] == 15
     assert clone(whole()).set_params(detector__omnibus=0.5).detector.omnibus == 0.5
 
 

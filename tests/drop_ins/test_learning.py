@@ -15,7 +15,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import OutlierDetector, WindowedAlarm
+from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector
 from skthermo.metrics import mape
 from skthermo.studies import detection_task
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
@@ -122,8 +122,9 @@ def test_optuna_tunes_a_detector_as_a_grid_search_does():
     year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
     fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
     damage = [{}, {"bottom": 0.1}]
-    task = detection_task(fem, later.temperatures, damage, columns=fem.mode_names_, n_repeats=2, random_state=0)
-    detector, windows = WindowedAlarm(1), [1, 3, 7]
+    task = detection_task(fem, later.temperatures, damage, n_repeats=2, random_state=0)
+    detector = CompensatedDetector(MahalanobisDetector(), Ridge(), targets=fem.mode_names_)
+    windows = [1, 3, 7]
 
     def objective(trial):
         tried = clone(detector).set_params(window=trial.suggest_categorical("window", windows))

@@ -127,4 +127,4 @@ def test_a_basis_whose_errors_stay_large_is_given_up(monkeypatch):
     )
     with pytest.raises(RuntimeError, match=r"after .* rounds .* expected a larger tol, or narrower bounds") as error:
         FRAME.reduced(0.01, random_state=0)
-    assert int(str(error.value).split()[1]) < 40
+    assert int(str(error.value).split()[1]) < 40  # the most

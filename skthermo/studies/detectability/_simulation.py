@@ -298,10 +298,10 @@ def ask_each(
     asked, found, errors = [name for name in detectors if name not in errors], {}, dict(errors)
     for name in asked:
         try:
-            with collected() as told:
+            with collected() as findings:
                 found[name] = question(name)
             named = f"detector {name!r}: " if len(asked) > 1 else ""
-            warn_each(type(one)(named + str(one.args[0]), one.kind) for one in told)
+            warn_each(type(one)(named + str(one.args[0]), one.kind) for one in findings)
         except Exception as error:
             errors[name] = error
     if not found:

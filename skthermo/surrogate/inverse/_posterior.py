@@ -414,6 +414,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         With ``dofs``: how columns of shapes are read (``reference`` holds the nominal shapes at the sensors).
     n_runs_ : int
         How often a program without derivatives was run.
+    taught_by_ : tuple or None
+        What it has learned from, by which a memory knows its inversions; None without a memory.
     findings_ : list of SkthermoWarning
         What is doubtful about the records of `fit`.
     n_parameters_, parameter_names_ : int, list of str
@@ -523,7 +525,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         asked = first, in_order, self.reduce, learns_prior, learns_noise
         with collected() as self.findings_:
             known = remembered(self.memory, taught, *asked, self.n_jobs, ignore=["n_jobs"])
-        self._taught_by = None if self.memory is None else asked
+        self.taught_by_ = None if self.memory is None else asked
         self.simulator_ = replace(known.simulator, model=model)  # not a copy that was read
         self.posterior_ = replace(known, simulator=self.simulator_)
         self.prior_, self.noise_ = known.prior, known.noise[: model.n_modes]
@@ -611,7 +613,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_is_fitted(self)
         inputs = self._read(X)
         with collected() as findings:
-            asked = self._taught_by, inputs, self.posterior_, self.n_jobs
+            asked = self.taught_by_, inputs, self.posterior_, self.n_jobs
             found = remembered(self.memory, inverted, *asked, ignore=["posterior", "n_jobs"])
         findings += doubts_of(found)
         theta = frame_like(X, found.theta, self.parameter_names_)
