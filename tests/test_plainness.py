@@ -25,7 +25,7 @@ ALLOWED = {
     WARNS: {"the caller's frames", "filters of warnings"},  # one function finds the user's line
     "_core/matrix_child.py": {"filters of warnings"},  # of a process of its own
 }
-AT_MOST = {"constants": 180, "constructors called of": 0, "names in two files": 0, "tests with private imports": 36}
+AT_MOST = {"constants": 180, "constructors called of": 0, "names in two files": 0, "tests with private imports": 15}
 
 
 @pytest.fixture(scope="module")

@@ -298,6 +298,9 @@ def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple
     empty = np.isnan(F).all(axis=0)
     if empty.any():
         raise ValueError(f"column {list(names)[empty.argmax()]!r} has no value in {len(F)} rows; expected some in each")
+    constant = np.fmin.reduce(F) == np.fmax.reduce(F)
+    if constant.any():
+        raise ValueError(f"column {list(names)[constant.argmax()]!r} has a single value; expected values that vary")
     middle = np.nanmedian(F, axis=0)
     scatter = 1.4826 * np.nanmedian(np.abs(F - middle), axis=0)  # the standard deviation of normal values
     is_frequency = (middle > 0) & (scatter < middle / 3)

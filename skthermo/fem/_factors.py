@@ -31,7 +31,7 @@ class Elimination(Protocol):
 
 def elimination(rows: NDArray[np.int32], pointers: NDArray[np.int32]) -> Elimination:
     """The elimination of a pattern, given as compressed sparse columns with sorted rows, by the chosen solver."""
-    eliminations = {"superlu": SuperLUElimination, "rslab": RslabElimination}
+    eliminations: dict[str, Callable[..., Elimination]] = {"superlu": SuperLUElimination, "rslab": RslabElimination}
     name = chosen_solver()
     if name not in eliminations:
         raise ValueError(f"SKTHERMO_SOLVER is {name!r}; expected one of {list(eliminations)}")

@@ -288,7 +288,9 @@ class Donors:
         For few receivers all donors that share any column are one pool.
         """
         if n_receivers * len(self.values) < PAIRS_PER_TREE:
-            yield observed, np.flatnonzero(self._known[column] * self._known[observed].any(axis=0))
+            members = np.flatnonzero(self._known[column] * self._known[observed].any(axis=0))
+            if len(members):
+                yield observed, members
             return
         pools: dict[bytes, tuple[Mask, list[Rows]]] = {}
         for missing, rows in self.patterns:

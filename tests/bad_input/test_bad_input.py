@@ -46,10 +46,11 @@ FROM_THE_DEPTHS = re.compile(
 
 SAYS_WHAT = re.compile(
     "[Ee]xpected|must be|should match|is expecting|not fitted|is none of these|not readable as|; found"
+    "|while a minimum of \\d+ is required"
     r"|: .+\. [A-Z].+\. [A-Z]"
 )
 """What says what was got and what was expected, or what was found, what follows and what to do; of scikit-learn's words
-those on parameters and on other columns."""
+those on parameters, on other columns and on too few rows or columns."""
 
 
 class TooLong(BaseException):

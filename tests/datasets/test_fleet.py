@@ -1,6 +1,7 @@
 """Laws of synthetic fleets: reproducible, weather by date, damage, climates, thermal laws."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,7 +9,6 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 from skthermo.datasets import make_fleet
-from skthermo.datasets._fleet_site import LAWS, SiteClimate, draw_law, estranged, persistent
 from skthermo.preprocessing import SensorMeans
 
 
@@ -133,8 +133,8 @@ def test_means_of_hours_are_those_of_days(bridge):
     assert 11 <= swing.idxmax() <= 18
 
 
-def test_weather_has_the_climate_of_its_place():
-    climate = SiteClimate(latitude=50.0, mean=9.0, season=8.0, swing=3.0, scatter=3.0, memory_hours=72.0)
+def test_weather_has_the_climate_of_its_place(bridge):
+    climate = replace(bridge.climate, latitude=50.0, mean=9.0, season=8.0, swing=3.0, scatter=3.0, memory_hours=72.0)
     weather = climate.weather(pd.Timestamp("2000-01-01"), pd.Timestamp("2039-12-31"), (1,))
     assert weather["air"].mean() == pytest.approx(9.0, abs=0.3)
     months = weather["air"].groupby(weather.index.month).mean()
@@ -153,31 +153,32 @@ def test_weather_has_the_climate_of_its_place():
     assert weather["sun"]["2001-06"].mean() > 3 * weather["sun"]["2001-12"].mean()
 
 
-def test_lasting_weather_has_its_closed_form():
-    noise = persistent(np.random.RandomState(0).standard_normal((200_000, 1)), 4.0)[:, 0]
-    assert noise.var() == pytest.approx(1, rel=0.05)
-    assert (noise[4:] * noise[:-4]).mean() == pytest.approx(np.exp(-1), abs=0.03)
+def test_laws_are_lines_above_the_knee_and_level_off_in_frost(bridge):
+    for law in bridge.laws.values():
+        warm, frozen = np.array([60.0, 61.0]), np.array([-4000.0, -4001.0])
+        assert np.diff(law.log_multiplier(warm))[0] == pytest.approx(law.slope, abs=1e-9)
+        rise = law.log_multiplier(frozen) - law.slope * (frozen - 10)
+        np.testing.assert_allclose(rise, law.limit if law.gain else 0.0, rtol=1e-3)
 
 
-@pytest.mark.parametrize("material", LAWS)
-def test_laws_are_lines_above_the_knee_and_level_off_in_frost(material):
-    law = LAWS[material]
-    warm, frozen = np.array([60.0, 61.0]), np.array([-400.0, -401.0])
-    assert np.diff(law.log_multiplier(warm))[0] == pytest.approx(law.slope, abs=1e-9)
-    rise = law.log_multiplier(frozen) - law.slope * (frozen - 10)
-    np.testing.assert_allclose(rise, law.limit if law.gain else 0.0, rtol=1e-3)
-
-
-def test_coefficients_scatter_about_the_family_and_atypical_bridges_do_not():
-    laws = [draw_law("bearings", None, np.random.RandomState(seed)) for seed in range(400)]
-    slopes = np.log([law.slope / LAWS["bearings"].slope for law in laws])
-    assert slopes.mean() == pytest.approx(0, abs=0.05)
+def test_coefficients_scatter_about_the_family():
+    bridges = make_fleet(400, atypical=0.0, random_state=0).values()
+    slopes = np.log([-bridge.laws["bearings"].slope for bridge in bridges if "bearings" in bridge.laws])
+    assert len(slopes) > 200
+    assert slopes.mean() == pytest.approx(np.log(3e-3), abs=0.06)
     assert slopes.std() == pytest.approx(0.3, rel=0.1)
+
+
+def test_laws_of_atypical_bridges_are_not_those_of_the_family(bridge):
     T = np.linspace(-20, 30, 11)
-    normal = LAWS["concrete"]
-    np.testing.assert_allclose(estranged(normal, "reversed").log_multiplier(T), -normal.log_multiplier(T))
-    np.testing.assert_allclose(estranged(normal, "doubled").log_multiplier(T), 2 * normal.log_multiplier(T))
-    assert estranged(normal, "knee elsewhere").knee == normal.knee + 14
+    normal = replace(bridge, atypical_law=None).laws
+    reversed_, doubled, elsewhere = (
+        replace(bridge, atypical_law=how).laws for how in ("reversed", "doubled", "knee elsewhere")
+    )
+    for zone, law in normal.items():
+        np.testing.assert_allclose(reversed_[zone].log_multiplier(T), -law.log_multiplier(T))
+        np.testing.assert_allclose(doubled[zone].log_multiplier(T), 2 * law.log_multiplier(T))
+        assert elsewhere[zone].knee == law.knee + 14
 
 
 def test_bridges_with_other_thermometers_have_the_same_inputs(fleet):

@@ -11,7 +11,6 @@ from scipy.integrate import quad
 from scipy.stats import spearmanr
 
 from skthermo.datasets import kw51_sensors, kw51_structure, make_kw51
-from skthermo.datasets._kw51_model import box, channel, pipe, rectangle, tee, times
 from skthermo.fem import Membrane
 from skthermo.updating import sensitivity
 
@@ -191,40 +190,55 @@ def test_sensors_are_where_their_labels_say(structure):
     assert (above["09"], above["15"], above["21"]) == (above["11"], above["17"], above["23"])
 
 
-STEPS = (np.arange(2000) + 0.5) / 2000
-
-
 def integrated(width, depth, steel):
-    """Area and second moments of the steel inside a rectangle of cells."""
-    y, z = np.meshgrid(width * STEPS, depth * STEPS)
+    """Area and second moments of the steel inside a rectangle of cells, whose edges are those of the steel."""
+    sides = np.array([width, depth])
+    numbers = np.rint(sides / np.where(sides > 0.2, 5e-4, 5e-5)).astype(int)
+    places = [(np.arange(n) + 0.5) * side / n for side, n in zip(sides, numbers, strict=True)]
+    y, z = np.meshgrid(*places)
     cells = steel(y, z)
-    cell = width * depth / STEPS.size**2
+    cell = width * depth / y.size
     y, z = y[cells] - y[cells].mean(), z[cells] - z[cells].mean()
     return {"A": cells.sum() * cell, "I_yy": (z**2).sum() * cell, "I_zz": (y**2).sum() * cell}
 
 
+def section_of(structure, group):
+    """Properties of a member of a group."""
+    member = structure.members[min(structure.groups[group], key=str)]
+    return {name: value for name, value, _ in member.properties()}
+
+
 CASES = {
-    "box": (box(1.25, 0.8, 0.05), 0.8, 1.25, lambda y, z: (abs(y - 0.4) > 0.35) | (abs(z - 0.625) > 0.575)),
-    "tee": (tee(1.0, 0.5, 0.1), 0.5, 1.0, lambda y, z: (z > 0.9) | (abs(y - 0.25) < 0.05)),
-    "channel": (channel(0.25, 0.2, 0.01), 0.2, 0.25, lambda y, z: (y < 0.01) | (abs(z - 0.125) > 0.115)),
-    "rectangle": (rectangle(0.31, 0.05), 0.05, 0.31, lambda y, z: y > 0),
-    "pipe": (pipe(0.75, 0.05), 0.75, 0.75, lambda y, z: abs(np.hypot(y - 0.375, z - 0.375) - 0.35) < 0.025),
+    "arch": (0.86, 1.3, lambda y, z: (abs(y - 0.43) > 0.38) | (abs(z - 0.65) > 0.6)),
+    "girders": (0.6, 1.235, lambda y, z: (z > 1.155) | (abs(y - 0.3) < 0.04)),
+    "transverse_beams": (0.6, 1.235, lambda y, z: (z > 1.155) | (abs(y - 0.3) < 0.04)),
+    "braces": (0.35, 0.35, lambda y, z: (abs(y - 0.175) > 0.159) | (abs(z - 0.175) > 0.159)),
+    "deck_connections": (0.045, 0.31, lambda y, z: y > 0),
+    "pipes": (0.75, 0.75, lambda y, z: abs(np.hypot(y - 0.375, z - 0.375) - 0.355) < 0.02),
 }
+"""Width, depth and steel of sections, by the group of their members."""
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_area_and_second_moments(case):
-    section, width, depth, steel = CASES[case]
-    found = integrated(width, depth, steel)
+@pytest.mark.parametrize("group", CASES)
+def test_area_and_second_moments(structure, group):
+    found = integrated(*CASES[group])
+    section = section_of(structure, group)
     assert_allclose([section[name] for name in found], list(found.values()), rtol=1e-4)
 
 
-def test_torsion_constants():
-    assert_allclose(rectangle(1.0, 1.0)["J"], 0.1408, rtol=2e-3)  # Timoshenko: 0.1406 b^4
-    assert_allclose(rectangle(10.0, 0.1)["J"], 10 * 0.1**3 / 3, rtol=0.01)
-    ring = pipe(1.0, 0.01)
-    assert_allclose(ring["J"], ring["I_yy"] + ring["I_zz"])
-    assert_allclose(box(1.0, 1.0, 0.01)["J"], 0.99**3 * 0.01)  # Bredt, 4 A^2 t / perimeter
-    assert_allclose(tee(1.2, 0.6, 0.08)["J"], (0.6 + 1.12) * 0.08**3 / 3)
-    assert_allclose(channel(0.3, 0.2, 0.01)["J"], (0.3 + 2 * 0.19) * 0.01**3 / 3)
-    assert times(3, ring)["A"] == 3 * ring["A"]
+def test_stiffeners_are_channels_side_by_side(structure):
+    channel = integrated(0.25, 0.25, lambda y, z: (y < 0.008) | (abs(z - 0.125) > 0.117))
+    section = section_of(structure, "stiffeners")
+    number = section["A"] / channel["A"]
+    assert_allclose([section[name] / number for name in channel], list(channel.values()), rtol=1e-4)
+    assert_allclose(section["J"], number * (0.25 + 2 * 0.242) * 0.008**3 / 3, rtol=1e-4)
+
+
+def test_torsion_constants(structure):
+    J = {group: section_of(structure, group)["J"] for group in CASES}
+    assert_allclose(J["arch"], 2 * (1.25 * 0.81) ** 2 * 0.05 / (1.25 + 0.81))  # Bredt, 4 A^2 t / perimeter
+    assert_allclose(J["braces"], 0.334**3 * 0.016)
+    assert_allclose(J["girders"], (0.6 + 1.155) * 0.08**3 / 3)
+    assert_allclose(J["deck_connections"], 0.31 * 0.045**3 * (1 - 0.63 * 0.045 / 0.31) / 3, rtol=1e-3)  # Timoshenko
+    pipe = section_of(structure, "pipes")
+    assert_allclose(J["pipes"], pipe["I_yy"] + pipe["I_zz"])

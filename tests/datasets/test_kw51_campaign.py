@@ -7,15 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pandas.testing import assert_frame_equal
 
 from skthermo.datasets import kw51_structure, make_kw51, make_kw51_campaign
-from skthermo.datasets._kw51_campaign import (
-    WEATHER_BOX,
-    draw_weather,
-    memory,
-    missing_modes,
-    missing_temperatures,
-    smooth_noise,
-    thermal_multipliers,
-)
 from skthermo.fem import mac
 from skthermo.studies import Scenario
 
@@ -32,6 +23,17 @@ def campaign():
 @pytest.fixture(scope="module")
 def unchanged():
     return make_kw51_campaign(retrofit=False, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def several(unchanged):
+    """Campaigns of eight seeds."""
+    return [unchanged, *(make_kw51_campaign(retrofit=False, random_state=seed) for seed in range(1, 8))]
+
+
+def steel_of(campaign):
+    """Temperature below the deck in all hours, from what it does to the bearings."""
+    return 10 - np.log(campaign.theta["K_bea"]) / 0.012
 
 
 @pytest.mark.nightly
@@ -69,14 +71,6 @@ def test_one_seed_gives_one_campaign(campaign, unchanged):
     noise, other_noise = (c.frequencies / c.clean_frequencies - 1 for c in (campaign, unchanged))
     assert_allclose(noise, other_noise, atol=1e-12)
     assert not make_kw51_campaign(n_hours=10, random_state=1).theta.equals(campaign.theta[:10])
-
-
-def test_longer_weather_begins_as_a_shorter_one():
-    weather = [draw_weather(n_hours, np.random.RandomState(4)) for n_hours in (100, 11328, 11328 + 500)]
-    assert_frame_equal(weather[0], weather[1][:100], check_exact=True)
-    assert_frame_equal(weather[1], weather[2][:11328], check_exact=True)
-    missing = [missing_modes(n_hours, np.random.RandomState(4)) for n_hours in (50, 70)]
-    assert_array_equal(missing[0], missing[1][:50])
 
 
 @pytest.mark.nightly
@@ -166,46 +160,57 @@ def test_frost_lifts_the_vertical_modes(unchanged):
     assert abs(excess["f2"]) < 0.001
 
 
-def test_gaps_cover_as_on_the_bridge():
-    missing = np.array([missing_modes(11328, np.random.RandomState(seed)) for seed in range(8)])
+@pytest.mark.nightly
+def test_gaps_cover_as_on_the_bridge(several):
+    missing = np.array([one.frequencies.isna() for one in several])
     assert_allclose(1 - missing.mean(axis=(0, 1))[1:], COVERAGE, atol=0.02)
     assert (~missing).all(axis=2).mean() == pytest.approx(0.13, abs=0.02)
     begins = (missing[:, 1:] & ~missing[:, :-1]).sum(axis=(0, 1))
     assert (missing.sum(axis=(0, 1)) / begins > 3).all()  # hours in one block
-    index = pd.date_range("2018-10-01", periods=11328, freq="h")
-    hours = np.array([missing_temperatures(index, np.random.RandomState(seed)) for seed in range(8)])
+    hours = np.array([one.temperatures["tBD31A"].isna() for one in several])
     assert 1 - hours.mean() == pytest.approx(0.88, abs=0.01)
     assert hours[:, :4000].mean() == pytest.approx(0.31, abs=0.015)
-    assert hours[:, index < "2018-11-21"].all()
+    assert hours[:, several[0].temperatures.index < "2018-11-21"].all()
 
 
-def test_weather_is_that_of_the_region():
-    for seed in range(8):
-        weather = draw_weather(11328, np.random.RandomState(seed))
-        steel = weather["steel"]
+@pytest.mark.nightly
+def test_weather_is_that_of_the_region(several):
+    for campaign in several:
+        steel, ballast = steel_of(campaign), campaign.theta["E_b"]
+        assert_allclose(campaign.temperatures["tBD31A"].dropna(), steel[campaign.temperatures["tBD31A"].notna()])
         assert steel["2019-01"].min() == pytest.approx(-2.9, abs=1.0)
         assert -8 < steel.min() < -2
         assert 28 < steel.max() < 45
-        assert weather["frost"]["2019-01"].max() > 0.5
-        assert (weather["frost"]["2019-06":"2019-08"] < 1e-3).all()
+        assert ballast["2019-01"].max() > 1.1  # frozen
+        assert (ballast["2019-06":"2019-08"] < 1.01).all()
         daily = steel.resample("D").agg(["min", "max"])
         width = daily["max"] - daily["min"]
         assert width["2019-06":"2019-08"].mean() > 2 * width["2018-12":"2019-01"].mean()
 
 
-def test_smooth_noise_has_its_closed_form():
-    noise = smooth_noise(1_000_000, 2, 10.0, np.random.RandomState(0))
-    assert abs(np.corrcoef(noise.T)[0, 1]) < 0.05
-    lags = np.arange(0, 40, 8)
-    found = [(noise[lag:] * noise[: len(noise) - lag]).mean(axis=0) for lag in lags]
-    expected = (1 + lags / 10) * np.exp(-lags / 10)
-    assert_allclose(found, np.column_stack([expected, expected]), atol=0.03)
+@pytest.mark.nightly
+def test_moisture_is_smooth_noise_of_a_closed_form(several):
+    noise = np.array([(one.theta["M_b"] - 1) / 0.0018 for one in several])
+    lags = np.arange(0, 144, 24)
+    found = [(noise[:, lag:] * noise[:, : noise.shape[1] - lag]).mean() for lag in lags]
+    assert_allclose(found, (1 + lags / 36) * np.exp(-lags / 36), atol=0.1)
 
 
-def test_memory_forgets_exponentially():
-    step = np.r_[np.full(5, 2.0), np.full(50, 3.0)]
-    assert_allclose(memory(step, 24.0)[5:], 3 - np.exp(-np.arange(1, 51) / 24))
-    assert_allclose(memory(step, 24.0)[:5], 2.0)
+def test_the_slab_forgets_the_steels_past_exponentially():
+    campaign = make_kw51_campaign(n_hours=200, random_state=0)
+    steel = steel_of(campaign).to_numpy()
+    slab = 10 + (1 - campaign.theta["E_pla"].to_numpy()) / 3.6e-4
+    share = np.exp(-1 / 24)
+    assert slab[0] == pytest.approx(steel[0])
+    assert_allclose(slab[1:], share * slab[:-1] + (1 - share) * steel[1:], atol=1e-9)
+
+
+@pytest.mark.nightly
+def test_frequencies_of_extreme_weather_are_those_of_the_full_model(several):
+    for campaign in several:
+        hours = [*campaign.theta.idxmin(), *campaign.theta.idxmax()]
+        expected = campaign.model.frequencies(campaign.theta.loc[hours])
+        assert_allclose(campaign.clean_frequencies.loc[hours], expected, rtol=1e-5)
 
 
 def test_shapes_are_those_of_the_model():
@@ -224,15 +229,6 @@ def test_shapes_are_those_of_the_model():
     again = np.diagonal(mac(everything.shapes[0].T, everything.shapes[-1].T))
     assert (again > 0.999).all()
     assert (again < 1).all()
-
-
-def test_weather_stays_within_the_bounds_of_reduction():
-    bounds = np.array([(1 - b, 1 + b) if isinstance(b, float) else b for b in WEATHER_BOX.values()])
-    for seed in range(20):
-        theta = thermal_multipliers(draw_weather(11328, np.random.RandomState(seed)))
-        theta = theta[list(WEATHER_BOX)]
-        assert (theta.min() > bounds[:, 0]).all()
-        assert (theta.max() < bounds[:, 1]).all()
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,20 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skthermo.datasets import make_kw51
-from skthermo.datasets._kw51_model import KW51_UPDATED as THETA
 
+THETA = {  # multipliers that the third fit of examples/plot_kw51_updating.py ends at
+    "E_bot": 1.3,
+    "E_arc": 0.9,
+    "E_br": 0.9,
+    "E_con": 0.9,
+    "E_pip": 0.942523,
+    "A_c": 1.5,
+    "I_22p": 0.5,
+    "A_d": 1.031471,
+    "I_22a": 1.128122,
+    "A_a": 1.016123,
+    "M_a": 0.711763,
+}
 MEASURED = np.array([0.51, 1.24, 1.89, 2.45, 2.58, 2.92])
 AT_LOWER, AT_UPPER = ["E_arc", "E_br", "E_con", "I_22p"], ["E_bot", "A_c"]
 

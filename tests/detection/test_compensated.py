@@ -129,7 +129,7 @@ def test_any_outlier_detector_serves_and_grids_reach_its_parameters():
     assert clone(whole()).set_params(detector__omnibus=0.5).detector.omnibus == 0.5
 
 
-def test_severities_are_those_of_the_record_and_nothing_is_told_of_gaps():
+def test_severities_are_those_of_the_record_and_nan_in_gaps():
     detector = whole(DirectionalDetector(make_truss())).fit(YEAR)
     losses = detector.severities(truss(3, damage={"diagonal": 0.2}))
     assert losses["diagonal"].median() == pytest.approx(0.2, abs=0.05)
@@ -153,7 +153,7 @@ def test_more_damage_is_never_less_alarm():
         assert (before[2:] > detector.threshold_).all()
 
 
-def test_it_is_pickled_and_told_again():
+def test_it_is_pickled_and_its_report_reads_residuals():
     detector = whole(DirectionalDetector(), window="5D").fit(YEAR)
     again = pickle.loads(pickle.dumps(detector))
     np.testing.assert_array_equal(again.damage_index(LATER), detector.damage_index(LATER))

@@ -75,12 +75,12 @@ def test_rows_with_some_modes_enter_the_baseline():
     ("X", "message"),
     [
         (F[:3], r"covariance of 3 baseline rows and 3 modes is singular \(rank 2\)"),
-        (F * [1, 1, 0], r"modes \[2\].* are constant"),
+        (F * [1, 1, 0], "column 2 has a single value"),
         (np.column_stack([F, F[:, 0] * 1e-9]), r"singular \(rank 3\)"),
-        (np.column_stack([F, np.full(len(F), 4.1)]), r"modes \[3\].* are constant"),
+        (np.column_stack([F, np.full(len(F), 4.1)]), "column 3 has a single value"),
         (np.column_stack([F, F[:, 0] + F[:, 1]]), r"400 baseline rows and 4 modes is singular \(rank 3\)"),
         (F[:1], "1 sample"),
-        (np.vstack([F[:1], np.full((5, 3), np.nan)]), "covariance of 1 baseline rows"),
+        (np.vstack([F[:1], np.full((5, 3), np.nan)]), "has a single value"),
     ],
 )
 def test_bad_baselines_are_named(X, message):

@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, sample
-from skthermo.fem._factors import elimination, factorise
 from skthermo.fem.modal import ShiftInvertSolver
 from tests.fem.frames import FRAME, portal
 from tests.fem.test_sparse import THETA, chain, dense_frequencies
@@ -29,44 +28,30 @@ def solver(request, monkeypatch):
     return request.param
 
 
-def factorised(matrix):
-    """What solves with a single matrix, and what does by the elimination of its pattern."""
-    matrix = scipy.sparse.csc_array(matrix)
-    matrix.sort_indices()
-    return [factorise(matrix), elimination(matrix.indices, matrix.indptr).factorise(matrix)]
-
-
-def random_stiffness(seed, n=60):
-    random = np.random.default_rng(seed)
-    part = scipy.sparse.random_array((n, n), density=0.05, rng=random)
-    return (part @ part.T + scipy.sparse.diags_array(random.uniform(0.1, 1.0, n))).tocsc()
-
-
 @pytest.mark.parametrize("seed", range(3))
-def test_factors_solve_as_lapack_does(solver, seed):
-    matrix = random_stiffness(seed)
-    columns = np.random.default_rng(seed).standard_normal((60, 5))
-    expected = scipy.linalg.solve(matrix.toarray(), columns, assume_a="pos")
-    for solve in factorised(matrix):
-        np.testing.assert_allclose(solve(columns), expected, rtol=1e-9, atol=1e-11)
-        np.testing.assert_allclose(solve(columns[:, 0]), expected[:, 0], rtol=1e-9, atol=1e-11)
+def test_frequencies_of_any_pattern_are_those_of_lapack(solver, seed):
+    random, n = np.random.default_rng(seed), 250
+    part = scipy.sparse.random_array((n, n), density=0.01, rng=random)
+    own = scipy.sparse.diags_array(random.uniform(0.1, 1.0, n))
+    model = AffineModel({("a",): part @ part.T, ("b",): own}, scipy.sparse.eye_array(n), n_modes=4)
+    theta = random.uniform(0.5, 2.0, (3, 2))
+    np.testing.assert_allclose(model.frequencies(theta), dense_frequencies(model, theta), rtol=1e-9)
 
 
-def test_what_is_not_positive_definite_has_no_factors(solver):
-    indefinite = chain(60) - 0.1 * scipy.sparse.eye_array(60)
-    singular = scipy.sparse.csc_array([[1.0, -1.0], [-1.0, 1.0]])
-    assert [*factorised(indefinite), *factorised(-chain(60)), *factorised(singular)] == [None] * 6
+def test_what_is_not_positive_definite_has_no_modes_and_changes_no_other_row(solver):
+    terms = {("k",): chain(250), ("force",): -1e-5 * scipy.sparse.eye_array(250)}
+    model = AffineModel(terms, scipy.sparse.eye_array(250), n_modes=3)
+    with pytest.warns(UserWarning, match="no-solution"):
+        frequencies = model.frequencies([[1.0, 1.0], [1.0, 1e4], [2.0, 1.0]])
+    assert np.isnan(frequencies).any(axis=1).tolist() == [False, True, False]
+    np.testing.assert_array_equal(frequencies[[0, 2]], model.frequencies([[1.0, 1.0], [2.0, 1.0]]))
 
 
-def test_an_elimination_serves_all_matrices_of_its_pattern_in_any_order(solver):
-    terms = FRAME._core.stiffness
-    one = elimination(terms.pattern.rows, terms.pattern.pointers)
-    sent = pickle.loads(pickle.dumps(one))
-    right = np.ones(terms.n_dof)
-    first, second = terms.assemble(THETA[:2])
-    alone = [one.factorise(matrix)(right) for matrix in (first, second)]
-    np.testing.assert_array_equal(one.factorise(first)(right), alone[0])
-    np.testing.assert_array_equal(sent.factorise(second)(right), alone[1])
+def test_a_model_that_is_sent_gives_the_bits_of_its_own_in_any_order(solver):
+    model = portal()
+    sent = pickle.loads(pickle.dumps(model))
+    expected = model.frequencies(THETA)
+    np.testing.assert_array_equal(sent.frequencies(THETA[::-1])[::-1], expected)
 
 
 def test_frequencies_do_not_depend_on_the_solver(solver):

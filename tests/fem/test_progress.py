@@ -14,7 +14,6 @@ import joblib
 import numpy as np
 import pytest
 
-from skthermo._core.parallel import run_jobs
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, evaluate, sample
 
@@ -55,20 +54,17 @@ def slow_square_root(row):
     return np.sqrt(row)
 
 
-def test_a_notebook_sees_a_bar_of_jobs(monkeypatch):
+def test_a_notebook_sees_a_bar_unasked(monkeypatch):
     class Output(io.StringIO):
         __module__ = "ipykernel.iostream"
 
-    def repeat(number):
-        time.sleep(0.6)
-        return number
-
-    for output in (Output(), Terminal(), io.StringIO()):
+    slow = CallableModel(slow_square_root, ["E"], 1)
+    for output in (Output(), io.StringIO()):
         monkeypatch.setattr(sys, "stderr", output)
-        assert run_jobs((joblib.delayed(repeat)(n) for n in range(3)), 3, unit="repeats", n_jobs=1) == [0, 1, 2]
+        sample(slow, 0.2, 128, random_state=0)
         lines = [line for line in output.getvalue().split("\r") if line]
-        assert bool(lines) == (type(output) is not io.StringIO)
-        assert all(" of 3 repeats in " in line for line in lines)
+        assert bool(lines) == isinstance(output, Output)
+        assert all(" of 128 samples in " in line for line in lines)
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on

@@ -11,7 +11,6 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from skthermo.fem import AffineModel, Beam, Structure
-from skthermo.fem._terms import DenseTerms, SparseTerms
 from skthermo.fem.modal import ShiftInvertSolver
 from tests.fem.frames import FRAME, SECTION, portal
 
@@ -55,23 +54,6 @@ def test_sparse_jacobian_equals_central_differences(track):
         for unit in np.eye(4)
     ]
     np.testing.assert_allclose(model.jacobian(THETA), np.stack(differences, axis=2), atol=1e-5)
-
-
-def test_sparse_and_dense_terms_are_one_sum():
-    keys = np.array([[0, 0], [1, 0], [1, 2]])
-    random = np.random.default_rng(1)
-    matrices = [scipy.sparse.random_array((9, 9), density=0.3, rng=random).tocsc() for _ in keys]
-    matrices = [matrix + matrix.T for matrix in matrices]
-    sparse, dense = (
-        kind.from_matrices(matrices, keys).with_factors(np.array([1, 0.5, 2])) for kind in (SparseTerms, DenseTerms)
-    )
-    theta, shapes = random.uniform(0.5, 2, (4, 2)), random.standard_normal((4, 9, 3))
-    np.testing.assert_allclose([m.toarray() for m in sparse.assemble(theta)], dense.assemble(theta), atol=1e-14)
-    np.testing.assert_allclose(sparse.quadratic_forms(shapes), dense.quadratic_forms(shapes), atol=1e-12)
-    np.testing.assert_allclose(sparse.product(theta, shapes), dense.product(theta, shapes), atol=1e-12)
-    basis = random.standard_normal((9, 4))
-    reduced = sparse.projected(basis).assemble(theta)
-    np.testing.assert_allclose(reduced, dense.projected(basis).assemble(theta), atol=1e-12)
 
 
 def chain(n_dof):

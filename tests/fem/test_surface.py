@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, FrequencySurface
-from skthermo.fem.affine._surface import n_terms, slopes_of_terms, terms
 
 TRUSS = make_truss()
 TOL = 4e-6
@@ -145,14 +143,3 @@ def test_more_solves_allow_a_higher_degree():
 def test_with_too_low_a_degree_nothing_is_solved():
     with pytest.raises(RuntimeError, match="degree 2"):
         FrequencySurface(lambda rows: pytest.fail("solved"), weather_rows(0), highest_degree=2)
-
-
-@pytest.mark.parametrize(("n_variables", "degree"), [(1, 4), (3, 3), (5, 2)])
-def test_terms_are_all_products_and_their_slopes_the_derivatives(n_variables, degree):
-    z, step = np.random.default_rng(0).uniform(-1, 1, size=(20, n_variables)), 1e-6
-    found = terms(z, degree)
-    np.testing.assert_allclose(found, PolynomialFeatures(degree).fit_transform(z), rtol=1e-13)
-    assert found.shape[1] == n_terms(n_variables, degree)
-    steps = step * np.eye(n_variables)
-    expected = [(terms(z + one, degree) - terms(z - one, degree)) / (2 * step) for one in steps]
-    np.testing.assert_allclose(slopes_of_terms(z, degree), np.stack(expected, axis=1), atol=1e-8)

@@ -6,7 +6,6 @@ import pytest
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.preprocessing import LagFeatures, check_records, residual_trend, set_aside
-from skthermo.preprocessing.checks._stuck import stuck_runs
 
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
@@ -17,6 +16,13 @@ def hourly(seed=0, n_days=120):
     random = np.random.default_rng(seed)
     hours = np.arange(24 * n_days)
     return 10 + 3 * np.sin(2 * np.pi * hours / 24) + 0.05 * np.cumsum(random.standard_normal(len(hours)))
+
+
+def stuck_runs(column):
+    """First and last row of each run of a thermometer's column that counts as stuck."""
+    frequencies = 4 + 0.01 * np.random.default_rng(0).standard_normal((len(column), 2))
+    table = check_records(np.reshape(column, (-1, 1)), frequencies).table
+    return table.loc[table["what"] == "stuck-sensor", ["from", "to"]].to_numpy().tolist()
 
 
 def one(findings):

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.preprocessing import LagFeatures, check_records
-from skthermo.preprocessing.checks._record_findings import ARE_MEANINGLESS, WARNINGS
 
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
@@ -231,11 +230,8 @@ def test_nothing_fails_whatever_is_given(temperatures, frequencies):
     assert len(list(found.warnings())) <= len(kinds(found))
     assert isinstance(str(found), str)
     alone = check_records(temperatures), check_records(None, frequencies)
-    assert set().union(*map(kinds, alone)) - {"implausible-values"} <= kinds(found) | {"fahrenheit", *KINDS_OF_PAIRS}
-
-
-KINDS_OF_PAIRS = {what for what in WARNINGS if what not in ("no-table", "no-numbers", "infinite-values", "kelvin")}
-"""Kinds that tables which are exchanged or equal are not searched for."""
+    of_any_table = {"no-table", "no-numbers", "infinite-values", "kelvin"}  # also of exchanged or equal tables
+    assert set().union(*map(kinds, alone)) & of_any_table <= kinds(found)
 
 
 def test_arguments_that_are_no_tables_are_refused():
@@ -246,13 +242,6 @@ def test_arguments_that_are_no_tables_are_refused():
 
 
 class TestFindings:
-    def test_each_kind_says_what_follows_and_what_to_do(self):
-        assert set(WARNINGS) >= ARE_MEANINGLESS
-        for text in WARNINGS.values():
-            what, consequence, action = text.split(". ")
-            assert what.endswith(": {}")
-            assert min(map(len, (consequence, action))) > 10
-
     @given(random=st.randoms(use_true_random=False))
     @often
     def test_order_of_rows_and_columns_does_not_matter(self, random):

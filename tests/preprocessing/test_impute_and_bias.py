@@ -6,7 +6,7 @@ import pytest
 from sklearn.impute import KNNImputer
 
 from skthermo.datasets import make_truss
-from skthermo.preprocessing import BiasAligner, KNNGapImputer, _impute
+from skthermo.preprocessing import BiasAligner, KNNGapImputer
 
 RNG = np.random.default_rng(0)
 HOURS = pd.date_range("2025-01-01", periods=80, freq="h")
@@ -25,15 +25,6 @@ def test_imputer_gives_scikit_learns_values_on_a_frame_of_its_own(weights):
     pd.testing.assert_frame_equal(filled[present], GAPPY[present])
 
 
-@pytest.fixture
-def trees(monkeypatch):
-    """Trees even for few rows and small pools."""
-    monkeypatch.setattr(_impute, "FEW_PAIRS", 0)
-    monkeypatch.setattr(_impute, "PAIRS_PER_POOL", 0.0)
-    monkeypatch.setattr(_impute, "PAIRS_PER_TREE", 30)
-    monkeypatch.setattr(_impute, "PAIRS_AT_ONCE", 50)
-
-
 def imputed_by_definition(donors, row, column, n_neighbors, weigh):
     """One value, from all distances, directly."""
     shared = ~np.isnan(donors) & ~np.isnan(row)
@@ -44,51 +35,49 @@ def imputed_by_definition(donors, row, column, n_neighbors, weigh):
     return np.average(donors[usable, column][nearest], weights=weigh(distances[nearest]))
 
 
-def scattered(share):
+def scattered(share, n_donors=5000, n_new=4500):
+    """Records with gaps in few patterns, as many as make trees faster than all distances."""
     rng = np.random.default_rng(1)
-    full = rng.normal(size=(500, 5)) @ rng.normal(size=(5, 5))
-    new = np.where(rng.random((60, 5)) < share, np.nan, full[:60] + 0.1)
+    full = rng.normal(size=(n_donors, 4)) @ rng.normal(size=(4, 4))
+    new = np.where(rng.random((n_new, 4)) < share, np.nan, full[:n_new] + 0.1)
     return np.where(rng.random(full.shape) < share, np.nan, full), new[~np.isnan(new).all(axis=1)]
 
 
 @pytest.mark.nightly
-@pytest.mark.usefixtures("trees")
-@pytest.mark.parametrize("share", [0.1, 0.5])
+@pytest.mark.parametrize("share", [0.2, 0.5])
 @pytest.mark.parametrize("n_neighbors", [1, 10, 300])
-def test_trees_give_scikit_learns_values(share, n_neighbors):
+def test_many_records_have_scikit_learns_values(share, n_neighbors):
     gappy, new = scattered(share)
     ours, theirs = (imputer(n_neighbors=n_neighbors).fit(gappy) for imputer in (KNNGapImputer, KNNImputer))
     np.testing.assert_allclose(ours.transform(gappy), theirs.transform(gappy), rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(ours.transform(new), theirs.transform(new), rtol=1e-10, atol=1e-10)
 
 
-@pytest.mark.usefixtures("trees")
-@pytest.mark.parametrize("share", [0.1, 0.5])
+@pytest.mark.parametrize("share", [0.2, 0.5])
 @pytest.mark.parametrize(
     ("weights", "weigh"),
     [("uniform", np.ones_like), ("distance", np.reciprocal), (lambda d: np.exp(-d), lambda d: np.exp(-d))],
     ids=["uniform", "distance", "callable"],
 )
-def test_trees_give_the_weighted_mean_of_the_nearest(weights, weigh, share):
+def test_many_records_have_the_weighted_mean_of_the_nearest(weights, weigh, share):
     gappy, new = scattered(share)
     filled = KNNGapImputer(weights=weights).fit(gappy).transform(new)
-    for row, column in np.argwhere(np.isnan(new)):
+    for row, column in np.argwhere(np.isnan(new))[::50]:
         expected = imputed_by_definition(gappy, new[row], column, 10, weigh)
         assert filled[row, column] == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 
-@pytest.mark.usefixtures("trees")
-@pytest.mark.parametrize("pairs", [0, 30, 10_000_000])
-def test_neighbours_are_the_same_far_from_zero(pairs, monkeypatch):
-    monkeypatch.setattr(_impute, "PAIRS_PER_TREE", pairs)
-    gappy, new = scattered(0.3)
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_neighbours_are_the_same_far_from_zero(share):
+    gappy, new = scattered(share, 8000, 7500)
     near, far = (KNNGapImputer().fit(gappy + shift).transform(new + shift) - shift for shift in (0.0, 1e7))
     np.testing.assert_allclose(far, near, rtol=0, atol=1e-7)
 
 
-@pytest.mark.usefixtures("trees")
-def test_trees_serve_rows_without_any_value_indicators_and_empty_columns():
-    holed = GAPPY.copy()
+@pytest.mark.parametrize("n_records", [80, pytest.param(8000, marks=pytest.mark.nightly)])
+def test_rows_without_any_value_indicators_and_empty_columns(n_records):
+    holed = pd.concat([GAPPY] * (n_records // 80))
+    holed += 1e-3 * np.random.default_rng(2).standard_normal(holed.shape)
     holed.iloc[5] = np.nan
     filled = KNNGapImputer().fit_transform(holed)
     np.testing.assert_allclose(filled.iloc[5], holed.mean(), rtol=1e-12)
@@ -101,21 +90,18 @@ def test_trees_serve_rows_without_any_value_indicators_and_empty_columns():
         np.testing.assert_allclose(ours, theirs, rtol=1e-10)
 
 
-@pytest.mark.usefixtures("trees")
+def test_a_row_without_any_value_among_many_has_the_means():
+    gappy, _ = scattered(0.2)
+    gappy[5] = np.nan
+    np.testing.assert_allclose(KNNGapImputer().fit_transform(gappy)[5], np.nanmean(gappy, axis=0), rtol=1e-12)
+
+
 def test_donors_are_a_copy():
-    values = GAPPY.to_numpy(copy=True)
-    imputer = KNNGapImputer().fit(values)
-    expected = imputer.transform(GAPPY.to_numpy())
-    values[:] = 99.0
-    np.testing.assert_array_equal(imputer.transform(GAPPY.to_numpy()), expected)
-
-
-def test_trees_are_for_many_rows_of_few_patterns():
-    rng = np.random.default_rng(0)
-    few_patterns, many_patterns = (np.where(rng.random((9000, p)) < 0.1, np.nan, 1.0) for p in (6, 20))
-    assert _impute.Donors(few_patterns).trees_are_faster(np.isnan(few_patterns))
-    assert not _impute.Donors(few_patterns[:2000]).trees_are_faster(np.isnan(few_patterns[:2000]))
-    assert not _impute.Donors(many_patterns).trees_are_faster(np.isnan(many_patterns))
+    gappy, new = scattered(0.3)
+    imputer = KNNGapImputer().fit(gappy)
+    expected = imputer.transform(new)
+    gappy[:] = 99.0
+    np.testing.assert_array_equal(imputer.transform(new), expected)
 
 
 def test_imputer_keeps_arrays():

@@ -15,7 +15,6 @@ from sklearn.utils import Bunch
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
-from skthermo.preprocessing._poles import MISSED_MODE, assign, shape_agreement
 from tests.benchmarks.mode_tracker import right, simulated_poles, ways
 
 RNG = np.random.default_rng(0)
@@ -112,42 +111,48 @@ def test_order_of_poles_and_of_modes_does_not_matter():
     np.testing.assert_array_equal(other.frequencies, modes.frequencies.to_numpy()[:, order])
 
 
-def brute_force(cost):
-    """Lowest cost of one record, from all assignments; rows are modes."""
+def lowest_cost(cost):
+    """Lowest cost of one record, from all assignments; rows are modes, and one without a pole costs 3."""
     n_modes, n_poles = cost.shape
-    choices = itertools.product(range(-1, n_poles), repeat=n_modes)
     return min(
-        sum(MISSED_MODE if pole < 0 else cost[mode, pole] for mode, pole in enumerate(choice))
-        for choice in choices
+        sum(3.0 if pole < 0 else cost[mode, pole] for mode, pole in enumerate(choice))
+        for choice in itertools.product(range(-1, n_poles), repeat=n_modes)
         if len({pole for pole in choice if pole >= 0}) == sum(pole >= 0 for pole in choice)
     )
 
 
 @settings(deadline=None, max_examples=60)
-@given(st.integers(0, 2**31), st.integers(1, 4), st.integers(1, 4), st.floats(0.2, 1))
-def test_the_assignment_is_optimal_and_one_to_one(seed, n_modes, n_poles, density):
+@given(st.integers(0, 2**31), st.integers(1, 4), st.integers(1, 4), st.sampled_from([0.05, 0.2, 0.6]))
+def test_the_assignment_is_optimal_and_one_to_one(seed, n_modes, n_poles, max_shift):
     random = np.random.default_rng(seed)
-    costs = np.where(
-        random.random((5, n_modes, n_poles)) < density, random.uniform(0, 3, (5, n_modes, n_poles)), np.inf
-    )
-    record, mode, pole = np.nonzero(np.isfinite(costs))
-    cost = costs[record, mode, pole]
-    chosen = assign(record, record * n_poles + pole, mode, cost)
-    for i in range(5):
-        own = chosen[record[chosen] == i]
-        assert len(set(mode[own])) == len(set(pole[own])) == len(own)
-        total = cost[own].sum() + MISSED_MODE * (n_modes - len(own))
-        assert total == pytest.approx(brute_force(costs[i]))
+    reference, shapes = random.uniform(2, 3, n_modes), random.normal(size=(3, n_modes))
+    F, S = random.uniform(2, 3, (5, n_poles)), random.normal(size=(5, n_poles, 3))
+    tracker = ModeTracker((reference, shapes), max_shift=max_shift, min_mac=0.1, close=0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of modes that are alike or not found
+        poles = tracker.fit_transform({"frequencies": F, "shapes": S}).poles.to_numpy()
+    for chosen, f, phi in zip(poles, F, S, strict=True):
+        shift, agreement = np.abs(f / reference[:, np.newaxis] - 1), mac(shapes, phi.T)
+        cost = (1 - agreement) / (1 - 0.1) + shift / max_shift
+        cost[(shift > max_shift) | (agreement < 0.1)] = np.inf
+        found = chosen >= 0
+        assert len(set(chosen[found])) == found.sum()
+        total = cost[np.flatnonzero(found), chosen[found]].sum() + 3 * (~found).sum()
+        assert total == pytest.approx(lowest_cost(cost))
 
 
 def test_mac_is_that_of_fem_and_ignores_failed_sensors():
     shapes = RNG.normal(size=(20, 6)) + 1j * RNG.normal(size=(20, 6))
-    own, _ = shape_agreement(shapes, PHI, [])
-    np.testing.assert_allclose(own, mac(shapes.T, PHI), rtol=1e-12)
+    tracker = ModeTracker((F0[:1], PHI[:, :1]), min_mac=0.0)
+
+    def found():
+        raw = {"frequencies": np.full((20, 1), F0[0]), "shapes": shapes[:, np.newaxis]}
+        return tracker.fit_transform(raw).mac["f1"]
+
+    np.testing.assert_allclose(found(), mac(shapes.T, PHI)[:, 0], rtol=1e-12)
     shapes[:7, 4] = np.nan
-    own, _ = shape_agreement(shapes, PHI, [])
-    np.testing.assert_allclose(own[:7], mac(np.delete(shapes[:7], 4, 1).T, np.delete(PHI, 4, 0)), rtol=1e-12)
-    np.testing.assert_allclose(own[7:], mac(shapes[7:].T, PHI), rtol=1e-12)
+    few = mac(np.delete(shapes[:7], 4, 1).T, np.delete(PHI, 4, 0))[:, 0]
+    np.testing.assert_allclose(found(), [*few, *mac(shapes[7:].T, PHI)[:, 0]], rtol=1e-12)
 
 
 def test_shapes_of_close_modes_may_mix():

@@ -143,7 +143,7 @@ def test_rows_without_stamps_are_consecutive_within_a_state(fem_of_arrays):
     task = task_of(fem_of_arrays, T=T)
     assert list(task.X.index) == list(range(365 + 6 * 120))
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*(no-earlier-records|lags-without-stamps|weather-of-one-fold)")
+        warnings.filterwarnings("ignore", ".*(no-earlier-records|weather-of-one-fold)")
         detector = task.refit(with_memory(3, targets=[3, 4, 5, 6, 7, 8]))
         found = task.scoring.decisions(detector, task.X[365:]).values
         for start in range(0, len(found), 120):

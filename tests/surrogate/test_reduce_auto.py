@@ -1,6 +1,7 @@
 """Laws of ``reduce="auto"``: what is reduced, that results stay the same, and that the report says so."""
 
 import pickle
+import warnings
 from copy import deepcopy
 
 import numpy as np
@@ -12,7 +13,6 @@ from sklearn.linear_model import Ridge
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper, refitted
-from skthermo.surrogate._simulator import Simulator
 from tests.fem.frames import portal
 
 LARGE, SMALL = portal(4), make_truss()
@@ -120,13 +120,23 @@ def test_clones_memory_and_refits_decide_alike(tmp_path):
 
 
 TRUSS = make_truss()
-BOX = np.tile([0.9, 1.1], (4, 1))
 THETA = np.random.default_rng(0).uniform(0.92, 1.08, (5, 4))
 
 
-@pytest.fixture
+def simulator_of(theta, reduce):
+    """The simulator of a chain whose records are those of the truss at rows of theta."""
+    share = np.linspace(0, 1, len(theta))[:, np.newaxis]
+    order = np.argsort(theta[:, 0])
+    stamps = pd.date_range("2025", periods=len(theta), freq="D")
+    F = pd.DataFrame(TRUSS.frequencies(theta[order]), stamps).add_prefix("f")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of records that only serve as an example
+        return chain(TRUSS, reduce=reduce).fit(pd.DataFrame(30 * share, stamps, ["T"]), F).simulator_
+
+
+@pytest.fixture(scope="module")
 def simulator():
-    return Simulator(TRUSS, TRUSS.reduced(BOX, tol=1e-6, random_state=0), BOX, 1e-6)
+    return simulator_of(np.random.default_rng(2).uniform(0.9, 1.1, (60, 1)) ** [1.0, 0.5, 0.8, 0.6], 1e-6)
 
 
 CHANGES = [
@@ -136,10 +146,10 @@ CHANGES = [
     lambda one: one.changed("with_modes", [0, 1, 2]),
     lambda one: one.changed("with_added", stiffness=None, mass=np.eye(TRUSS.n_dof)),
     lambda one: one.changed("with_added", stiffness=None, mass=2 * np.eye(TRUSS.n_dof)),
-    lambda one: one.with_columns(["top"], {}, np.vstack([BOX, [[0.8, 1.0]]])),
-    lambda one: one.with_columns(["top"], {}, np.vstack([BOX, [[0.7, 1.0]]])),
-    lambda one: one.with_columns(["bottom"], {}, np.vstack([BOX, [[0.8, 1.0]]])),
-    lambda one: one.with_columns([], {"deck": np.eye(TRUSS.n_dof)}, np.vstack([BOX, [[0.8, 1.2]]])),
+    lambda one: one.with_columns(["top"], {}, np.vstack([one.box, [[0.8, 1.0]]])),
+    lambda one: one.with_columns(["top"], {}, np.vstack([one.box, [[0.7, 1.0]]])),
+    lambda one: one.with_columns(["bottom"], {}, np.vstack([one.box, [[0.8, 1.0]]])),
+    lambda one: one.with_columns([], {"deck": np.eye(TRUSS.n_dof)}, np.vstack([one.box, [[0.8, 1.2]]])),
 ]
 
 
@@ -173,7 +183,7 @@ def solved_rows(monkeypatch):
 
 
 def test_most_of_many_rows_come_from_a_surface(monkeypatch):
-    simulator = Simulator.around(TRUSS, USUAL, 1e-5).damaged({"top": 0.2})
+    simulator = simulator_of(USUAL, 1e-5).damaged({"top": 0.2})
     later = np.vstack([np.repeat(USUAL, 8, axis=0), [[1.3, 1, 1, 1]], [[np.nan, 1, 1, 1]], 2 * USUAL[:3]])
     numbers = solved_rows(monkeypatch)
     found = simulator.frequencies(later)
@@ -185,7 +195,7 @@ def test_most_of_many_rows_come_from_a_surface(monkeypatch):
 
 
 def test_few_rows_full_models_and_growing_damage_have_no_surface(monkeypatch):
-    few, exact = Simulator.around(TRUSS, USUAL, 1e-5), Simulator.around(TRUSS, USUAL, False)
+    few, exact = simulator_of(USUAL, 1e-5), simulator_of(USUAL, False)
     rows = np.repeat(USUAL, 10, axis=0)
     growing = few.with_damage_parameters(["top"], 0.0, 0.2)
     for simulator, theta in (

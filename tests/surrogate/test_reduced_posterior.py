@@ -6,7 +6,7 @@ import pytest
 from sklearn.linear_model import Ridge
 
 from skthermo.fem import AffineModel
-from skthermo.fem.affine import ReducedModel, _basis
+from skthermo.fem.affine import ReducedModel
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from tests.fem.frames import portal
 
@@ -60,14 +60,19 @@ def made(monkeypatch):
 @pytest.fixture
 def narrow(monkeypatch):
     """No basis is accurate far from the nominal state."""
-    estimated_errors = _basis.estimated_errors
 
-    def errors(full, core, vectors, theta, factors):
-        estimates, steps = estimated_errors(full, core, vectors, theta, factors)
-        far = (np.abs(theta - 1) > BOUNDS + 1e-9).any()
-        return np.ones_like(estimates) if far else estimates, steps
+    def refusing(cls):
+        reduced = cls.reduced
 
-    monkeypatch.setattr(_basis, "estimated_errors", errors)
+        def make(self, bounds, **options):
+            if (np.abs(np.asarray(bounds) - 1) > BOUNDS + 1e-9).any():
+                raise RuntimeError("after 4 rounds, errors are larger")
+            return reduced(self, bounds, **options)
+
+        monkeypatch.setattr(cls, "reduced", make)
+
+    for cls in (AffineModel, ReducedModel):
+        refusing(cls)
 
 
 def test_one_reduced_model_serves_the_inverse_and_predictions(made):
@@ -118,13 +123,3 @@ def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
     assert fem.report_.parameters.n_full_solves == 0  # beside a reduced model
     assert is_same(found, inverse(reduce=False).fit(F).invert(F))
     np.testing.assert_allclose(fem.predict(T), FRAME.frequencies(fem.predict_parameters(T)), rtol=1e-9)
-
-
-def test_a_basis_whose_errors_stay_large_is_given_up(monkeypatch):
-    random = np.random.default_rng(0)
-    monkeypatch.setattr(
-        _basis, "estimated_errors", lambda *state: (0.02 + 0.001 * random.random((len(state[3]), 1)), [])
-    )
-    with pytest.raises(RuntimeError, match=r"after .* rounds .* expected a larger tol, or narrower bounds") as error:
-        FRAME.reduced(0.01, random_state=0)
-    assert int(str(error.value).split()[1]) < 40  # the most

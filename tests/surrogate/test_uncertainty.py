@@ -14,7 +14,6 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
-from skthermo._core.frames import correlation_time
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
 from skthermo.residuals.baseline import BaselineResiduals, compared, order_statistic
@@ -66,13 +65,16 @@ def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, 
 def test_correlation_time_of_an_autoregressive_series(share_missing):
     series = autoregressive(20_000, 0.8)
     series[np.random.default_rng(1).random(len(series)) < share_missing] = np.nan
-    assert correlation_time(series) == pytest.approx((1 + 0.8) / (1 - 0.8), rel=0.2)
-    assert correlation_time(7 + 3 * series) == pytest.approx(correlation_time(series))
+    weather = np.random.default_rng(2).uniform(size=len(series))
+    found = residuals(weather, series).correlation_time
+    assert found == pytest.approx((1 + 0.8) / (1 - 0.8), rel=0.2)
+    assert residuals(weather, 7 + 3 * series).correlation_time == pytest.approx(found)
 
 
 def test_correlation_time_of_series_without_memory_is_one():
-    assert correlation_time(np.random.default_rng(0).standard_normal(5000)) == pytest.approx(1, abs=0.1)
-    assert correlation_time(np.full(100, np.nan)) == correlation_time(np.ones(100)) == correlation_time(np.ones(1)) == 1
+    weather, values = np.random.default_rng(0).standard_normal((2, 5000))
+    assert residuals(weather, values).correlation_time == pytest.approx(1, abs=0.1)
+    assert residuals(weather, np.ones(5000)).correlation_time == 1
 
 
 # Spread

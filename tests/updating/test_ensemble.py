@@ -8,7 +8,6 @@ import pytest
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.updating import ModelUpdater
-from skthermo.updating._ensemble import groups_beside
 from tests.fem.frames import portal
 
 TRUSS = make_truss()
@@ -128,14 +127,16 @@ def test_drawn_models_are_like_the_calibrated_one(model):
 
 def test_models_that_follow_their_modes_do_so_when_they_are_drawn():
     model = portal(2, track=True).with_modes([0, 1, 3, 2, 4, 5])
-    assert groups_beside(model, None) == ["beams"]  # whose torsion no parameter scales
-    assert groups_beside(model, ["columns", "soil"]) == []
     truth = [1.0, 1.0, 1.0, 1.02]
     F = model.frequencies([truth])[0]
     updater = ModelUpdater(model, bounds=0.7, prior=0.15).fit(F, frequency_std=0.01 * F)
     for drawn in updater.sample_models(3, random_state=0):
         assert drawn.track
         np.testing.assert_allclose(drawn.frequencies(ONE)[0], F, rtol=0.05)
+    for groups in (None, ["beams"]), ([], ["columns", "soil"]):  # no parameter scales the torsion of the beams
+        same = [updater.sample_models(3, groups=some, random_state=0) for some in groups]
+        for one, other in zip(*same, strict=True):
+            np.testing.assert_array_equal(one.frequencies(ONE), other.frequencies(ONE))
 
 
 def test_a_warning_counts_models_in_which_sorted_modes_swap_places():

@@ -204,7 +204,9 @@ def _doubtful_factors(terms: Terms, factors: Mapping[str, float]) -> list[str]:
     """Sentences about terms that seem to be less than their part of the whole."""
     doubts: list[str] = []
     rest, parts = terms.get(()), {key[0]: term for key, term in terms.items() if key}
-    for name, part in parts.items() if rest is not None else ():
+    if rest is None:
+        return doubts
+    for name, part in parts.items():
         others = [abs(other) for key, other in terms.items() if key and key != (name,)]
         shared = reduce(add, others).sum(axis=0) if others else np.zeros(part.shape[0])
         rows = np.flatnonzero((abs(part).sum(axis=0) > 0) & (shared == 0))

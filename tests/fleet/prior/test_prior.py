@@ -258,7 +258,7 @@ def test_impossible_weather_is_warned_of_once_also_within_a_compensator(prior):
     T, F, _ = records(50, 60)
     kelvin = T.assign(**{T.columns[0]: T.iloc[:, 0] + 273.15})
     mapper = prior.mapper().fit(T, F)
-    with pytest.warns(RecordsWarning, match="in 60 of 60 rows.*implausible-temperatures"):
+    with pytest.warns(RecordsWarning, match="implausible-temperatures"):
         mapper.predict(kelvin)
     held = TemperatureCompensator(prior.mapper(), targets=list(F.columns), cv="contiguous").fit(T.join(F))
     with pytest.warns() as warned:
