@@ -62,7 +62,7 @@ class SpecificFactors(OutlierMixin, BaseEstimator):
 
 
 class ConditionalCovariance(OutlierMixin, BaseEstimator):
-    """Minus the Mahalanobis distance among the records in the most similar weather; the targets are the last columns."""
+    """Minus the Mahalanobis distance among the records in the most similar weather; targets are the last columns."""
 
     def __init__(self, targets, n_neighbors=50):
         self.targets = targets
