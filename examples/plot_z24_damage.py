@@ -159,14 +159,15 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 #
 # That something has changed is sure, and the soil under the piers is where, with a probability of 95 %. What else has
 # changed is not: damage of three groups has a probability of 39 %, that of two groups 14 and 5 %, damage of the soil
-# alone 6 %, and beside something else 17 %. The truth, a pier that was lowered, is not a loss of stiffness of one group.
+# alone 6 %, and beside something else 17 %. The truth, a pier that was lowered, is not a loss of stiffness of one
+# group.
 
 IdentifiedDamageDisplay.from_predictions(found)
 
 # %%
 # .. image:: /images/z24_damage.png
-#    :alt: Explanations with their probabilities, 39 % for three groups and 17 % for the soil and something else; mean severities
-#          of five groups with credible intervals of 90 %, that of the soil the largest; shifts of four modes
+#    :alt: Explanations with their probabilities, 39 % for three groups and 17 % for the soil and something else; mean
+#          severities of five groups with credible intervals of 90 %, that of the soil the largest; shifts of four modes
 #
 # Simulated rates beside measured ones
 # ------------------------------------
