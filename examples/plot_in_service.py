@@ -52,8 +52,8 @@ baseline, later = records[:"2025"], records["2026":]
 # A detector, an FE model, a number of false alarms
 # -------------------------------------------------
 # The detector is any of ``skthermo.detection``: here the Mahalanobis distance of residuals of piecewise-linear
-# regression, as means of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The threshold is not a
-# share of the records, but what an owner asks for: one false alarm a year.
+# regression, as means of a day. The chain lets the monitor follow slow drift in the stiffness of the groups. The
+# threshold is not a share of the records, but what an owner asks for: one false alarm a year.
 
 fem = DataInformedFEM(make_truss(), random_state=0)
 fem.fit(baseline[campaign.temperatures.columns], baseline[modes])

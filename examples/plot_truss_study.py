@@ -21,12 +21,10 @@ import numpy as np
 import pandas as pd
 from detector_recipes import field_detectors
 from page_recipes import command_line, save_figures
-from sklearn.base import clone
-from sklearn.pipeline import make_pipeline
 from truss_recipes import GROUPS, HALVED, NOISE, SEVERITIES, Realisation, smallest, table_2, table_3
 
 from skthermo.datasets import make_truss, make_truss_campaign, truss_structure
-from skthermo.detection import DirectionalDetector, MahalanobisDetector
+from skthermo.detection import CompensatedDetector, DirectionalDetector, MahalanobisDetector
 from skthermo.fem import add_noise
 from skthermo.metrics import error_table
 from skthermo.plotting import DamageIndexDisplay, DetectorsDisplay, PODCurveDisplay, PredictionDisplay, StructureDisplay
@@ -160,8 +158,7 @@ draw_curves(plt.subplots(1, 3, figsize=(11, 4), layout="constrained", sharey=Tru
 # other weather and other training records, which make them wider.
 
 several = field_detectors(list(year.frequencies))
-compensator = clone(several["piecewise-linear"][0])
-several["directions of the model"] = make_pipeline(compensator, DirectionalDetector(fem))
+several["directions of the model"] = CompensatedDetector(DirectionalDetector(fem), targets=list(year.frequencies))
 chosen = ["raw, Mahalanobis", "raw, isolation forest", "raw, 20 neighbours", "linear regression", "piecewise-linear"]
 chosen += ["directions of the model"]
 tenth = [{}, *({group: 0.1} for group in GROUPS)]
@@ -178,7 +175,7 @@ display = DetectorsDisplay.from_estimator(comparison, "agreement")
 # with the covariance that it has learned. It needs no simulation, and no other study.
 
 detector = several["directions of the model"].fit(year.temperatures.join(year.frequencies))
-print(detector[-1].minimum_detectable_damage().round(3).to_string())
+print(detector.minimum_detectable_damage().round(3).to_string())
 StructureDisplay.from_estimator(detector, truss_structure())
 
 # %%

@@ -148,7 +148,10 @@ def alarm_table(records, detectors):
     rows = {}
     for label, detector in detectors.items():
         detector.fit(records.baseline)
-        rows[label] = {"false alarms": alarms(detector, records.later), "damage found": alarms(detector, records.damaged)}
+        rows[label] = {
+            "false alarms": alarms(detector, records.later),
+            "damage found": alarms(detector, records.damaged),
+        }
     return pd.DataFrame(rows).T
 
 

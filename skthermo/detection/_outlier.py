@@ -76,8 +76,7 @@ class OutlierDetector(DamageDetector):
     scatter more a larger weight; ``make_pipeline(StandardScaler(), OneClassSVM())`` weights all modes alike.
 
     Rows with a missing mode are left out of the baseline and cannot be evaluated: their damage index is NaN, and
-    ``predict`` gives 0. :doc:`/guide/detectors_theory` has the false alarms of several estimators, and when to set
-    ``block``.
+    ``predict`` gives 0. :doc:`/guide/detectors_theory` says when to set ``block``.
 
     Examples
     --------

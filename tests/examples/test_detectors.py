@@ -39,8 +39,8 @@ def targets(baseline):
 def fitted(baseline, targets):
     """Every detector, with the columns that it sees."""
     detectors = FIELD.field_detectors(targets, Ridge())
-    for name in ("boosted trees", "boosted trees, whitened"):
-        detectors[name].set_params(temperaturecompensator__estimator__estimator__n_estimators=10)
+    for name in ("boosted trees", "boosted trees, regimes"):
+        detectors[name].set_params(regressor__estimator__n_estimators=10)
     sees = {name: targets if name.startswith("raw") else list(baseline) for name in detectors}
     return {name: (detector.fit(baseline[sees[name]]), sees[name]) for name, detector in detectors.items()}
 
@@ -62,7 +62,7 @@ def test_every_rate_of_false_alarms_is_the_one_asked_for(fitted, baseline, later
     rank = int(np.ceil((n + 1) * (1 - asked)))
     lowest, highest = betabinom(len(later), n + 1 - rank, rank).ppf([0.0005, 0.9995])
     alarms = {name: (detector.predict(later[sees]) == -1).sum() for name, (detector, sees) in fitted.items()}
-    assert {"chain", "chain, whitened"} <= set(alarms)
+    assert {"chain", "chain, regimes"} <= set(alarms)
     assert not {name: n for name, n in alarms.items() if not lowest <= n <= highest}
 
 
@@ -83,7 +83,7 @@ def test_gaps_are_not_evaluated_by_those_that_need_complete_rows(fitted, later, 
     for name, (detector, sees) in fitted.items():
         with pytest.warns(UserWarning, match="not-predicted|not-evaluated"):
             decisions = detector.predict(gaps[sees])
-        last = detector[-1] if hasattr(detector, "steps") else detector
+        last = getattr(detector, "detector", detector)
         unknown = [3] if isinstance(last, MahalanobisDetector) else [1, 3]
         np.testing.assert_array_equal(np.flatnonzero(decisions == 0), unknown, err_msg=name)
 
@@ -113,6 +113,17 @@ def test_a_factor_common_to_all_columns_counts_little():
     assert -specific.score_samples(rows).mean() == pytest.approx(length, rel=0.05)
 
 
+def test_a_conditional_covariance_is_that_of_records_in_similar_weather():
+    """The scatter grows in frost: the same departure counts there less."""
+    random = np.random.default_rng(0)
+    T = np.r_[np.full(300, -5.0), np.full(300, 10.0)] + random.normal(size=600)
+    F = np.where(T < 2, 3.0, 1.0)[:, np.newaxis] * random.normal(size=(600, 2)) + np.outer(T, [1.0, 2.0])
+    detector = FIELD.ConditionalCovariance(2, n_neighbors=100).fit(np.column_stack([T, F]))
+    frost, mild = -detector.score_samples([[-5.0, -5.0 + 6, -10.0], [10.0, 10.0 + 6, 20.0]])
+    assert frost == pytest.approx(6 / 3, rel=0.25)
+    assert mild == pytest.approx(6 / 1, rel=0.25)
+
+
 def test_columns_that_wander_together_are_evaluated_by_what_keeps_them_together():
     random = np.random.default_rng(0)
     walk = random.normal(size=600).cumsum()
@@ -137,6 +148,6 @@ def test_blocks_are_as_long_as_wanted(targets):
     rows = pd.DataFrame(np.random.default_rng(0).normal(size=(400, 6)), stamps, targets)
     for name, detector in FIELD.field_detectors(targets, block="1D").items():
         if "neighbours" in name:
-            last = detector[-1] if hasattr(detector, "steps") else detector
+            last = getattr(detector, "detector", detector)
             assert last.block == "1D"
     FIELD.field_detectors(targets, block="1D")["raw, 20 neighbours"].fit(rows)

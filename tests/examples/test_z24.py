@@ -18,7 +18,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:.*few-baseline-records"),  # 240 of them, and windows in ten days
 ]
 
-FEW = ("raw, Mahalanobis", "raw, 20 neighbours", "piecewise-linear", "piecewise-linear, whitened", "linear regression")
+FEW = ("raw, Mahalanobis", "raw, 20 neighbours", "piecewise-linear", "piecewise-linear, regimes", "linear regression")
 
 
 @functools.cache
@@ -101,13 +101,11 @@ def test_the_chain_predicts_nearly_as_well_as_a_direct_regression(frozen):
 
 
 @pytest.mark.nightly
-def test_a_spread_by_weather_finds_the_damage_at_few_false_alarms(frozen):
-    records = Z24.Records.of(frozen)
-    table = Z24.alarm_table(
-        {label: Z24.compensate(records, Z24.TemperatureMapper(), whiten)[0] for label, whiten in Z24.WHITENINGS.items()}
-    )
+def test_two_regimes_find_the_damage_at_few_false_alarms(frozen):
+    ways = {label: Z24.compensated(regimes=regimes) for label, regimes in Z24.REGIMES.items()}
+    table = Z24.alarm_table(Z24.Records.of(frozen), ways)
     assert (table["false alarms"] <= 5).all()
-    assert table["damage found"][Z24.WHITENED] > 95
+    assert table["damage found"]["two regimes"] > 95
 
 
 @pytest.mark.nightly
