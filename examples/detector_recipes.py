@@ -62,20 +62,20 @@ class SpecificFactors(OutlierMixin, BaseEstimator):
 
 
 class ConditionalCovariance(OutlierMixin, BaseEstimator):
-    """Minus the Mahalanobis distance among the records whose temperatures, all but the last columns, are nearest."""
+    """Minus the Mahalanobis distance among the records in the most similar weather; targets are the last columns."""
 
-    def __init__(self, n_targets, n_neighbors=50):
-        self.n_targets = n_targets
+    def __init__(self, targets, n_neighbors=50):
+        self.targets = targets
         self.n_neighbors = n_neighbors
 
     def fit(self, X, y=None):
-        T, self.F_ = np.split(np.asarray(X), [-self.n_targets], axis=1)
+        T, self.F_ = np.split(np.asarray(X), [-len(self.targets)], axis=1)
         self.scaler_ = StandardScaler().fit(T)
         self.weather_ = NearestNeighbors(n_neighbors=self.n_neighbors).fit(self.scaler_.transform(T))
         return self
 
     def score_samples(self, X):
-        T, F = np.split(np.asarray(X), [-self.n_targets], axis=1)
+        T, F = np.split(np.asarray(X), [-len(self.targets)], axis=1)
         near = self.F_[self.weather_.kneighbors(self.scaler_.transform(T), return_distance=False)]
         mean = near.mean(axis=1)
         centred = near - mean[:, np.newaxis]
@@ -141,6 +141,6 @@ def field_detectors(targets, estimator=None, random_state=0, *, contamination=0.
         detectors |= {name: compensated(regressor), f"{name}, regimes": compensated(regressor, regimes="auto")}
     for name in ("isolation forest", "20 neighbours"):
         detectors[f"piecewise-linear, {name}"] = compensated(regressors["piecewise-linear"], outlier(name))
-    nearby = ConditionalCovariance(len(targets))
+    nearby = ConditionalCovariance(targets)
     detectors["conditional covariance"] = OutlierDetector(nearby, contamination, block=block)
     return detectors

@@ -59,9 +59,8 @@ monitor.update(after[after.index < soon])
 print(monitor.rebaseline(works_end).summary())
 
 # %%
-# A month later, a refit would add the new records. It says whether that is a gain; here it is none, because the hard
-# frost then raises the threshold, and the detector of the new baseline stays in charge. No record of the strengthened
-# bridge is in alarm until January.
+# A month later, a refit adds the new records, and says whether that is a gain. No record of the strengthened bridge is
+# in alarm until January.
 
 month = works_end + pd.Timedelta(days=30)
 monitor.update(after[(after.index >= soon) & (after.index < month)])

@@ -14,7 +14,7 @@ PER_DAY = 8  # records
 LIMIT = 0.02  # of false alarms
 GRID = {
     "regressor__lagfeatures__lags": [1, 4, 8],
-    "regimes": [None, "auto"],
+    "regimes": [None, ("T2", 5.0)],  # in degrees Celsius
     "window": [None, "24h"],
 }
 

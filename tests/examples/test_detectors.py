@@ -118,7 +118,7 @@ def test_a_conditional_covariance_is_that_of_records_in_similar_weather():
     random = np.random.default_rng(0)
     T = np.r_[np.full(300, -5.0), np.full(300, 10.0)] + random.normal(size=600)
     F = np.where(T < 2, 3.0, 1.0)[:, np.newaxis] * random.normal(size=(600, 2)) + np.outer(T, [1.0, 2.0])
-    detector = FIELD.ConditionalCovariance(2, n_neighbors=100).fit(np.column_stack([T, F]))
+    detector = FIELD.ConditionalCovariance(["f1", "f2"], n_neighbors=100).fit(np.column_stack([T, F]))
     frost, mild = -detector.score_samples([[-5.0, -5.0 + 6, -10.0], [10.0, 10.0 + 6, 20.0]])
     assert frost == pytest.approx(6 / 3, rel=0.25)
     assert mild == pytest.approx(6 / 1, rel=0.25)
