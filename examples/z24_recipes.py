@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 from page_recipes import command_line
 from sklearn.ensemble import GradientBoostingRegressor
@@ -129,8 +130,8 @@ class Records(NamedTuple):
 def residuals(records, targets=FREQUENCIES):
     """What the default regression leaves of the records, of the baseline out of fold, in percent."""
     compensator = TemperatureCompensator(targets=targets)
-    baseline = 100 * compensator.fit_transform(records.baseline)
-    return records.each(lambda frame: 100 * compensator.transform(frame), baseline)
+    baseline = compensator.fit_transform(records.baseline)
+    return records.each(compensator.transform, baseline).each(lambda frame: 100 * np.expm1(frame))
 
 
 def compensated(detector=None, regressor=None, targets=FREQUENCIES, **options):
