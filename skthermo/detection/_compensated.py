@@ -16,7 +16,7 @@ from sklearn.utils.metaestimators import available_if
 
 from skthermo._core.arrays import Array, as_floats, check_probability, median, robust_deviation
 from skthermo._core.estimators import Estimator, HasMethods, Interval, StrOptions, _fit_context, check_is_fitted
-from skthermo._core.frames import column_names, first_disorder, frame_like, has_stamps, row_times
+from skthermo._core.frames import check_duration, column_names, first_disorder, frame_like, has_stamps, row_times
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import DamageDetector, DamageIndexMixin, mean_log_density
 from skthermo.detection._compensator import TemperatureCompensator
@@ -355,7 +355,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         """The input, by name or position, and the value at which records are divided."""
         names = column_names(T, "") if isinstance(T, pd.DataFrame) else list(range(T.shape[1]))
         if isinstance(self.regimes, tuple):
-            if len(self.regimes) != 2 or self.regimes[0] not in names:
+            if len(self.regimes) != 2 or self.regimes[0] not in names or not isinstance(self.regimes[1], Real):
                 raise ValueError(f"regimes is {self.regimes!r}; expected an input among {names}, and a value")
             return self.regimes[0], float(self.regimes[1])
         if self.regimes is None or self.window is not None:
@@ -379,6 +379,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
                 f"window is {self.window!r}, a time, but the records are not a frame with a stamp for each; expected a "
                 "DatetimeIndex, or a number of records as the window"
             )
+        if not isinstance(self.window, Integral):
+            check_duration(self.window, "window", may_be_zero=False)
         row = first_disorder(X)
         if row:
             raise ValueError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -64,8 +64,9 @@ def solve_rows(
     places = np.split(known, range(size, len(known), size))
     thread_safe = getattr(model, "thread_safe", False)
     job = Job(model.quiet() if thread_safe else model, method, dofs)  # type: ignore[attr-defined]
+    parts: Generator[Any, None, None]
     if thread_safe and effective_n_jobs(n_jobs) == 1:
-        parts: Iterator[Any] = map_on_blas_threads(lambda rows: (job(rows), []), [theta[place] for place in places])
+        parts = map_on_blas_threads(lambda rows: (job(rows), []), [theta[place] for place in places])
     else:
         jobs = (delayed(on_one_thread)(job, theta[place]) for place in places)
         parts = as_they_come(jobs, n_jobs=n_jobs, prefer=getattr(model, "prefer", None))

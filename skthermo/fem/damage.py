@@ -74,7 +74,7 @@ def as_directions(slopes: Array, groups: Sequence[str], modes: Sequence[Any]) ->
     """A row for each group that moves a frequency, by more than rounding (1e-9)."""
     import pandas as pd
 
-    moved: NDArray[np.bool_] = np.any(np.abs(slopes) > 1e-9, axis=1)
+    moved: Any = np.any(np.abs(slopes) > 1e-9, axis=1)
     if not moved.any():
         raise ValueError(f"no loss of stiffness of the groups {groups} moves a frequency; expected one that does")
     return pd.DataFrame(slopes[moved], [group for group, has in zip(groups, moved, strict=True) if has], list(modes))

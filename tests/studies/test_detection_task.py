@@ -315,6 +315,11 @@ def test_confirmation_in_the_same_weather_says_so(fem):
     assert table["optimism"].item() != 0  # also with the seed of the task, the noise is fresh
 
 
+def test_unknown_weather_is_warned_of(fem):
+    with pytest.warns(UserWarning, match="look like kelvin.*outside-training-weather"):
+        task_of(fem, T=WEATHER + 273.15)
+
+
 def test_scenarios_of_uncertain_severity_are_drawn_anew(fem):
     uncertain = UncertainDamage("uncertain", pd.DataFrame({"bottom": [0.1, 0.2]}))
     task = task_of(fem, [Scenario("healthy"), uncertain])

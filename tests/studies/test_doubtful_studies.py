@@ -57,11 +57,13 @@ def test_a_blind_detector_is_said_to_be_blind(fem):
         assert minimum["mdd"].isna().all()
 
 
-def test_one_warning_counts_the_families_whose_curves_lie_beside_their_points(fem):
+def test_one_warning_for_all_families_whose_curves_lie_beside_their_points(fem):
     both = study(fem, sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"]))
     results = both.run(WEATHER)
     results.loc[results["measure"] == "POD", "rate"] = [0.3, 0.35, 0.99] * 2
-    with pytest.warns(UserWarning, match="of 3 .*1 time more for other families.*poor-curve-fit") as caught:
+    with pytest.warns(
+        UserWarning, match="of 3 .*for other families or sources, more than once.*poor-curve-fit"
+    ) as caught:
         both.minimum_detectable_damage(method="curve")
     assert len(caught) == 1
 

@@ -485,6 +485,7 @@ def _task(
     n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
     index = _moved(T, baseline, n_repeats * n_scenarios)
     with warnings_once("in the simulations of this task"), single_blas_thread():
+        warn_each(fem.thermal_.doubts(fem.weather(T)))
         clean = clean_frequencies(fem, scenarios, T, len(seeds))
         simulation = Simulation(fem, {}, scenarios, T, clean, measurement, None)
         tables = [
