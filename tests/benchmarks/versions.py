@@ -50,7 +50,7 @@ class OtherVersion:
         return done
 
     def run_file(self, file, words):
-        settings = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        settings = os.environ | {"PYTHONPATH": str(self.source / "examples")}  # recipes for that package
         programs = self.environment / ("Scripts" if os.name == "nt" else "bin")
         return run_python(programs / "python", file, words, settings)
 
