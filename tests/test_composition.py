@@ -64,5 +64,4 @@ def test_short_files_have_a_reason():
 def test_the_guide_for_contributors_lists_what_all_packages_share():
     section = HOUSE.read_text().partition("What every package may use: ``_core``\n")[2].partition("\nDependencies\n")[0]
     listed = set(re.findall(r"``(\w+)\.py``", section)) - {"exceptions"}
-    kept = {"text_matrices", "matrix_child"}  # of matrix_files
-    assert listed == {path.stem for path in (PACKAGE / "_core").glob("[a-z]*.py")} - kept
+    assert listed == {path.stem for path in (PACKAGE / "_core").glob("[a-z]*.py")}

@@ -238,9 +238,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_base.py", "detection/test_mahalanobis.py"): [
         ("rows that cannot be evaluated", "np.where(unknown, 0, ", "np.where(unknown, 1, "),
     ],
-    ("_core/warnings.py", "surrogate/test_report.py"): [
-        ("a warning for each fold", "if kind in given:", "if kind in given and not in_folds:"),
-    ],
     ("_core/parallel.py", "test_threads.py"): [
         ("limits around threads", "if effective_n_jobs(n_jobs) > 1 else", "if effective_n_jobs(n_jobs) > 9 else"),
     ],

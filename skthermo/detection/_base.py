@@ -168,8 +168,10 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     Examples
     --------
     >>> import numpy as np
+    >>> from sklearn.linear_model import LinearRegression
+    >>> from sklearn.pipeline import make_pipeline
     >>> from skthermo.datasets import make_truss_campaign
-    >>> from skthermo.detection import DamageDetector
+    >>> from skthermo.detection import DamageDetector, TemperatureCompensator
     >>> class LargestDeviation(DamageDetector):
     ...     def _learn(self, F, times):
     ...         self.mean_, self.std_ = np.nanmean(F, axis=0), np.nanstd(F, axis=0)
@@ -179,8 +181,10 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     ...     def _index(self, F):
     ...         return np.fmax.reduce(np.abs(F - self.mean_) / self.std_, axis=1)
     >>> year = make_truss_campaign(random_state=0)
-    >>> detector = LargestDeviation().fit(year.frequencies)
-    >>> print(f"{(detector.predict(year.frequencies) == -1).mean():.0%} alarms")
+    >>> baseline = year.temperatures.join(year.frequencies)
+    >>> residuals = TemperatureCompensator(LinearRegression(), targets=list(year.frequencies))
+    >>> detector = make_pipeline(residuals, LargestDeviation()).fit(baseline)
+    >>> print(f"{(detector.predict(baseline) == -1).mean():.0%} alarms")
     2% alarms
     """
 

@@ -111,6 +111,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
     >>> for window in (None, 7):
     ...     detector = CompensatedDetector(directional, targets=list(year.frequencies), window=window)
     ...     print(f"{(detector.fit(baseline).score_samples(later) < detector.offset_).mean():.0%}")
+    43%
+    99%
     """
 
     _parameter_constraints: dict = {
