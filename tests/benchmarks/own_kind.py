@@ -10,7 +10,6 @@ three kinds, and raw frequencies. Beside them stand the same alarms on measured 
 import pandas as pd
 from harness import DATA, arguments, compensated, recipes, shown
 from sklearn.ensemble import GradientBoostingRegressor
-from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neural_network import MLPRegressor
 
 from skthermo.surrogate import TemperatureMapper
@@ -24,7 +23,7 @@ def kinds():
     network = MLPRegressor(
         hidden_layer_sizes=(64,), alpha=1.0, learning_rate_init=0.003, max_iter=2000, n_iter_no_change=20
     )
-    trees = MultiOutputRegressor(GradientBoostingRegressor(random_state=0))
+    trees = GradientBoostingRegressor(random_state=0)  # one for each output
     regressors = {"piecewise-linear": None, "boosted trees": trees, "network": network}
     return {name: TemperatureMapper(regressor, random_state=0) for name, regressor in regressors.items()}
 
