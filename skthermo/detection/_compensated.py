@@ -16,7 +16,7 @@ from sklearn.utils.metaestimators import available_if
 
 from skthermo._core.arrays import Array, as_floats, check_probability, median, robust_deviation
 from skthermo._core.estimators import Estimator, HasMethods, Interval, StrOptions, _fit_context, check_is_fitted
-from skthermo._core.frames import check_duration, column_names, first_disorder, frame_like, has_stamps, row_times
+from skthermo._core.frames import column_names, first_disorder, frame_like, has_stamps, row_times
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import DamageDetector, DamageIndexMixin, mean_log_density
 from skthermo.detection._compensator import TemperatureCompensator
@@ -327,7 +327,11 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         return score
 
     def _index_of(self, X: Any) -> Array:
-        return self._by_regime(X, lambda detector, Z: detector._index_of(Z), are_indices=True)
+        def index(detector: Any, Z: pd.DataFrame) -> Array:
+            with collected():  # records without an index are counted once, over all regimes
+                return -np.asarray(detector.score_samples(Z))
+
+        return self._by_regime(X, index, are_indices=True)
 
     def _by_regime(self, X: Any, value: Callable[[Any, pd.DataFrame], Array], *, are_indices: bool = False) -> Array:
         """Values that the detector of the regime of each record gives."""
@@ -381,8 +385,6 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
                 f"window is {self.window!r}, a time, but the records are not a frame with a stamp for each; expected a "
                 "DatetimeIndex, or a number of records as the window"
             )
-        if not isinstance(self.window, Integral):
-            check_duration(self.window, "window", may_be_zero=False)
         row = first_disorder(X)
         if row:
             raise ValueError(

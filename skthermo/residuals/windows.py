@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, median, robust_deviation
-from skthermo._core.frames import has_stamps
+from skthermo._core.frames import check_duration, has_stamps
 
 Regimes = NDArray[np.intp]
 
@@ -25,7 +26,7 @@ class WindowMeans:
     stamps.
     """
 
-    window: Any
+    window: int | pd.Timedelta
     width: int
     share: float
     limits: Array
@@ -35,7 +36,7 @@ class WindowMeans:
     @property
     def lookback_(self) -> int | np.timedelta64:
         """How long before a record its window begins: a number of rows, or a time."""
-        return self.window - 1 if isinstance(self.window, int) else pd.Timedelta(self.window).to_timedelta64()
+        return self.window - 1 if isinstance(self.window, int) else self.window.to_timedelta64()
 
     @classmethod
     def fitted(
@@ -46,6 +47,7 @@ class WindowMeans:
         A residual counts as no farther from the median of its regime than so many robust standard deviations, so that
         an outlier does not dominate a mean.
         """
+        window = int(window) if isinstance(window, Integral) else check_duration(window, "window", may_be_zero=False)
         values, numbers = residuals.to_numpy(), range(regime.max() + 1)
         middle = np.array([median(values[regime == k]) for k in numbers])
         reach = farthest * np.array([robust_deviation(values[regime == k]) for k in numbers])
@@ -57,7 +59,7 @@ class WindowMeans:
             first = len(residuals) - window if isinstance(window, int) else 0
             recent = slice(max(first, 0), None)
             if not isinstance(window, int):
-                recent = residuals.index > residuals.index[-1] - pd.Timedelta(window)
+                recent = residuals.index > residuals.index[-1] - window
             history = residuals[recent], regime[recent]
         ones = pd.Series(1.0, residuals.index)
         width = window if isinstance(window, int) else int(ones.rolling(window).count().max())

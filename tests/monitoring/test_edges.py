@@ -283,7 +283,7 @@ def test_units_are_honest_and_checked():
 
 def test_a_number_that_loggers_write_is_a_value_where_the_baseline_reaches_it():
     records = pd.DataFrame({"d": [-150.0, -99.0, 120.0], "f": [2.0, -99.0, 2.1]})
-    wrong = Plausible.of(records, ["d", "f"]).implausible(records.to_numpy())
+    wrong = Plausible.learned(records, ["d", "f"]).implausible(records.to_numpy())
     assert wrong.tolist() == [[False, False], [False, True], [False, False]]
 
 

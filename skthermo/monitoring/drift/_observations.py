@@ -282,6 +282,8 @@ def checked_records(fem: Any, T: Any, F: Any) -> tuple[Any, Any]:
         raise ValueError(f"T has {T.shape[1]} columns, {list(T.columns)}; expected {fem.n_features_in_}, as in fit")
     if list(F.columns) != fem.mode_names_:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
+    if not len(F):
+        raise ValueError("F has 0 samples; expected at least one record")
     found = set_aside(T, F, model=fem.model, exclude={"no-rows"})
     warn_each(found.others.warnings(exclude={"unsorted-stamps"}))
     T, F = (
