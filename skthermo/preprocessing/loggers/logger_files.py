@@ -124,7 +124,10 @@ def in_zone(table: pd.DataFrame, zone: Any, file: Path) -> pd.DataFrame:
 
 
 def _parquet(file: Path) -> pd.DataFrame:
-    table = pd.read_parquet(file)
+    try:
+        table = pd.read_parquet(file)
+    except ImportError as error:  # as of any other file that cannot be read: it keeps no other out
+        raise ValueError(f"{file}: 'pyarrow' is not installed; get it with: pip install pyarrow") from error
     table = table if isinstance(table.index, pd.DatetimeIndex) else table.set_index(table.columns[0])
     if not isinstance(table.index, pd.DatetimeIndex):
         raise ValueError(f"{file}: the first column holds {table.index.dtype}; expected times")
