@@ -163,7 +163,7 @@ PredictionDisplay.from_predictions(
 # Is it right on records that it has not seen?
 # --------------------------------------------
 # :meth:`~skthermo.surrogate.DataInformedFEM.extrapolation_distance` says how far the weather of the test is outside
-# that of the training. Errors stand beside those of a ridge regression from temperatures straight to frequencies,
+# that of the training. Errors are compared with those of a ridge regression from temperatures straight to frequencies,
 # which knows nothing of a structure: the chain loses little against it, and can be damaged.
 
 beyond = fem.extrapolation_distance(T[n_train:]).max(axis=1)

@@ -106,7 +106,7 @@ def show_rest():
 def shown(title, table, digits=2):
     """Print a table, rounded or, as "3g", to some digits in all, and keep it for ``--out``.
 
-    With ``--against``, columns of the other version stand beside it.
+    With ``--against``, columns of the other version follow it.
     """
     table = table.to_frame("") if isinstance(table, pd.Series) else table
     form = f".{digits}" if isinstance(digits, str) else f".{digits}f"
