@@ -116,7 +116,7 @@ def expected_failures(estimator):
 
 
 ESTIMATORS = [
-    ExponentialMeans([3]),
+    ExponentialMeans(half_lives=[3]),
     LagFeatures(),
     HampelFilter(),
     HingeFeatures(),

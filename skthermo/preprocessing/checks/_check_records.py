@@ -24,8 +24,6 @@ from skthermo._core.arrays import (
 )
 from skthermo._core.estimators import check_array
 from skthermo._core.frames import YEAR, column_names, columns_by_sensor, correlation_time, has_stamps, row_times
-from skthermo.preprocessing._find_memory import MemoryFindings, find_memory, is_of_weeks, lines_of
-from skthermo.preprocessing._past import trailing_means
 from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, predicted_by_weather
 from skthermo.preprocessing.checks._record_findings import RecordFinding, RecordFindings, findings_table, period_of
 from skthermo.preprocessing.checks._set_aside import CleanedRecords
@@ -43,7 +41,7 @@ def check_records(
     It looks for gross errors first: arguments that are no tables of numbers, wrong times, numbers that stand for
     missing values, other units, empty, constant or equal columns, tables that are exchanged or have different rows. No
     argument makes it fail. Such values are then left out, and it looks for stuck sensors and modes, weather that
-    explains nothing, temperatures of another time, modes exchanged in some rows, outliers, memory, steps and trends.
+    explains nothing, temperatures of another time, modes exchanged in some rows, outliers, steps and trends.
     One table alone is checked for gross errors only, which takes milliseconds for a year of hourly records. A finding
     is a reason to look at the records, no proof of a fault.
 
@@ -73,7 +71,6 @@ def check_records(
     See Also
     --------
     HampelFilter : Puts NaN in place of outliers.
-    find_memory : Means of earlier temperatures, also over hours, that explain the frequencies.
     residual_trend : The trend of residuals of any regression.
 
     Notes
@@ -98,15 +95,14 @@ def check_records(
         Bounds and reports are in degrees Celsius. Subtract 273.15
     """
     cleaned = CleanedRecords(temperatures, frequencies, unit=unit, model=model)
-    far, findings, memory = cleaned.outliers(), cleaned.findings, None
+    far, findings = cleaned.outliers(), cleaned.findings
     if cleaned.belong_together:
         records = RecordsInOrder(cleaned, unit)
         findings = [*findings, *records.findings()]
         far.iloc[records.order] |= records.are_outliers
-        memory = records.memory
     table = findings_table(findings)
     cleaned.set_stuck_aside()
-    return RecordFindings(table, cleaned.n_rows, far, memory, **cleaned.tables(), left_out=cleaned.left_out())
+    return RecordFindings(table, cleaned.n_rows, far, **cleaned.tables(), left_out=cleaned.left_out())
 
 
 class RecordsInOrder:
@@ -131,7 +127,6 @@ class RecordsInOrder:
         self.F = cleaned.useful_values(F)[rows]
         self.order, self.unit = T.order[rows], f" {unit}" if unit else ""
         self.are_outliers = np.zeros(self.F.shape, dtype=bool)
-        self.memory: MemoryFindings | None = None
         is_useless = np.isnan(useful) & (T.were_known | np.isnan(T.values).all(axis=0))
         self.has_faulty_sensors = bool(is_useless.mean(axis=0).max() > 0.01)
         self.has_wrong_times = cleaned.have_wrong_times
@@ -155,8 +150,7 @@ class RecordsInOrder:
         folds = BlockedKFold().fold_of(pd.DataFrame(index=self.index) if is_timed else self.T)
         yield from self._exchanged_modes(lines, folds)
         yield from self._outliers(self._far_from_neighbours(lines, folds))
-        slow = list(self._slow_means())
-        changes, level = self._changes(np.hstack([lines, past, *(inputs for _, inputs in slow)]))
+        changes, level = self._changes(np.hstack([lines, past]))
         F = self.F - level  # a step or a trend would pass for a season of another time
         shift = self._shift(lines, past, places, F, folds)
         if shift is not None:
@@ -171,8 +165,6 @@ class RecordsInOrder:
             )
             yield RecordFinding.in_rows(self.index, "no-thermal-effect", "", usable, detail)
             return
-        for finding, _ in slow:
-            yield finding
         yield from changes
 
     def _stuck(self, what: str, table: Array, names: list[Hashable], unit: str) -> Iterator[RecordFinding]:
@@ -247,31 +239,6 @@ class RecordsInOrder:
                 yield RecordFinding.in_rows(self.index, "frequency-outliers", name, rows, detail)
         self.F[far] = np.nan
         self.are_outliers |= far
-
-    def _slow_means(self) -> Iterator[tuple[RecordFinding, Array]]:
-        """Findings of memory of weeks, each with piecewise-linear functions of the mean that explains it."""
-        types = set(map(type, (*self.sensors, *self.modes)))
-        are_named = types == {str} and len(set(self.modes)) == len(self.modes)
-        if self.has_faulty_sensors or self.has_wrong_times or not are_named:
-            return
-        self.memory = find_memory(
-            pd.DataFrame(self.T, self.index, self.sensors), pd.DataFrame(self.F, self.index, self.modes)
-        )
-        chosen = self.memory.table[self.memory.table["chosen"].astype(bool)]
-        usable = np.flatnonzero(~np.isnan(self.F).all(axis=1))
-        for (constant, sensor), part in chosen.groupby(["time_constant", "sensor"], sort=False):
-            duration = pd.Timedelta(constant)
-            if is_of_weeks(duration):
-                times, length = self.index.as_unit("ns").asi8, duration.as_unit("ns").value
-                mean = trailing_means(times, self.T[:, [self.sensors.index(sensor)]], length)
-                before = np.exp(-(times - times[0]) / length)[:, np.newaxis]  # weight of the weather before the records
-                detail = (
-                    f"the mean of {sensor!r} with a time constant of {duration.days} days lowers the error "
-                    f"in periods held out by {part['fall'].mean():.0%}: "
-                    f"ExponentialMeans(['{constant}'], sensors=[{sensor!r}])"
-                )
-                inputs = np.hstack([lines_of(mean[:, 0]), before, before * mean])
-                yield RecordFinding.in_rows(self.index, "slow-temperatures", sensor, usable, detail), inputs
 
     def _shift(self, lines: Array, past: Array, places: Array, F: Array, folds: Rows) -> RecordFinding | None:
         """A finding where temperatures of other rows explain clearly more than the row's own and its past."""

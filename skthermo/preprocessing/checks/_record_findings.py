@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from skthermo._core.frames import Table, midnight
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing._find_memory import MemoryFindings
 
 WARNINGS = {
     "no-table": "the argument is no table of numbers: {}. Nothing can be learned from it. Give a DataFrame or a "
@@ -82,8 +81,6 @@ WARNINGS = {
     "frequency-outliers": "frequencies are far from their neighbours in time and from a regression on the weather: {}. "
     "Impossible values are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
     "HampelFilter does",
-    "slow-temperatures": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
-    "taken for changes of the structure. Append these means to the inputs of the regression",
     "sudden-change": "frequencies change at once, and the weather does not explain it: {}. Both levels would be "
     "learned as healthy. Fit on records of one structure, in one state and by one way of identification",
     "trend": "residuals of the frequencies beside the weather have a trend: {}. A detector takes a trend that goes on "
@@ -174,8 +171,6 @@ class RecordFindings(SavesFrames):
         Number of records.
     outliers : DataFrame of bool of shape (n_records, n_modes), optional
         Which frequencies are outliers, on the records' index.
-    memory : MemoryFindings, optional
-        The result of `find_memory`; None where memory was not looked for.
     temperatures, frequencies : array-like or DataFrame, optional
         The tables as they were given, NaN in place of values that cannot be measurements, as `set_aside` gives them.
     left_out : dict, optional
@@ -196,7 +191,6 @@ class RecordFindings(SavesFrames):
     table: pd.DataFrame
     n_rows: int
     outliers: pd.DataFrame | None = None
-    memory: MemoryFindings | None = None
     temperatures: Table | None = None
     frequencies: Table | None = None
     left_out: dict[Hashable, str] = field(default_factory=dict)

@@ -172,41 +172,37 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
 class CheckedRecords(NamedTuple):
     """Records that a chain learns, without values that cannot be; ``usable`` frequencies are without outliers.
 
-    ``findings`` is what `check_records` has found, ``means`` the transformer that gives means of earlier temperatures
-    which the frequencies remember, if they do, and ``doubts`` hold warnings.
+    ``findings`` is what `check_records` has found, and ``doubts`` hold warnings.
     """
 
     temperatures: Table
     frequencies: Table
     usable: Table
     findings: RecordFindings
-    means: BaseEstimator | None
     doubts: list[SkthermoWarning]
 
 
-def checked_records(
-    T: Table, F: Table, model: FEModel, memory: str | Memory | None, *, uses_means: bool
-) -> CheckedRecords:
+def checked_records(T: Table, F: Table, model: FEModel, memory: str | Memory | None) -> CheckedRecords:
     """Check the records that a chain was given, once for all of its parts.
 
-    There is no warning of outliers, which train nothing, nor of slow temperatures for a chain that uses means of them.
+    There is no warning of outliers, which train nothing.
     """
     with collected() as doubts:
         found = set_aside(T, F, model=model, needs_all=True)
     findings = remembered(memory, check_records, T, F)
     T, F = found.temperatures, found.frequencies
-    mended = {"frequency-outliers"} | ({"slow-temperatures"} if uses_means else set())
-    doubts += [*findings.warnings(exclude=mended), *misplaced_columns(T, F), *doubts_of_modes(model, F)]
-    means = getattr(findings.memory, "features", None)
-    if means is not None and not set(means.sensors) <= set(column_names(T, "T")):
-        means = None
+    doubts += [
+        *findings.warnings(exclude={"frequency-outliers"}),
+        *misplaced_columns(T, F),
+        *doubts_of_modes(model, F),
+    ]
     far = findings.outliers
     if isinstance(F, pd.DataFrame) and far.index.is_unique:  # findings may be of longer tables
         far = far.reindex(index=F.index, columns=F.columns, fill_value=False)
     usable = F
     if far.shape == F.shape and far.to_numpy().any():
         usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))
-    return CheckedRecords(T, F, usable, findings, means, doubts)
+    return CheckedRecords(T, F, usable, findings, doubts)
 
 
 def mode_offsets(model: FEModel, F: Table) -> pd.Series:
