@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, DensityMixin, clone
 from sklearn.neighbors import KernelDensity
 
-from skthermo._core.arrays import Array, as_floats
+from skthermo._core.arrays import Array, as_floats, spread_evenly
 from skthermo._core.estimators import HasMethods, Interval, StrOptions
 from skthermo._core.frames import column_names
 from skthermo._core.text import listed
@@ -160,8 +160,8 @@ class OutlierDetector(DamageDetector):
 
         The score of a support vector machine, as an example, grows with the number of records that it was fitted on.
         """
-        fitted = clone(self.estimator).fit(others)
-        own, ours = (np.quantile(_index_of(one, others), [0.25, 0.5, 0.75]) for one in (fitted, self.estimator_))
+        fitted, some = clone(self.estimator).fit(others), spread_evenly(others, 1000)  # which tell quartiles
+        own, ours = (np.quantile(_index_of(one, some), [0.25, 0.5, 0.75]) for one in (fitted, self.estimator_))
         scale = (ours[2] - ours[0]) / (own[2] - own[0]) if own[2] > own[0] else 1.0
         return ours[1] + scale * (_index_of(fitted, rows) - own[1])
 
