@@ -351,10 +351,17 @@ def conformal_threshold(index: Array, contamination: float) -> float:
     return threshold
 
 
-def interleaved_folds(times: Array) -> NDArray[np.intp]:
-    """The fold of each row: fifty blocks of time dealt in turn to five folds, or up to twenty folds of few rows."""
-    n_rows, ranks = len(times), np.argsort(np.argsort(times, kind="stable"))
-    return ranks // max(n_rows // 50, 1) % (5 if n_rows > 100 else min(n_rows, 20))
+def interleaved_folds(times: Array, F: Array) -> NDArray[np.intp]:
+    """The fold of each row: blocks of time dealt in turn to five folds, or up to twenty folds of few rows.
+
+    Blocks are as many as the rows are worth independent ones, from five to fifty, so that a block is a stranger to its
+    neighbours.
+    """
+    n_rows, order = len(times), np.argsort(times, kind="stable")
+    n_blocks = np.clip(np.median([independent_records(values[order]) for values in F.T]) / 2, 5, 50)
+    ranks = np.empty(n_rows, dtype=np.intp)
+    ranks[order] = np.arange(n_rows)
+    return ranks // max(int(n_rows / n_blocks), 1) % (5 if n_rows > 100 else min(n_rows, 20))
 
 
 def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> tuple[float, list[SkthermoWarning]]:

@@ -123,7 +123,7 @@ class MahalanobisDetector(DamageDetector):
                 return lambda test: np.full_like(value(whole, F[test]), np.inf)
             return lambda test: value(others, F[test])
 
-        return out_of_fold(learn, interleaved_folds(times))
+        return out_of_fold(learn, interleaved_folds(times, F))
 
     def _limit(self, index: Array) -> float:
         if self.threshold == "chi2":

@@ -126,14 +126,14 @@ class OutlierDetector(DamageDetector):
         if self.threshold == "quantile":
             return self._index(F)
         known, index = F[complete], np.full(len(F), np.nan)
-        folds = self._folds(times[complete])
+        folds = self._folds(times[complete], known)
         index[complete] = out_of_fold(lambda train: lambda test: self._index_from(known[train], known[test]), folds)
         return index
 
-    def _folds(self, times: Array) -> NDArray[np.intp]:
+    def _folds(self, times: Array, F: Array) -> NDArray[np.intp]:
         """The fold of each complete row."""
         if self.block is None:
-            return interleaved_folds(times)
+            return interleaved_folds(times, F)
         is_timed = np.ptp(times) > 1e12  # numbers of rows are smaller, and nanoseconds larger
         index = pd.DatetimeIndex(times.astype("datetime64[ns]")) if is_timed else pd.Index(times)
         return BlockedKFold(min(5, len(times)), block=self.block).fold_of(pd.DataFrame(index=index))
