@@ -36,7 +36,8 @@ class MahalanobisDetector(DamageDetector):
         How the threshold is set:
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances of the n baseline records,
-          each from records of other blocks of time: fifty blocks, dealt in turn to five folds.
+          each from records of other blocks of time, dealt in turn to five folds: five to fifty blocks, longer than
+          the records remember.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
           of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5 % false alarms
           where 2 % are asked for.

@@ -38,7 +38,7 @@ class OutlierDetector(DamageDetector):
         How the threshold is set:
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the indices that the n baseline records
-          have by clones fitted on others: five more fits, each without a fifth of fifty blocks of time.
+          have by clones fitted on others: five more fits, each without a fifth of the blocks of time.
         - ``"quantile"``: the (1 - contamination) quantile of the indices of the records that the estimator was fitted
           on, in one fit. Estimators that score such records better than new ones, as ``LocalOutlierFactor`` does, then
           raise more false alarms than asked for.
