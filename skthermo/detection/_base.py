@@ -261,6 +261,20 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         warn_each(self.findings_)
         return self
 
+    def _interleaved_folds(self, F: Array, times: Array) -> NDArray[np.intp]:
+        """The fold of each row: blocks of time dealt in turn to five folds, or up to twenty folds of few rows.
+
+        There are fifty blocks, so that each fold has all seasons; of residuals, which have none, as many as they are
+        worth pairs of independent rows, but at least five, so that a block is a stranger to its neighbours.
+        """
+        n_rows, order = len(times), np.argsort(times, kind="stable")
+        residuals = F.T[(self.report_["read_as"] == "residual").to_numpy()][:, order]
+        numbers = [independent_records(values) for values in residuals]
+        n_blocks = np.clip(np.median(numbers) / 2, 5, 50) if numbers else 50
+        ranks = np.empty(n_rows, dtype=np.intp)
+        ranks[order] = np.arange(n_rows)
+        return ranks // max(int(n_rows / n_blocks), 1) % (5 if n_rows > 100 else min(n_rows, 20))
+
     def _relative(self, X: ArrayLike) -> Array:
         """Rows of X as `fit` read them: frequencies divided by their level, residuals as they are."""
         check_is_fitted(self)
@@ -349,19 +363,6 @@ def conformal_threshold(index: Array, contamination: float) -> float:
             "do not determine the covariance; expected more rows"
         )
     return threshold
-
-
-def interleaved_folds(times: Array, F: Array) -> NDArray[np.intp]:
-    """The fold of each row: blocks of time dealt in turn to five folds, or up to twenty folds of few rows.
-
-    Blocks are as many as the rows are worth independent ones, from five to fifty, so that a block is a stranger to its
-    neighbours.
-    """
-    n_rows, order = len(times), np.argsort(times, kind="stable")
-    n_blocks = np.clip(np.median([independent_records(values[order]) for values in F.T]) / 2, 5, 50)
-    ranks = np.empty(n_rows, dtype=np.intp)
-    ranks[order] = np.arange(n_rows)
-    return ranks // max(int(n_rows / n_blocks), 1) % (5 if n_rows > 100 else min(n_rows, 20))
 
 
 def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> tuple[float, list[SkthermoWarning]]:

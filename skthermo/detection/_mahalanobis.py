@@ -12,7 +12,7 @@ from sklearn.covariance import EmpiricalCovariance
 
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import HasMethods, StrOptions
-from skthermo.detection._base import DamageDetector, conformal_threshold, interleaved_folds
+from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.exceptions import FewRecordsWarning, ResultWarning, SkthermoWarning
 from skthermo.preprocessing.folds import Rows, out_of_fold
 from skthermo.residuals.gaussian import Gaussian, check_invertible, modes_text
@@ -36,8 +36,8 @@ class MahalanobisDetector(DamageDetector):
         How the threshold is set:
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances of the n baseline records,
-          each from records of other blocks of time, dealt in turn to five folds: five to fifty blocks, longer than
-          the records remember.
+          each from records of other blocks of time, dealt in turn to five folds: fifty blocks or, of residuals, as
+          few as are longer than these remember.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
           of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5 % false alarms
           where 2 % are asked for.
@@ -124,7 +124,7 @@ class MahalanobisDetector(DamageDetector):
                 return lambda test: np.full_like(value(whole, F[test]), np.inf)
             return lambda test: value(others, F[test])
 
-        return out_of_fold(learn, interleaved_folds(times, F))
+        return out_of_fold(learn, self._interleaved_folds(F, times))
 
     def _limit(self, index: Array) -> float:
         if self.threshold == "chi2":

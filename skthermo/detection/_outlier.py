@@ -16,7 +16,7 @@ from skthermo._core.arrays import Array, as_floats, spread_evenly
 from skthermo._core.estimators import HasMethods, Interval, StrOptions
 from skthermo._core.frames import column_names
 from skthermo._core.text import listed
-from skthermo.detection._base import DamageDetector, conformal_threshold, interleaved_folds
+from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.preprocessing.folds import BlockedKFold, out_of_fold
 
 
@@ -133,7 +133,7 @@ class OutlierDetector(DamageDetector):
     def _folds(self, times: Array, F: Array) -> NDArray[np.intp]:
         """The fold of each complete row."""
         if self.block is None:
-            return interleaved_folds(times, F)
+            return self._interleaved_folds(F, times)
         is_timed = np.ptp(times) > 1e12  # numbers of rows are smaller, and nanoseconds larger
         index = pd.DatetimeIndex(times.astype("datetime64[ns]")) if is_timed else pd.Index(times)
         return BlockedKFold(min(5, len(times)), block=self.block).fold_of(pd.DataFrame(index=index))
