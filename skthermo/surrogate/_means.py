@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, piecewise_linear, robust_deviation, spread_evenly
-from skthermo._core.frames import as_stamps
+from skthermo._core.arrays import Array, robust_deviation, spread_evenly
 from skthermo.preprocessing import ExponentialMeans
 
 N_PERIODS = 5  # contiguous ones, so that a season is predicted from others
@@ -32,40 +31,38 @@ def chosen_means(
     by ``least_fall``, beside a straight line and a step in time, which would pass for memory of weeks. Nothing is
     chosen from fewer than 270 days, which lack a season.
     """
-    stamps = as_stamps(T.index)
-    order = np.argsort(stamps.asi8, kind="stable")
-    T, Y, stamps = T.iloc[order], Y[order], stamps[order]
-    values = T.to_numpy(dtype=float)
+    order = np.argsort(T.index, kind="stable")
+    T, Y = T.iloc[order], Y[order]
+    values, times = T.to_numpy(dtype=float), T.index
     rows = spread_evenly(np.flatnonzero(~np.isnan(values).any(axis=1) & ~np.isnan(Y).all(axis=1)), most_rows)
-    age = (stamps[rows] - stamps[0]).to_numpy()
-    if len(rows) < 20 * N_PERIODS or age[-1] < np.timedelta64(270, "D"):  # to other seasons means extrapolate wildly
-        return None
-    step = np.median(np.diff(stamps.to_numpy()))
-    lives = {one: pd.Timedelta(one).to_timedelta64() for one in half_lives}
-    tried = [one for one, length in lives.items() if step <= length <= age[-1] / 8]
     sensors = T.columns[spread_evenly(np.flatnonzero(np.ptp(values[rows], axis=0) > 0), most_sensors)]
+    ages = times[rows] - times[0]
+    if len(rows) < 20 * N_PERIODS or ages[-1] < pd.Timedelta(days=270):  # to other seasons means extrapolate wildly
+        return None
+    step, tried = np.median(np.diff(times)), []
+    for half_life in half_lives:
+        if step <= pd.Timedelta(half_life) <= ages[-1] / 8:
+            tried.append(half_life)
     if not tried or not len(sensors):
         return None
-    means = ExponentialMeans(half_lives=tried, sensors=list(sensors), recorded=0.0).fit(T).transform(T)
-    now = as_lines(T[sensors].to_numpy(dtype=float)[rows])
-    past = as_lines(means.to_numpy()[rows][:, T.shape[1] :])
-    X = np.hstack([np.ones((len(rows), 1)), *now, *past])
-    base, width = np.arange(1 + sum(part.shape[1] for part in now)), past[0].shape[1]
-    candidates = [(place, [k]) for place in range(len(sensors)) for k in range(len(tried))]
-    candidates += [(place, [*range(len(tried))]) for place in range(len(sensors)) if len(tried) > 1]
-    sets = [base]
-    for place, some in candidates:
-        starts = len(base) + width * (len(sensors) * np.array(some) + place)
-        sets.append(np.concatenate([base, *(np.arange(start, start + width) for start in starts)]))
-    longest = np.array([max(lives[tried[k]] for k in some) for _, some in candidates])
-    has_past = age >= 2 * longest[:, np.newaxis]  # others lack the weather before
-    falls = np.array([falls_of(X, y, sets, has_past, least_fall) for y in Y[rows].T])  # (n_responses, n_candidates)
+    means = [T[sensors]] + [T[sensors].ewm(halflife=pd.Timedelta(one), times=times).mean() for one in tried]
+    columns = np.hstack(means)[rows]
+    standard = (columns - columns.mean(axis=0)) / columns.std(axis=0)
+    knots = np.quantile(standard, (0.25, 0.5, 0.75), axis=0)
+    lines = np.stack([standard, *np.maximum(standard - knots[:, np.newaxis], 0.0)], axis=2)  # of each column
+    X = np.hstack([np.ones((len(rows), 1)), lines.reshape(len(rows), -1)])
+    places = 1 + np.arange(lines[0].size).reshape(1 + len(tried), len(sensors), -1)  # of the lines among X
+    base = np.append(0, places[0])
+    candidates, sets, has_past = [], [base], []
+    for sensor in range(len(sensors)):
+        for some in (*(slice(k, k + 1) for k in range(len(tried))), slice(None)):
+            lives = tried[some]
+            candidates.append(ExponentialMeans(half_lives=lives, sensors=[sensors[sensor]]))
+            sets.append(np.append(base, places[1:][some, sensor]))
+            has_past.append(ages >= 2 * pd.Timedelta(lives[-1]))  # others lack the weather before
+    falls = np.array([falls_of(X, y, sets, np.array(has_past), least_fall) for y in Y[rows].T])
     score = np.where((falls > least_fall).any(axis=0) & (falls > -0.5 * least_fall).all(axis=0), falls.mean(axis=0), 0)
-    best = int(score.argmax())
-    if score[best] <= 0:
-        return None
-    place, some = candidates[best]
-    return ExponentialMeans(half_lives=[tried[k] for k in some], sensors=[sensors[place]])
+    return candidates[score.argmax()] if score.max() > 0 else None
 
 
 def falls_of(X: Array, y: Array, sets: list[NDArray[np.intp]], has_past: NDArray[np.bool_], least: float) -> Array:
@@ -121,9 +118,3 @@ def predicted_by_others(X: Array, Y: Array, sets: list[NDArray[np.intp]], *, pen
                 others[np.ix_(columns, columns)], of_others[columns]
             )
     return predicted
-
-
-def as_lines(values: Array) -> list[Array]:
-    """Piecewise-linear functions of each column, standardised, that bend at its quartiles."""
-    standard = ((values - values.mean(axis=0)) / values.std(axis=0)).T[:, :, np.newaxis]
-    return [piecewise_linear(one, np.quantile(one, (0.25, 0.5, 0.75), axis=0)) for one in standard]

@@ -488,7 +488,8 @@ class TemperatureMapper(MultiplierRegressor):
 
     def _chosen(self, T: Table, targets: Array) -> ExponentialMeans | None:
         """Unfitted means of earlier temperatures."""
-        if self.means is None or (is_auto(self.means) and not has_stamps(T)):
+        is_timed = has_stamps(T) and not (T.index.hasnans or T.index.has_duplicates)
+        if self.means is None or (is_auto(self.means) and not is_timed):
             return None
         return chosen_means(T, targets) if is_auto(self.means) else ExponentialMeans(half_lives=self.means)
 
