@@ -89,9 +89,9 @@ def _the_memory_of_records_is_found_once():
     """Most chains of the tests learn from few records; each check of them would look for their memory again."""
     import joblib
 
-    from skthermo.preprocessing.checks import _check_records
+    from skthermo.surrogate.chain import _records
 
-    found, find = {}, _check_records.find_memory
+    found, find = {}, _records.find_memory
 
     def once(*records):
         key = joblib.hash(records)
@@ -100,7 +100,7 @@ def _the_memory_of_records_is_found_once():
         return copy.deepcopy(found[key])
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(_check_records, "find_memory", once)
+        patched.setattr(_records, "find_memory", once)
         yield
 
 

@@ -10,18 +10,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._core.arrays import Array, means_of_known, median, piecewise_linear, robust_deviation, spread_evenly
+from skthermo._core.arrays import (
+    Array,
+    means_of_known,
+    median,
+    piecewise_linear,
+    robust_deviation,
+    rows_by_pattern,
+    spread_evenly,
+)
 from skthermo._core.estimators import check_array
 from skthermo._core.frames import DAY, check_same_rows, column_names, columns_by_sensor, has_stamps
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.preprocessing._past import ExponentialMeans, trailing_means
-from skthermo.preprocessing._weather_lines import (
-    WeatherLines,
-    predicted_by_ridge,
-    predicted_by_weather,
-    quartiles,
-    without_far,
-)
+from skthermo.preprocessing._weather_lines import WeatherLines, predicted_by_weather, quartiles, without_far
+from skthermo.preprocessing.folds import out_of_fold
 
 TIME_CONSTANTS = ("3h", "12h", "2D", "5D", "10D", "20D", "40D", "60D")
 
@@ -290,3 +293,51 @@ def _fall(before: Array, after: Array) -> tuple[float, float]:
     modes, sums = known.any(axis=0), np.where(known, [before, after], 0.0).sum(axis=1)
     ratios = np.divide(after, before, out=np.full(before.shape, np.nan), where=known)[known.any(axis=1)]
     return 1 - float(np.mean(sums[1, modes] / sums[0, modes])), float(np.nanmean(ratios, axis=1).max())
+
+
+def products(inputs: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Products of inputs with inputs and with each mode, and the number of rows that have an input and a value:
+    (n_modes, n_inputs, n_inputs), (n_modes, n_inputs) and (n_modes,). Sums of them are those of all rows."""
+    n_modes, n_inputs = values.shape[1], inputs.shape[1]
+    gram, targets, counts = np.zeros((n_modes, n_inputs, n_inputs)), np.zeros((n_modes, n_inputs)), np.zeros(n_modes)
+    usable = ~np.isnan(inputs).any(axis=1)
+    for known, modes in rows_by_pattern(~np.isnan(values.T) & usable):
+        X = inputs if known.all() else inputs[known]
+        gram[modes], counts[modes] = X.T @ X, len(X)
+        targets[modes] = (X.T @ values[np.ix_(known, modes)]).T
+    return gram, targets, counts
+
+
+def ridge_of_sets(gram: Array, targets: Array, counts: Array, sets: Sequence[Sequence[int]] | None = None) -> Array:
+    """Ridge coefficients of each mode, (n_modes, n_inputs), from `products`; the first input is a constant.
+
+    With sets of inputs, each of which begins with the constant, the result is (n_sets, n_modes, n_inputs), zero for
+    inputs that a set has not.
+    """
+    n_inputs = gram.shape[-1]
+    penalty = np.tile(1e-4 * np.maximum(counts, 1.0)[:, np.newaxis], n_inputs)
+    penalty[:, 0] = 1e-9
+    penalised = gram + penalty[..., np.newaxis] * np.eye(n_inputs)
+    if sets is None:
+        return np.linalg.solve(penalised, targets[..., np.newaxis])[..., 0]
+    coefficients = np.zeros((len(sets), *targets.shape))
+    for own, columns in zip(coefficients, sets, strict=True):
+        part = penalised[:, np.asarray(columns)[:, np.newaxis], columns]
+        own[:, columns] = np.linalg.solve(part, targets[:, columns, np.newaxis])[..., 0]
+    return coefficients
+
+
+def predicted_by_ridge(
+    inputs: Array, values: Array, folds: NDArray[np.intp], sets: Sequence[Sequence[int]] | None = None
+) -> Array:
+    """Values of each fold as `ridge_of_sets` predicts them from the other folds; with sets, (n_samples, n_sets, n_modes)."""
+    n_folds = folds.max() + 1
+    of_folds = [products(inputs[folds == fold], values[folds == fold]) for fold in range(n_folds)]
+    by_fold = [np.stack(parts) for parts in zip(*of_folds, strict=True)]
+
+    def learn(train: NDArray[np.intp]):
+        others = np.bincount(folds[train], minlength=n_folds) > 0
+        coefficients = ridge_of_sets(*(np.tensordot(others, part, 1) for part in by_fold), sets)
+        return lambda test: np.moveaxis(inputs[test] @ np.swapaxes(coefficients, -1, -2), -2, 0)
+
+    return out_of_fold(learn, folds)

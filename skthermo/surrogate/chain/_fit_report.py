@@ -250,8 +250,6 @@ class FitReport(SavesFrames):
         if self.pooling_probability is not None:
             listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.pooling_probability.items())
             lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
-        if getattr(self.findings.memory, "features", None) is not None:
-            lines.append(self.findings.memory.summary())
         if len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"MAPE is in-sample, of {self.rows.scored} rows spread evenly over the training rows."]

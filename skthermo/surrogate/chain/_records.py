@@ -21,7 +21,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel, match_modes
-from skthermo.preprocessing import BlockedKFold, RecordFindings, check_records, set_aside
+from skthermo.preprocessing import BlockedKFold, MemoryFindings, RecordFindings, check_records, find_memory
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import misplaced_columns, unseen_weather
@@ -172,41 +172,44 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
 class CheckedRecords(NamedTuple):
     """Records that a chain learns, without values that cannot be; ``usable`` frequencies are without outliers.
 
-    ``findings`` is what `check_records` has found, ``means`` the transformer that gives means of earlier temperatures
-    which the frequencies remember, if they do, and ``doubts`` hold warnings.
+    ``findings`` is what `check_records` has found, ``memory`` what `find_memory` has, where it was looked for, and
+    ``doubts`` hold warnings.
     """
 
     temperatures: Table
     frequencies: Table
     usable: Table
     findings: RecordFindings
-    means: BaseEstimator | None
+    memory: MemoryFindings | None
     doubts: list[SkthermoWarning]
+
+    @property
+    def means(self) -> BaseEstimator | None:
+        """The transformer that gives means of earlier temperatures which the frequencies remember, if they do."""
+        return None if self.memory is None else self.memory.features
 
 
 def checked_records(
     T: Table, F: Table, model: FEModel, memory: str | Memory | None, *, uses_means: bool
 ) -> CheckedRecords:
-    """Check the records that a chain was given, once for all of its parts.
+    """Check the records that a chain was given, once for all of its parts; outliers train nothing, and give no warning.
 
-    There is no warning of outliers, which train nothing, nor of slow temperatures for a chain that uses means of them.
+    Means of earlier temperatures are looked for where the chain's mapper uses them.
     """
-    with collected() as doubts:
-        found = set_aside(T, F, model=model, needs_all=True)
-    findings = remembered(memory, check_records, T, F)
-    T, F = found.temperatures, found.frequencies
-    mended = {"frequency-outliers"} | ({"slow-temperatures"} if uses_means else set())
-    doubts += [*findings.warnings(exclude=mended), *misplaced_columns(T, F), *doubts_of_modes(model, F)]
-    means = getattr(findings.memory, "features", None)
-    if means is not None and not set(means.sensors) <= set(column_names(T, "T")):
-        means = None
-    far = findings.outliers
-    if isinstance(F, pd.DataFrame) and far.index.is_unique:  # findings may be of longer tables
-        far = far.reindex(index=F.index, columns=F.columns, fill_value=False)
-    usable = F
-    if far.shape == F.shape and far.to_numpy().any():
+    findings = check_records(T, F, model=model)
+    findings.refuse_meaningless(needs_all=True)
+    T, F = findings.temperatures, findings.frequencies
+    doubts = [
+        *findings.warnings(exclude={"frequency-outliers"}),
+        *misplaced_columns(T, F),
+        *doubts_of_modes(model, F),
+    ]
+    far, usable, slow = findings.outliers.to_numpy(), F, None
+    if far.any():
         usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))
-    return CheckedRecords(T, F, usable, findings, means, doubts)
+    if uses_means and isinstance(T, pd.DataFrame) and T.columns.inferred_type == "string":
+        slow = remembered(memory, find_memory, T, usable)
+    return CheckedRecords(T, F, usable, findings, slow, doubts)
 
 
 def mode_offsets(model: FEModel, F: Table) -> pd.Series:
