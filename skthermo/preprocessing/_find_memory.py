@@ -110,7 +110,7 @@ def find_memory(temperatures: ArrayLike, frequencies: ArrayLike) -> MemoryFindin
     See Also
     --------
     ExponentialMeans : The transformer.
-    check_records : Names memory of weeks among other findings.
+    check_records : Faults of the records.
 
     Notes
     -----
@@ -330,7 +330,8 @@ def ridge_of_sets(gram: Array, targets: Array, counts: Array, sets: Sequence[Seq
 def predicted_by_ridge(
     inputs: Array, values: Array, folds: NDArray[np.intp], sets: Sequence[Sequence[int]] | None = None
 ) -> Array:
-    """Values of each fold as `ridge_of_sets` predicts them from the other folds; with sets, (n_samples, n_sets, n_modes)."""
+    """Values of each fold, predicted by `ridge_of_sets` from the other folds; with sets, (n_samples, n_sets,
+    n_modes)."""
     n_folds = folds.max() + 1
     of_folds = [products(inputs[folds == fold], values[folds == fold]) for fold in range(n_folds)]
     by_fold = [np.stack(parts) for parts in zip(*of_folds, strict=True)]

@@ -63,7 +63,9 @@ def residual_trend(residuals: ArrayLike) -> pd.DataFrame:
         square = centred @ centred
         change = centred @ y / square
         scatter = y - y.mean() - change * centred
-        time = min(correlation_time(np.where(known, column - y.mean() - change * (places - x.mean()), np.nan)), len(y) / 2)
+        time = min(
+            correlation_time(np.where(known, column - y.mean() - change * (places - x.mean()), np.nan)), len(y) / 2
+        )
         variance = scatter @ scatter / max(len(y) - 1 - 2 * time, 1.0)
         ends = [(y - y.mean())[part].mean() if part.any() else np.nan for part in (x <= 1 / 5, x >= 4 / 5)]
         per_year = change * YEAR.value / span if has_stamps(residuals) else np.nan

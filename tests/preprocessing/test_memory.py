@@ -94,17 +94,6 @@ def test_the_mean_halves_the_error_of_a_later_year():
     assert (error(features.transform(T)) < 0.8 * error(T)).all()
 
 
-class TestChecks:
-    def test_memory_is_named_and_no_step(self):
-        findings = check_records(*bridge(5, 730, "40D")).table
-        assert set(findings["what"]) - {"frequency-outliers"} == {"slow-temperatures"}
-        assert set(findings.loc[findings["what"] == "slow-temperatures", "column"]) == {"air"}
-
-    def test_a_step_beside_memory_stays_one(self):
-        findings = check_records(*bridge(7, 730, "40D", step=-0.02)).table
-        steps = findings[findings["what"] == "sudden-change"]
-        assert set(steps["column"]) == {"f1", "f2"}
-
-    def test_a_trend_beside_memory_stays_one(self):
-        findings = check_records(*bridge(8, 730, "40D", trend=-0.03)).table
-        assert {"trend", "sudden-change"} & set(findings["what"])
+def test_slow_memory_is_no_fault_of_records():
+    findings = check_records(*bridge(5, 730, "40D")).table
+    assert set(findings["what"]) <= {"frequency-outliers"}

@@ -136,8 +136,8 @@ def compare_times(
 ) -> None:
     """Name temperatures that explain nothing, or clearly less than temperatures of other rows do.
 
-    A structure may follow the weather of up to a day before. What remains is judged by the median of up to four parts of
-    the records, so that a change of the structure within one of them does not look like the season of another time.
+    A structure may follow the weather of up to a day before. Temperatures of other rows have to explain more in four
+    parts of the records, too, so that a change of the structure does not look like the season of another time.
     """
     inertia = 24 if hours is None else max(int(24 / hours), 1)
     n_rows, left = len(values), {}
@@ -148,11 +148,13 @@ def compare_times(
             return
     shift = min(left, key=lambda shift: np.mean(left[shift]))
     rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
-    inputs, given = np.hstack([lines, with_past(places)]), values[rows]
-    own, other = unexplained(inputs[rows], given, folds[rows]), unexplained(inputs[rows - shift], given, folds[rows])
-    ratio = np.exp(np.mean(np.log(np.maximum(other, 1e-300) / own)))
+    inputs, ratios = np.hstack([lines, with_past(places)]), []
+    for n_parts in (4, 1):
+        own = unexplained(inputs[rows], values[rows], folds[rows], n_parts)
+        other = unexplained(inputs[rows - shift], values[rows], folds[rows], n_parts)
+        ratios.append(np.exp(np.mean(np.log(np.maximum(other, 1e-300) / own))))
     own, other = np.mean(own), np.mean(other)
-    is_better = ratio < 0.9 and 1 - other > max(0.1, 1 - own + 0.01)
+    is_better = ratios[0] < 1 and ratios[1] < 0.9 and 1 - other > max(0.1, 1 - own + 0.01)
     if is_better and np.mean(left[shift]) < 0.95:  # means of the past may follow a season by chance
         length = ""
         if hours is not None:
@@ -166,16 +168,16 @@ def compare_times(
         F.found("time-shift", "", is_there, detail, period=False)
         return
     rows = spread_evenly(np.arange(n_rows), 4000)
-    least = min(left[0].min(), unexplained(lines[rows], values[rows], folds[rows], n_parts=1).min())
+    least = min(left[0].min(), unexplained(lines[rows], values[rows], folds[rows], 4).min(initial=1.0))
     if least > 0.98 and np.isnan(T.values[~np.isnan(T.before)]).mean() < 0.01:
         usable = ~np.isnan(values).all(axis=1) & ~np.isnan(places).any(axis=1)
         detail = f"at most {max(1 - least, 0.0):.1%} of the variance of a mode, in periods held out"
         F.found("no-thermal-effect", "", usable, f"{detail}, in {np.count_nonzero(usable)} rows", period=False)
 
 
-def unexplained(inputs: Array, values: Array, folds: Rows, n_parts: int = 4) -> Array:
-    """Share of the variance of each mode that inputs do not explain out of fold: the median of parts of the records of
-    at least a hundred rows, each by itself, (n_modes,); modes without a value in a part are left out."""
+def unexplained(inputs: Array, values: Array, folds: Rows, n_parts: int = 1) -> Array:
+    """Share of the variance of each mode that inputs do not explain out of fold, (n_modes,): the median of parts of the
+    records, each by itself, with at least a hundred rows; modes without a value in a part are left out."""
     values = np.where(np.isnan(inputs).any(axis=1)[:, np.newaxis], np.nan, values)
     n_parts = min(max(len(values) // 100, 1), n_parts)
     shares = np.empty((n_parts, values.shape[1]))

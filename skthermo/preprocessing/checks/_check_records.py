@@ -196,8 +196,8 @@ def set_aside(
         Whether columns that would be left out are an error.
     is_baseline : bool, default=True
         Whether the records are of one healthy state. In others, damage may move values to another level, so that only
-        those are set aside that stand for a missing one: infinite ones, numbers that loggers write, frequencies that are
-        not positive.
+        those are set aside that stand for a missing one: infinite ones, numbers that loggers write, frequencies that
+        are not positive.
 
     Returns
     -------

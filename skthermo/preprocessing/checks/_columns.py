@@ -277,7 +277,11 @@ def put_stuck_aside(table: Reading) -> None:
         for run in np.sort(longest[lengths[longest] >= 5]):
             stuck = rows[first[run] : first[run] + lengths[run]]
             is_lag = stuck[0] == 0 and np.count_nonzero(table.values[0] == column[0]) > 1
-            if not is_lag and is_outstanding(values[first], lengths, run) and others_vary(values, lengths, lengths[run]):
+            if (
+                not is_lag
+                and is_outstanding(values[first], lengths, run)
+                and others_vary(values, lengths, lengths[run])
+            ):
                 wrong = np.zeros(len(column), dtype=bool)
                 wrong[stuck] = True
                 table.put_aside("stuck", place, wrong)
