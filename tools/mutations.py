@@ -204,15 +204,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("datasets/_kw51_campaign.py", "datasets/test_kw51_campaign.py"): [
         ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
     ],
-    ("preprocessing/checks/_stuck.py", "preprocessing/test_checks.py"): [
-        ("stuck sensors beside rounding", "length >= 4 * usual", "length >= usual"),
+    ("preprocessing/checks/_columns.py", "preprocessing/test_checks.py"): [
+        ("stuck sensors beside rounding", "length >= 4 * np.sort(lengths)[-4]", "length >= np.sort(lengths)[-4]"),
         ("stuck sensors beside resting values", "length < 4 * same[3]", "False"),
         ("stuck sensors at all", "lengths[longest] >= 5", "lengths[longest] >= 500"),
     ],
-    ("preprocessing/checks/_check_records.py", "preprocessing/test_checks.py"): [
-        ("direction of a time shift", "inputs[rows - shift]", "inputs[np.minimum(rows + shift, n_rows - 1)]"),
+    ("preprocessing/checks/_beside_weather.py", "preprocessing/test_checks.py"): [
+        ("direction of a time shift", "lines[rows - shift]", "lines[np.minimum(rows + shift, n_rows - 1)]"),
         ("inertia as a time shift", "strength[farthest - 1 : farthest + inertia + 1] = 0", "strength[farthest] = 0"),
-        ("exchanged modes that cross", "            if np.sqrt(ratio.prod()) < 0.5:", "            if True:"),
+        ("exchanged modes that cross", "        if np.sqrt(ratio.prod()) < 0.5:", "        if True:"),
     ],
     ("preprocessing/_hampel.py", "preprocessing/test_hampel.py"): [
         ("outliers where records scatter more", "np.fmax(local, self.deviations_", "np.fmin(local, self.deviations_"),

@@ -31,7 +31,7 @@ from skthermo.residuals.weather import TrainingRange, implausible, parts
 
 ROWS_EACH = 1000  # of a bridge, evenly spread: each bridge counts alike
 N_KNOTS, LEAST_ALONE = 4, 2  # knots and rows without a fleet
-ALLOWED = ("no-rows", "stuck-sensor", "implausible-values", "constant")  # findings in rows of any order, of any inputs
+ALLOWED = ("no-rows", "stuck", "implausible-values", "constant")  # findings in rows of any order, of any inputs
 
 
 @dataclass(frozen=True)

@@ -286,7 +286,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         F, self.y_is_vector_ = frequency_table(y)
-        records = checked_records(T, frame_like(F, check_array(F, **options)), self.model, self.memory)
+        records = checked_records(T, frame_like(F, check_array(F, **options)), self.model)
         T, F, usable = records.temperatures, records.frequencies, records.usable
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
         self._clone_parts(records, has_shapes=shapes is not None)
