@@ -9,7 +9,7 @@ drawn, then a year in service. Its monitor is set for one false alarm a year. At
 in; it is found if an event opens within 30 days. The
 means by role of the thermometers now and 12 and 48 hours ago, for all regressions.
 
-fleet        residuals of ``FleetPrior(...).mapper()`` on the logarithms of the frequencies
+fleet        residuals of ``FleetMapper(mappers)`` (of 0.2.0, of ``FleetPrior``) of the other bridges' frequencies
 fleet mean   a ridge on the bridge's own records towards the mean coefficients of the fleet's bridges; its weight is the
              one that predicts the fleet's own bridges best after as many days. It does not know how uncertain it is.
 lines        piecewise-linear in all temperatures, the library's default, on the bridge's own records
@@ -32,10 +32,16 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_fleet
-from skthermo.fleet import FleetPrior
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import HingeFeatures, LagFeatures, SensorMeans
 from skthermo.surrogate import TemperatureMapper
+
+try:
+    from skthermo.surrogate import FleetMapper
+
+    FleetPrior = None
+except ImportError:  # before 0.3
+    from skthermo.fleet import FleetPrior
 
 PER_DAY, LAGS, MEMORY = 4, [0, 2, 8], 60
 DAYS = (15, 30, 60, 120)
@@ -43,7 +49,7 @@ SEVERITIES, FOUND_WITHIN, SETS_IN = (0.05, 0.2), 30, (15, 137, 259)
 MOST_EVENTS, LEAST_WITHIN = 1.5, 0.9
 DAMAGED = {"truss": "bottom", "girder": "first span", "arch": "girder"}
 PENALTIES, N_ASKED = 10.0 ** np.arange(-1, 5), 8
-WAYS = {"fleet": "prior from the fleet", "fleet mean": "ridge towards the fleet's mean", "lines": "own records only"}
+WAYS = {"fleet": "mapper of the fleet", "fleet mean": "ridge towards the fleet's mean", "lines": "own records only"}
 
 
 class ByPenalty(RegressorMixin, BaseEstimator):
@@ -124,17 +130,20 @@ class Kind:
         years = {name: history(bridge, 365, "2024-01-01") for name, bridge in members.items()}
         fleet = {name: prepared(members[name], year) for name, year in years.items()}
         self.columns = list(next(iter(fleet.values()))[0])
-        covariates = made.covariates.loc[list(members), ["material", "span"]]
-        self.prior = FleetPrior().fit(fleet, covariates)
+        if FleetPrior:
+            self.prior = FleetPrior().fit(fleet, made.covariates.loc[list(members), ["material", "span"]])
+        else:
+            self.mappers = [TemperatureMapper().fit(X, F) for X, F in fleet.values()]
         self.mean = FleetMean(fleet)
         self.penalties = {}
 
     def regressors(self, bridge, days):
         if days not in self.penalties:
             self.penalties[days] = self.mean.penalty(days)
-        own = {"material": bridge.covariates["material"], "span": bridge.covariates["span"]}
         found = {
-            "fleet": self.prior.mapper(own),
+            "fleet": self.prior.mapper({what: bridge.covariates[what] for what in ("material", "span")})
+            if FleetPrior
+            else FleetMapper(self.mappers),
             "fleet mean": ByPenalty(self.mean, self.penalties[days]),
             "lines": TemperatureMapper(),
         }
