@@ -102,7 +102,8 @@ def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
     together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
     joined = {name: " or ".join(names[together == together[name]]) for name in names}
     effects = effects.T.groupby(joined).sum().T.round(2).set_axis(records.index)
-    return effects.where(effects > 0).where(np.round(shares, 4)[:, np.newaxis] >= 0.5)
+    is_explained = np.round(shares, 4)[:, np.newaxis] >= 0.5
+    return effects.where((effects > 0) & is_explained)
 
 
 def causes(records: pd.DataFrame, targets: list[Any], temperatures: list[Any], index: Array) -> list[str]:

@@ -372,11 +372,11 @@ class Monitor(SavesFrames, Estimator):
             self.set_aside_ = aside[~aside["column"].isin(list(self.left_out_))].reset_index(drop=True)
             self.baseline_, self.prior_, self.since_ = baseline, None, None
             trained = baseline if not columns.reference else baseline[columns.inputs]
-            detector.fit(trained[columns.seen(detector)])
+            self.features_ = columns.seen(detector)
+            detector.fit(trained[self.features_])
         findings += self._take_charge(detector, trained)
-        seen = list(detector.feature_names_in_)
-        refuse_other_batches(detector, seen, trained, self.lookback_)
-        findings += blind_findings(detector, seen, trained, self.targets_, self.lookback_, self.threshold_)
+        refuse_other_batches(detector, self.features_, trained, self.lookback_)
+        findings += blind_findings(detector, self.features_, trained, self.targets_, self.lookback_, self.threshold_)
         self._begin_service(self.fem)
         self.versions_ = versions()
         warn_each(findings)
@@ -425,7 +425,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _index(self, records: pd.DataFrame) -> Array:
         """Damage indices of records in order of time, by the detector in charge."""
-        return index_of(self.detector_, list(self.detector_.feature_names_in_), records)
+        return index_of(self.detector_, self.features_, records)
 
     def _with(self, detector: Any, trained: pd.DataFrame) -> Monitor:
         """This monitor with another detector in charge, which was fitted on some records."""
@@ -454,6 +454,8 @@ class Monitor(SavesFrames, Estimator):
         if not len(raw):
             self.states_ = (begin,)
             return
+        if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
+            self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
         seen = self.corrections_.corrected(begin, raw, self._explained())
         days = pd.DatetimeIndex([one.day for one in seen.states])
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen.records])
@@ -508,10 +510,9 @@ class Monitor(SavesFrames, Estimator):
         records, place = self._with_memory(int(rows[0]))
         places = place + rows - rows[0]
         records = records.iloc[: places[-1] + 1]
-        features = list(self.detector_.feature_names_in_)
-        sizes = np.abs(departures(self.detector_, records[features], self.targets_, self.trained_)[places])
+        sizes = np.abs(departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places])
         sizes = np.round(np.nan_to_num(sizes), 2)
-        effects = group_effects(self.detector_, records[features]).iloc[places].add_prefix("effect ")
+        effects = group_effects(self.detector_, records[self.features_]).iloc[places].add_prefix("effect ")
         decisions = self.decisions_.copy()
         modes = decisions["modes"].to_numpy(copy=True)
         modes[rows] = [leading(dict(zip(map(str, self.targets_), size, strict=True))) for size in sizes]

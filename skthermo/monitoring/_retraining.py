@@ -13,7 +13,7 @@ from sklearn.utils import check_random_state
 
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import last_step
-from skthermo._core.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
+from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correlation_time, usual_step
 from skthermo._core.text import capital, counted
 from skthermo._core.warnings import without_warnings
 from skthermo.monitoring._events import WATCH
@@ -197,7 +197,9 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
 def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
     """Given records, or those that the monitor keeps as its detector saw them, that are not in the baseline."""
     if records is None:
-        records = monitor.corrected_
+        records = monitor.corrected_[
+            monitor.corrected_.index >= monitor.last_ - check_duration(monitor.retention, "retention")
+        ]
     records = records[list(monitor.trained_.columns)].sort_index()
     known = records.index.isin(monitor.trained_.index)
     return records[~known if monitor.since_ is None else ~known & (records.index >= monitor.since_)]
@@ -224,9 +226,7 @@ def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
 
 def _candidate(monitor: Any, baseline: pd.DataFrame) -> Any:
     with without_warnings():
-        return monitor._with(
-            clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)]), baseline
-        )
+        return monitor._with(clone(monitor.detector_).fit(baseline[monitor.features_]), baseline)
 
 
 def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> ShiftsTried:
