@@ -155,7 +155,9 @@ class FleetMapper(MultiplierRegressor):
             inputs = np.asarray(set_aside(frame_like(X, inputs), exclude=harmless, needs_all=True).temperatures)
         usable = ~(np.isnan(inputs).any(axis=1)[:, np.newaxis] | np.isnan(targets))
         if (usable.sum(axis=0) < 2).any():
-            raise ValueError(f"an output has {usable.sum(axis=0).min()} complete rows; expected at least 2")
+            raise ValueError(
+                f"an output has {usable.sum(axis=0).min()} complete rows of n_samples={len(inputs)}; expected at least 2"
+            )
         self.n_parameters_ = targets.shape[1]
         mappers = self._mappers()
         self._check(mappers)
@@ -165,7 +167,7 @@ class FleetMapper(MultiplierRegressor):
         self.is_log_ = not (targets <= 0).any() and all(mapper.log_targets_ for mapper in mappers)
         link, columns = np.log if self.is_log_ else np.positive, [targets[rows, j] for j, rows in enumerate(usable.T)]
         path = self.centre_ + self.scale_ * np.linspace(-2, 2, 9)[:, np.newaxis]  # from cold to warm
-        responses = self._others(path) if mappers else [column[np.newaxis] for column in columns]
+        responses = self._others(path, len(path)) if mappers else [column[np.newaxis] for column in columns]
         self.sizes_ = np.array([link(one).std(axis=1).mean() for one in responses])
         days = np.median(np.diff(row_times(X))) / 86_400e9 if has_stamps(X) and len(inputs) > 1 else 1.0
         dependence = 2.0 / np.clip(days, 1e-3, 2.0)
@@ -211,7 +213,7 @@ class FleetMapper(MultiplierRegressor):
         z = (inputs - self.centre_) / np.where(self.scale_ > 0, self.scale_, 1.0)
         own = np.hstack([z, *(np.maximum(z - knot, 0) for knot in (-1.0, 0.0, 1.0))])
         found = []
-        for others, size in zip(self._others(X), self.sizes_, strict=True):
+        for others, size in zip(self._others(X, len(inputs)), self.sizes_, strict=True):
             others = np.log(others) if self.is_log_ else others
             mean = others.mean(axis=0) if len(others) else np.zeros(len(inputs))
             n = max(len(others), 2)  # one alone has no deviations
@@ -219,7 +221,7 @@ class FleetMapper(MultiplierRegressor):
             found.append((mean, np.hstack([0.3 * mean[:, np.newaxis], deviations, 0.1 * size * own])))
         return found
 
-    def _others(self, X: ArrayLike) -> list[Array]:
+    def _others(self, X: ArrayLike, n_rows: int) -> list[Array]:
         """Predictions of the other bridges' mappers, (n_mappers, n_samples), for each output of those that have it."""
         found: list[list[Array]] = [[] for _ in range(self.n_parameters_)]
         for mapper in self._mappers():
@@ -229,7 +231,7 @@ class FleetMapper(MultiplierRegressor):
                 predicted = as_columns(mapper.predict(T))
             for output, column in self._columns_of(mapper).items():
                 found[output].append(predicted[:, column])
-        return [np.reshape(one, (len(one), np.shape(X)[0])) for one in found]
+        return [np.reshape(one, (len(one), n_rows)) for one in found]
 
     def _mappers(self) -> list[Any]:
         return list(self.mappers.values() if isinstance(self.mappers, Mapping) else self.mappers)
