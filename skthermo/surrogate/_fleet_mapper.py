@@ -156,7 +156,7 @@ class FleetMapper(MultiplierRegressor):
         usable = ~(np.isnan(inputs).any(axis=1)[:, np.newaxis] | np.isnan(targets))
         if (usable.sum(axis=0) < 2).any():
             raise ValueError(
-                f"an output has {usable.sum(axis=0).min()} complete rows of n_samples={len(inputs)}; expected at least 2"
+                f"an output has {usable.sum(axis=0).min()} of n_samples={len(inputs)} rows complete; expected 2 or more"
             )
         self.n_parameters_ = targets.shape[1]
         mappers = self._mappers()
