@@ -1878,7 +1878,6 @@ for argument, callables in VECTORS.items():
 UNITS = ("rad/s", "kHz", "periods")
 WEATHER = ["surrogate.DataInformedFEM.weather"]
 legal("X", ["surrogate.DataInformedFEM.extrapolation_distance"], CELSIUS, "the answer says how far outside")
-legal("X", ["fleet.FleetMapper.from_fleet"], CELSIUS, "the answer says that neither bridge nor fleet has such weather")
 legal("X", WEATHER, CELSIUS, "fills gaps alone: predict warns of the weather")
 legal("X", WEATHER, ["stamps missing", "stamps equal", "stamps from numbers"], "there are no lags")
 READ_FOR_NAMES = [*UNITS, "9999", "a slipped point", "a mode twice"]

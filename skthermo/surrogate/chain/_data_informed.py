@@ -41,8 +41,6 @@ from skthermo._core.estimators import (
     check_takes_weights,
     inputs_of_last_step,
     last_step,
-    offers,
-    rows_from_fleet,
     seed_parts,
     seeded,
     validate_data,
@@ -181,11 +179,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     deal with it in another way. If temperatures are a frame, results are frames. A row that cannot be computed, such as
     one without any temperature, is NaN; no row is dropped.
 
-    A mapper whose ``predict`` takes ``return_std``, such as ``TemperatureMapper(BayesianRidge())`` or one that has
-    learned from a fleet, makes standard deviations and intervals as wide as it is uncertain; errors of different
-    parameters count as independent. With ``reach_``, a range of weather, and ``from_fleet(X)``, a mask of rows, a
-    mapper says where it is based on records of others. See :doc:`/guide/records_theory`, :doc:`/guide/estimation` and
-    :doc:`/guide/uncertainty`.
+    A mapper whose ``predict`` takes ``return_std``, such as ``TemperatureMapper(BayesianRidge())`` or a `FleetMapper`,
+    makes standard deviations and intervals as wide as it is uncertain; errors of different parameters count as
+    independent. See :doc:`/guide/records_theory`, :doc:`/guide/estimation` and :doc:`/guide/uncertainty`.
 
     Examples
     --------
@@ -605,14 +601,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         DataFrame
             With X's index. A column for each input of M2, lags included: its distance outside the range of the training
-            rows, divided by that range (0 inside). Where the mapper has learned from a fleet, ``from_fleet`` is True in
-            weather that only the fleet has seen.
+            rows, divided by that range (0 inside).
         """
         weather = self.weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.inputs), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        if offers(self.mapper_, "from_fleet"):
-            return excess.assign(from_fleet=rows_from_fleet(self.mapper_, weather.filled))
         return excess
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
@@ -738,7 +731,7 @@ def imputed(imputer: BaseEstimator, T: Table, F: Table) -> Table:
 
 
 def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
-    """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
+    """Parameters as a mapper learns them: a frame, by whose names a `FleetMapper` knows them."""
     return pd.DataFrame(theta, T.index if isinstance(T, pd.DataFrame) else None, names, copy=False)
 
 

@@ -13,7 +13,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import Array, as_columns, as_floats, median, refuse_no_table, robust_deviation, spread_evenly
-from skthermo._core.estimators import _safe_indexing, last_step, predict_with_std, reach_of
+from skthermo._core.estimators import _safe_indexing, last_step
 from skthermo._core.frames import Table, column_names, frame_like, row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
@@ -108,7 +108,7 @@ class TrainingRecords(SavesFrames):
             rows = train[has_theta[train]]
             targets, own_weights = pd.DataFrame(theta[rows], columns=names), None if weights is None else weights[rows]
             fitted = fit_checked(clone(learner), inputs[rows], targets, own_weights)
-            return lambda test: stated_by(fitted, inputs[test])
+            return lambda test: as_columns(fitted.predict(inputs[test]))
 
         def learn_discrepancy(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
             # ratios to predictions that are out of fold themselves, so that the model is not solved for each fold
@@ -117,35 +117,15 @@ class TrainingRecords(SavesFrames):
             others = Discrepancy.fitted(model.discrepancy.regressor, inputs[rows], ratios[rows], own_weights)
             return lambda test: others.at(inputs[test])
 
-        found = out_of_fold(learn_parameters, fold_of)
-        predicted, deviations, beyond = np.split(found, [len(names), 2 * len(names)], axis=1)
+        predicted = out_of_fold(learn_parameters, fold_of)
         modelled = model.frequencies(predicted)
         ratios = self.usable[order] / modelled
         values = measured / (modelled * np.exp(out_of_fold(learn_discrepancy, fold_of))) - 1
         known = ~np.isnan(values).all(axis=1)
-        residuals = BaselineResiduals(
-            inputs[known], values[known], own[known], fold_of[known], order[known], (theta / predicted)[known]
-        )
-        reach = reach_of(learner, inputs)
-        if reach is None:
-            consequence = "Standard deviations, intervals and noise are unreliable there"
-            return replace(residuals, findings=tuple(unseen_weather(records, fold_of, consequence)))
-        errors = model.propagated(predicted, np.nan_to_num(deviations))[known]
-        return replace(residuals, errors=errors, reach=reach[0], beyond=beyond[known, 0])
-
-
-def stated_by(mapper: BaseEstimator, inputs: Array) -> Array:
-    """Predictions of a fitted mapper, standard deviations, and how far inputs are outside its weather, side by side.
-
-    Only a mapper with ``reach_``, the weather that it is based on, says the latter two.
-    """
-    reach = reach_of(mapper, inputs)
-    if reach is None:  # standard deviations of such a mapper are added to the scatter of all residuals
-        theta = as_columns(mapper.predict(inputs))
-        return np.column_stack([theta, np.full_like(theta, np.nan), np.zeros(len(inputs))])
-    theta, deviations = predict_with_std(mapper, inputs)
-    deviations = np.full_like(theta, np.nan) if deviations is None else deviations
-    return np.column_stack([theta, deviations, reach[0].excess(reach[1]).mean(axis=1)])
+        consequence = "Standard deviations, intervals and noise are unreliable there"
+        doubts = tuple(unseen_weather(records, fold_of, consequence))
+        ratios = (theta / predicted)[known]
+        return BaselineResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], ratios, doubts)
 
 
 def remembering_folds(records: Table, inputs: Array, own: Array) -> NDArray[np.intp]:
