@@ -20,7 +20,7 @@ from tests.surrogate.chains import TRUSS
 YEAR = make_truss_campaign(samples_per_year=90, random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
 SETTINGS = {"regressor": Ridge(1e-3), "bounds": 0.2, "n_samples": 60, "noise": 0.01, "random_state": 0}
-KINDS = "taught", "inverted", "check_records"  # functions whose results are kept
+KINDS = "taught", "inverted"  # functions whose results are kept
 THETA = np.random.default_rng(0).uniform(0.9, 1.1, (40, 4))
 
 
@@ -66,7 +66,7 @@ class TestOnce:
             np.testing.assert_array_equal(*(one.cv_results_["mean_test_score"] for one in (searches[0], search)))
             np.testing.assert_array_equal(searches[0].predict(T), search.predict(T))
         numbers = {kind: kept(tmp_path, kind) for kind in KINDS}
-        assert numbers == {"taught": 3, "inverted": 3, "check_records": 3}
+        assert numbers == {"taught": 3, "inverted": 3}
         assert len(list(tmp_path.rglob("output.pkl"))) == sum(numbers.values())
 
     def test_nothing_is_computed_again(self, tmp_path, monkeypatch):
