@@ -23,7 +23,7 @@ from skthermo._core.estimators import check_array
 from skthermo._core.frames import DAY, check_same_rows, column_names, columns_by_sensor, has_stamps
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.preprocessing._past import ExponentialMeans, trailing_means
-from skthermo.preprocessing._weather_lines import WeatherLines, predicted_by_weather, quartiles, without_far
+from skthermo.preprocessing._weather_lines import WeatherLines, predicted_by_weather, without_far
 from skthermo.preprocessing.folds import out_of_fold
 
 TIME_CONSTANTS = ("3h", "12h", "2D", "5D", "10D", "20D", "40D", "60D")
@@ -163,8 +163,7 @@ class MemorySearch:
         rows = spread_evenly(usable, 3000)
         self.ages, self.folds = (times[rows] - times[0]) / DAY.value, np.arange(len(rows)) * 5 // len(rows)
         self.has_all_seasons = pd.Timedelta(np.ptp(times), "ns") >= pd.Timedelta(days=270)
-        weather = WeatherLines.learned(T)
-        inputs = weather.inputs(weather.coordinates(T[rows]))
+        _, inputs = WeatherLines.learned(T).inputs(T[rows])
         left = F[rows] - predicted_by_weather(inputs, F[rows], self.folds)
         self.scale = robust_deviation(left)
         self.values = without_far(F[rows] - median(F[rows]), left) / np.where(self.scale > 0, self.scale, np.inf)
@@ -268,7 +267,7 @@ def _memory_table(rows: list[list[Any]]) -> pd.DataFrame:
 def lines_of(column: Array) -> Array:
     """Piecewise-linear functions of a standardised column."""
     standard = ((column - column.mean()) / column.std())[:, np.newaxis]
-    return piecewise_linear(standard, quartiles(standard))
+    return piecewise_linear(standard, np.quantile(standard, (0.25, 0.5, 0.75), axis=0))
 
 
 def _time_shapes(left: Array) -> Array:

@@ -179,8 +179,7 @@ class RecordFindings(SavesFrames):
         return self.summary()
 
     def warnings(self, *, exclude: Collection[str] = ()) -> Iterator[RecordsWarning]:
-        """A warning that counts and names values that count as missing, one that names columns that are left out, and
-        one for each other kind of finding.
+        """Warnings of values that count as missing, of columns that are left out, and of each other kind of finding.
 
         Parameters
         ----------
@@ -271,9 +270,9 @@ class SetAside(SavesFrames):
     def warnings(self) -> Iterator[RecordsWarning]:
         """One warning that counts and names the values, and one that names the columns that are left out.
 
-        Yields
-        ------
-        RecordsWarning
+        Returns
+        -------
+        iterator of RecordsWarning
             Of kind "set-aside" or "left-out".
         """
         return RecordFindings(self.table, 0, left_out=self.left_out).warnings()
