@@ -31,7 +31,14 @@ from skthermo.preprocessing import set_aside
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.sensors import SensorRegression, filled_text
-from skthermo.residuals.weather import BEYOND, TrainingRange, misplaced_columns, unpredicted_text, unseen_weather
+from skthermo.residuals.weather import (
+    BEYOND,
+    Extrapolation,
+    TrainingRange,
+    misplaced_columns,
+    unpredicted_text,
+    unseen_weather,
+)
 
 
 class TemperatureCompensator(TransformerMixin, Estimator):
@@ -336,7 +343,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         predicted, doubts = self._regress(inputs, F, folds)
         residuals = self._difference(Y, predicted)
         self.scale_, self.usual_deviation_ = robust_deviation(residuals), median(self._deviations(predicted))
-        residuals = self._shrunk(residuals, self._with_fills(T, inputs, predicted))
+        self.extrapolation_ = self._learn_extrapolation(as_floats(inputs), inputs, F)
+        residuals = self._shrunk(residuals, inputs, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
         text = unpredicted_text(unknown, as_floats(inputs))
@@ -361,6 +369,17 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             F = frame_like(F, np.where(far, np.nan, Y))
         self.estimator_ = self.regression_.estimator
         return predicted, found
+
+    def _learn_extrapolation(self, weather: Array, inputs: Any, F: Any) -> Extrapolation:
+        """How residuals scatter where the regression extrapolates, in the coldest and the warmest fifth of records."""
+        estimator, scale = self._default_part("estimator") if self.estimator is None else self.estimator, self.scale_
+
+        def residuals_of(others: Rows, fifth: Rows) -> Array:
+            with collected():
+                predicted = self.regression_.out_of_fold(estimator, inputs, F, [(others, fifth)])[:, fifth]
+            return self._difference(as_floats(F)[fifth], predicted) / np.where(scale > 0, scale, np.nan)
+
+        return Extrapolation.learned(weather, residuals_of)
 
     def inputs(self, X: ArrayLike) -> tuple[Any, list[SkthermoWarning]]:
         """The columns beside the targets, gaps filled from the other sensors.
@@ -407,7 +426,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             *self.sensors_.doubts(T),
             *as_findings(UnevaluatedRowsWarning, unpredicted_text(unknown, as_floats(inputs)), "not-predicted"),
         ]
-        residuals = self._shrunk(self._difference(as_floats(F), predicted), predicted)
+        residuals = self._shrunk(self._difference(as_floats(F), predicted), inputs, predicted)
         return frame_like(F, residuals), inputs, findings
 
     def _difference(self, Y: Array, predicted: Array) -> Array:
@@ -431,11 +450,12 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Standard deviations of predictions, relative for relative residuals."""
         return np.where(self.relative_, predicted[1] / np.abs(predicted[0]), predicted[1])
 
-    def _shrunk(self, residuals: Array, predicted: Array) -> Array:
+    def _shrunk(self, residuals: Array, inputs: Any, predicted: Array) -> Array:
         """Residuals that count less where the regression is less certain than it usually was in the baseline."""
         excess = np.maximum(self._deviations(predicted) ** 2 - self.usual_deviation_**2, 0.0)
         variance = np.where(self.scale_ > 0, self.scale_, 1.0) ** 2
-        return residuals / np.sqrt(1 + np.nan_to_num(excess) / variance)
+        outside = self.extrapolation_.variances(inputs)[:, np.newaxis]
+        return residuals / np.sqrt(outside + np.nan_to_num(excess) / variance)
 
     def _filled(self, T: Any) -> tuple[Any, list[SkthermoWarning]]:
         """Inputs whose gaps the other sensors fill, and a finding that names these."""
