@@ -82,6 +82,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Regression of each of the other columns on the others: ``sensors_.fill(T)`` and ``sensors_.departures(T)``.
     training_range_ : object
         Lowest and highest values of the other columns.
+    extrapolation_ : object
+        Variance of residuals outside these values, ``extrapolation_.variances(T)``, in terms of the one inside.
     targets_ : ndarray of int
         Positions of the targets.
     findings_ : list of SkthermoWarning
@@ -100,7 +102,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
 
     Residuals of records whose prediction is less certain than usual in the baseline are divided by sqrt(1 + e / s),
     with the excess e of its variance and the variance s of the baseline's residuals. A prediction is uncertain where
-    temperatures were filled, and where the estimator's ``predict`` takes ``return_std`` and says so.
+    temperatures were filled, and where the estimator's ``predict`` takes ``return_std`` and says so. Outside the
+    baseline's weather, by d times the range of a column, residuals are divided by the root of 1 + g ln(1 + d^2)
+    besides: the coldest and the warmest fifth of the baseline, each predicted from the other records, tell a growth g
+    for either end.
 
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design: it predicts each row of the baseline by a clone
     fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than those of new
@@ -379,7 +384,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
                 predicted = self.regression_.out_of_fold(estimator, inputs, F, [(others, fifth)])[:, fifth]
             return self._difference(as_floats(F)[fifth], predicted) / np.where(scale > 0, scale, np.nan)
 
-        return Extrapolation.learned(weather, residuals_of)
+        return Extrapolation.learned(self.training_range_, weather, residuals_of)
 
     def inputs(self, X: ArrayLike) -> tuple[Any, list[SkthermoWarning]]:
         """The columns beside the targets, gaps filled from the other sensors.

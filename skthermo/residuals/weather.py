@@ -90,14 +90,18 @@ class Extrapolation:
 
     @classmethod
     def learned(
-        cls, weather: Array, residuals_of: Callable[[NDArray[np.intp], NDArray[np.intp]], Array], usual: float = 9.0
+        cls,
+        reach: TrainingRange,
+        weather: Array,
+        residuals_of: Callable[[NDArray[np.intp], NDArray[np.intp]], Array],
+        *,
+        usual: float = 9.0,
     ) -> Extrapolation:
-        """Learn from the coldest and from the warmest fifth of records.
+        """Learn from the coldest and from the warmest fifth of the records of a range.
 
         ``residuals_of(others, fifth)`` are residuals of records, in their usual standard deviations, by a regression on
         the others. The usual growth has the weight of a record at 0.6 ranges.
         """
-        reach = TrainingRange.spanned(weather, slice(None))
         warmth = np.argsort(np.nanmean((weather - reach.lowest) / reach.width, axis=1))
         n_apart, growth = len(weather) // 5, np.full(2, usual)
         for end, order in enumerate((warmth, warmth[::-1])):
