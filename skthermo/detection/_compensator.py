@@ -380,8 +380,11 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         estimator, scale = self._default_part("estimator") if self.estimator is None else self.estimator, self.scale_
 
         def residuals_of(others: Rows, fifth: Rows) -> Array:
-            with collected():
-                predicted = self.regression_.out_of_fold(estimator, inputs, F, [(others, fifth)])[:, fifth]
+            try:
+                with collected():
+                    predicted = self.regression_.out_of_fold(estimator, inputs, F, [(others, fifth)])[:, fifth]
+            except ValueError:  # the others are too few for a regression
+                return np.full((len(fifth), F.shape[1]), np.nan)
             return self._difference(as_floats(F)[fifth], predicted) / np.where(scale > 0, scale, np.nan)
 
         return Extrapolation.learned(self.training_range_, weather, residuals_of)

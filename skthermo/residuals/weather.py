@@ -15,7 +15,7 @@ from sklearn.neighbors import NearestNeighbors
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._core.arrays import Array, as_floats, median, robust_deviation, spread_evenly
+from skthermo._core.arrays import Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
 from skthermo._core.frames import Table, column_names
 from skthermo.exceptions import RecordsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
@@ -102,15 +102,17 @@ class Extrapolation:
         ``residuals_of(others, fifth)`` are residuals of records, in their usual standard deviations, by a regression on
         the others. The usual growth has the weight of a record at 0.6 ranges.
         """
-        warmth = np.argsort(np.nanmean((weather - reach.lowest) / reach.width, axis=1))
-        n_apart, growth = len(weather) // 5, np.full(2, usual)
-        for end, order in enumerate((warmth, warmth[::-1])):
+        warmth = means_of_known((weather - reach.lowest) / reach.width, axis=1)
+        coldest_first = np.argsort(warmth)[: (~np.isnan(warmth)).sum()]
+        n_apart, growth = len(coldest_first) // 5, np.full(2, usual)
+        for end, order in enumerate((coldest_first, coldest_first[::-1])):
             fifth, others = np.sort(order[:n_apart]), np.sort(order[n_apart:])
             if not n_apart:
                 continue
             added = np.log1p(TrainingRange.spanned(weather, others).ends(weather[fifth])[:, end] ** 2)
-            excess = np.nan_to_num(np.nanmean(residuals_of(others, fifth) ** 2, axis=1) - 1)
-            growth[end] = max((added @ excess + 0.1 * usual) / (added @ added + 0.1), 0.0)
+            excess = means_of_known(residuals_of(others, fifth) ** 2, axis=1) - 1
+            known = ~np.isnan(excess)
+            growth[end] = max((added[known] @ excess[known] + 0.1 * usual) / (added[known] @ added[known] + 0.1), 0.0)
         return cls(reach, growth)
 
     def variances(self, weather: Any) -> Array:
