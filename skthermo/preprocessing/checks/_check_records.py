@@ -23,6 +23,7 @@ from skthermo.preprocessing.checks._reading import Reading
 from skthermo.preprocessing.checks._record_findings import (
     ASIDE_KINDS,
     LEFT_OUT_KINDS,
+    WARNINGS,
     RecordFinding,
     RecordFindings,
     SetAside,
@@ -200,7 +201,7 @@ def set_aside(
     Raises
     ------
     ValueError
-        If the unit is no text, or what is left is meaningless as a whole: tables of other units, of different rows, or
+        If the unit is no text, a kind to exclude is unknown, or what is left is meaningless as a whole: tables of other units, of different rows, or
         exchanged; text; no record; or no column of a table that can be used. All of it is listed.
 
     Warns
@@ -224,6 +225,9 @@ def set_aside(
     >>> int(found.temperatures["T1"].isna().sum())
     31
     """
+    unknown = set(exclude).difference(WARNINGS)
+    if unknown:
+        raise ValueError(f"exclude has {sorted(unknown)}; expected some of {[*WARNINGS]}")
     readings, findings, _ = examine(temperatures, frequencies, unit, model)
     kinds = (ASIDE_KINDS if is_baseline else {"placeholders"}).difference(exclude)
     tables, left_out, n_rows = {"temperatures": None, "frequencies": None}, {}, 0
