@@ -201,8 +201,9 @@ def set_aside(
     Raises
     ------
     ValueError
-        If the unit is no text, a kind to exclude is unknown, or what is left is meaningless as a whole: tables of other units, of different rows, or
-        exchanged; text; no record; or no column of a table that can be used. All of it is listed.
+        If the unit is no text, a kind to exclude is unknown, or what is left is meaningless as a whole: tables of
+        other units, of different rows, or exchanged; text; no record; or no column of a table that can be used. All of
+        it is listed.
 
     Warns
     -----
