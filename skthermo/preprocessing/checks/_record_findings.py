@@ -27,8 +27,10 @@ WARNINGS = {
     "are unknown. Drop rows without a time, and read the others by pandas.to_datetime with format= or unit=",
     "stamps-as-text": "the index holds times that are no DatetimeIndex: {}. Rows would count as equally spaced, in "
     "the given order. Convert the index by pandas.to_datetime",
-    "unsorted-stamps": "rows are not in order of time, or times repeat: {}. Folds and lags take rows for periods of "
-    "time. Sort them by sort_index(), and keep one row for each time, such as by groupby(level=0).mean()",
+    "repeated-stamps": "times occur more than once: {}. Lags and memory cannot know which of the rows was earlier. "
+    "Keep one row for each time, such as by groupby(level=0).mean()",
+    "unsorted-stamps": "rows are not in order of time: {}. Folds and lags take rows for periods of time. Sort them by "
+    "sort_index()",
     "missing-column": "a column has no value: {}. Nothing can be learned from it. Leave it out, or check why it is "
     "empty",
     "constant": "a column is constant: {}. It carries no information, and its spread of zero makes any change "

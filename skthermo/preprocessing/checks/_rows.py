@@ -35,7 +35,7 @@ def times_found(index: pd.Index) -> list[RecordFinding]:
     if len(again):
         again = again[np.argsort(stamps[again], kind="stable")]
         detail = f"{len(again)} of {n_rows} rows have the time of another"
-        found.append(RecordFinding.in_rows(index, "unsorted-stamps", "", again, detail))
+        found.append(RecordFinding.in_rows(index, "repeated-stamps", "", again, detail))
     if len(late):
         detail = f"{len(late)} of {n_rows} rows are earlier than the row before, the first row {late[0]}"
         detail = f"{detail} ({period_of(index, late[:1])})"
