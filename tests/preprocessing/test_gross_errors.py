@@ -115,7 +115,7 @@ class TestUnits:
         for hint, values in (
             ("Fahrenheit", 1.8 * T[name] + 32),
             ("as in", 10 * T[name]),
-            ("correlation", -T[name]),
+            ("another sign", -T[name]),
         ):
             found = check_records(T.assign(**{name: values}))
             assert only(found)[:2] == ("unit-of-temperatures", name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from skthermo.preprocessing.checks._reading import Reading, texts_of
 
 LOGGED = (*MISSING_CODES, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
 COLDEST, HOTTEST = -90.0, 100.0  # degrees Celsius that a structure in the open may have
+OTHER_UNITS = (1.8, 32.0, "degrees Fahrenheit"), (10.0, 0.0, "tenths of a degree"), (-1.0, 0.0, "another sign")
+"""How many of them are a degree Celsius, what they are at 0 degrees Celsius, and their name."""
 
 
 def look_at_temperatures(T: Reading) -> None:
@@ -127,75 +130,50 @@ def has_levels(table: Reading, place: int, known: Array) -> bool:
 def in_degrees(T: Reading, places: list[int]) -> list[int]:
     """The sensors in degrees Celsius; those in degrees Fahrenheit, in parts of a degree or with another sign are named.
 
-    Of a sensor beside others, the median and the width between the 5th and the 95th percentile tell its unit, in rows
-    where all have a value. Parts of a degree span more than the open does, smoothly.
+    A sensor has another unit if it lies much nearer to most of the others in this unit, and varies as they do. All
+    sensors together, or one alone, have another unit if no bridge in the open is as warm, or if their values span more
+    than the open does, smoothly. Of two sensors, either may be the one with another sign.
     """
-    mirrored = with_opposite_sign(T, places)
-    fine = sorted(set(places).difference(mirrored))
-    if not fine or len(mirrored) == 1 == len(fine):
+    values, n_sensors, hints = T.values[:, places], len(places), {}
+    if not n_sensors:
         return []
-    values, units = T.values[:, fine], [""] * len(fine)
     lowest, low, middles, high, warmest, highest = np.nanquantile(values, [0, 0.05, 0.5, 0.95, 0.99, 1], axis=0)
-    together = np.flatnonzero(~np.isnan(values).any(axis=1))
     typical = np.median(middles)  # a bridge has 45 to 85, or a warmest percent of 70, in degrees Fahrenheit only
     is_warm = 45 < typical < 85 or (typical < 45 and np.median(warmest) > 70)
+    together = spread_evenly(np.flatnonzero(~np.isnan(values).any(axis=1)), 1000)
     if is_warm and middles.min() > 16 and lowest.min() > -60 and highest.max() < 170:
-        units = ["as in degrees Fahrenheit"] * len(fine)
-    elif len(fine) > 1 and len(together) >= 50:
-        quantiles = np.quantile(values[spread_evenly(together, 1000)], [0.05, 0.5, 0.95], axis=0)
-        for number in range(len(fine)):
-            others, middle = np.delete(quantiles, number, axis=1), quantiles[1, number]
-            centre, width = np.median(others[1]), quantiles[2, number] - quantiles[0, number]
-            ratio, off = width / max(np.median(others[2] - others[0]), 1e-300), abs((middle - 32) / 1.8 - centre)
-            at_zero = middle - ratio * centre  # where the others are at 0 degrees Celsius
-            is_apart = middle - centre > 20 and off < 15 and (off < 5 or abs(at_zero - 32) < 10)
-            is_wide = width > 90 or highest[number] > HOTTEST or lowest[number] < COLDEST
-            if is_apart and lowest[number] > -60 and highest[number] < 170 and 0.3 < ratio / 1.8 < 3:
-                units[number] = "as in degrees Fahrenheit beside the others"
-            elif is_wide and abs(middle / 10 - centre) < 7.5 and 0.3 < ratio / 10 < 3:
-                units[number] = "as in tenths of a degree beside the others"
-    for number in range(len(fine)):
-        is_open = low[number] >= COLDEST and high[number] <= HOTTEST and highest[number] - lowest[number] < 180
-        if units[number] or is_open:
-            continue
+        hints = dict.fromkeys(range(n_sensors), "as in degrees Fahrenheit")
+    elif len(together) >= 50 and n_sensors > 1:
+        some = values[together]
+        with np.errstate(invalid="ignore", divide="ignore"):  # of a column that is constant there
+            correlations = np.corrcoef(some.T)
+        widths = np.maximum(np.ptp(np.quantile(some, [0.05, 0.95], axis=0), axis=0), 1e-300)
+        for number, (factor, zero, unit) in product(range(n_sensors), OTHER_UNITS):
+            others, own = np.arange(n_sensors) != number, some[:, [number]]
+            before = np.median(np.abs(own - some[:, others]), axis=0)
+            after = np.median(np.abs((own - zero) / factor - some[:, others]), axis=0)
+            ratios = widths[number] / widths[others] / abs(factor)
+            is_so = (before > 10) & (after < 0.4 * before) & (ratios > 0.3) & (ratios < 3)
+            is_so &= correlations[number, others] * np.sign(factor) > 0.6
+            if is_so.mean() > 0.5 and (n_sensors > 2 or not hints):
+                hints.setdefault(number, f"as in {unit} beside the others")
+    for number in range(n_sensors):
         series = values[~np.isnan(values[:, number]), number]
         steps = np.abs(np.diff(series))[(series[1:] > HOTTEST) | (series[1:] < COLDEST)]
+        is_open = low[number] >= COLDEST and high[number] <= HOTTEST and highest[number] - lowest[number] < 180
+        is_smooth = steps.size and high[number] - low[number] > 4 * np.median(steps)  # of temperatures, not of errors
         largest = max(highest[number] / HOTTEST, lowest[number] / COLDEST)
-        is_smooth = high[number] - low[number] > 4 * np.median(steps)  # of temperatures, not of errors
-        if is_smooth and largest < 1000:
-            units[number] = f"as in degrees times {10 if largest < 10 else 100 if largest < 100 else 1000}"
-    is_rule, celsius = 2 * units.count("") < len(fine), []
-    for place, unit, least, most in zip(fine, units, lowest, highest, strict=True):
-        if unit or is_rule:
-            hint = unit or "beside others in such a unit"
-            T.found_in("unit-of-temperatures", place, f"lies between {least:.6g} and {most:.6g}, {hint},")
-        elif not unit:
+        if not is_open and is_smooth and largest < 1000:
+            hints.setdefault(number, f"as in degrees times {10 if largest < 10 else 100 if largest < 100 else 1000}")
+    is_rule, celsius = 2 * len(hints) > n_sensors, []
+    for number, place in enumerate(places):
+        hint = hints.get(number, "beside others in such a unit" if is_rule else "")
+        if hint:
+            span = f"lies between {lowest[number]:.6g} and {highest[number]:.6g}"
+            T.found_in("unit-of-temperatures", place, f"{span}, {hint},")
+        else:
             celsius.append(place)
     return celsius
-
-
-def with_opposite_sign(T: Reading, places: list[int]) -> list[int]:
-    """Sensors that fall where the others rise, about at the level of the others with another sign; and name them.
-
-    Of two sensors, either may be the one.
-    """
-    if len(places) < 2 or len(T.values) < 50:
-        return []
-    values, mirrored = T.values[:, places], []
-    lows, middles, highs = np.nanquantile(values, [0.25, 0.5, 0.75], axis=0)
-    standard = np.clip(np.nan_to_num((values - middles) / np.where(highs > lows, highs - lows, np.inf)), -3, 3)
-    norms = np.maximum(np.sqrt((standard**2).sum(axis=0)), 1e-150)
-    correlations = standard.T @ standard / np.outer(norms, norms)
-    for number, place in enumerate(places if correlations.min() < -0.6 else ()):
-        others = np.arange(len(places)) != number
-        centre = np.median(middles[others])
-        is_mirrored = abs(middles[number] + centre) < min(15, abs(middles[number] - centre))
-        against, among = np.median(correlations[number, others]), np.median(correlations[np.ix_(others, others)])
-        if is_mirrored and against < -0.6 and among > 0.6 and not (mirrored and len(places) == 2):
-            partner = "the others" if len(places) > 2 else repr(T.columns[places[1]])
-            T.found_in("unit-of-temperatures", place, f"and {partner} have a correlation of {against:.2f}")
-            mirrored.append(place)
-    return mirrored
 
 
 def put_stuck_aside(table: Reading) -> None:
