@@ -205,8 +205,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
     ],
     ("preprocessing/checks/_columns.py", "preprocessing/test_checks.py"): [
-        ("stuck sensors beside rounding", "length >= 4 * np.sort(lengths)[-4]", "length >= np.sort(lengths)[-4]"),
-        ("stuck sensors beside resting values", "length < 4 * same[3]", "False"),
+        ("stuck sensors beside rounding", "lengths if ((lengths > 1)", "lengths[:0] if ((lengths > 1)"),
+        ("stuck sensors beside resting values", "lengths[levels == levels[run]]", "lengths[:0]"),
         ("stuck sensors at all", "lengths[longest] >= 5", "lengths[longest] >= 500"),
     ],
     ("preprocessing/checks/_beside_weather.py", "preprocessing/test_checks.py"): [

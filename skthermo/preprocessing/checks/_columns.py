@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from skthermo._core.arrays import Array, median, spread_evenly
 from skthermo._core.frames import MISSING_CODES, columns_by_sensor
@@ -189,7 +188,7 @@ def put_stuck_aside(table: Reading) -> None:
             stuck = rows[first[run] : first[run] + lengths[run]]
             if stuck[0] == 0 and np.count_nonzero(table.values[0] == column[0]) > 1:
                 continue
-            if is_outstanding(values[first], lengths, run) and others_vary(values, lengths, lengths[run]):
+            if is_outstanding(values[first], lengths, run):
                 wrong = np.zeros(len(column), dtype=bool)
                 wrong[stuck] = True
                 table.put_aside("stuck", place, wrong)
@@ -202,33 +201,17 @@ def equal_runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def is_outstanding(levels: Array, lengths: NDArray[np.intp], run: np.intp) -> bool:
-    """Whether a run is four times as long as a usual one by rounding, and as a usual one at its value.
+    """Whether a run of equal values is four times as long as a usual one at its value and, where values are equal by
+    rounding, as a usual one; and whether chance would give less than a hundredth of such a run in the whole column.
 
-    The usual run is the fourth longest. Chance would give less than a hundredth of such a run in the whole column.
-    Rain, and the sun at night, are zero again and again.
+    The usual run is the fourth longest. Rain, and the sun at night, are zero again and again.
     """
     length, n_values = lengths[run], lengths.sum()
-    rounded = lengths[(lengths > 1) & (lengths < 5)]
-    same = np.sort(lengths[levels == levels[run]])[::-1]
-    if len(same) > 3 and length < 4 * same[3]:
-        return False
-    if rounded.size and len(lengths) > 3:
-        share = (rounded - 1).sum() / n_values
-        return bool(length >= 4 * np.sort(lengths)[-4] and n_values * share ** (length - 1) <= 0.01)
-    return True
-
-
-def others_vary(values: Array, lengths: NDArray[np.intp], length: int) -> bool:
-    """Whether 95 % of the other periods of a run's length vary by at least three steps of rounding."""
-    as_long = np.repeat(lengths >= length, lengths)
-    if 2 * length >= len(values) or np.count_nonzero(as_long) > len(values) / 2:
-        return bool(2 * length >= len(values))
-    steps = np.abs(np.diff(values))
-    windows, size = slice(0, len(values) - length + 1), {"size": int(length), "origin": -(int(length) // 2)}
-    ranges = (maximum_filter1d(values, **size) - minimum_filter1d(values, **size))[windows]
-    elsewhere = ~maximum_filter1d(as_long, **size)[windows]
-    least = 3 * steps[steps > 0].min() * (1 - 1e-9)
-    return bool(elsewhere.any() and np.quantile(ranges[elsewhere], 0.05) >= least)
+    for others in (lengths[levels == levels[run]], lengths if ((lengths > 1) & (lengths < 5)).any() else lengths[:0]):
+        if len(others) > 3 and length < 4 * np.sort(others)[-4]:
+            return False
+    share = (lengths[lengths <= length] - 1).sum() - length + 1
+    return bool(n_values * (share / n_values) ** (length - 1) <= 0.01)
 
 
 def compare_with_model(F: Reading, model: Any) -> None:
