@@ -30,15 +30,8 @@ from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRows
 from skthermo.preprocessing import set_aside
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.gaussian import Gaussian
-from skthermo.residuals.weather import (
-    BEYOND,
-    SensorRegression,
-    TrainingRange,
-    filled_text,
-    misplaced_columns,
-    unpredicted_text,
-    unseen_weather,
-)
+from skthermo.residuals.sensors import SensorRegression, filled_text
+from skthermo.residuals.weather import BEYOND, TrainingRange, misplaced_columns, unpredicted_text, unseen_weather
 
 
 class TemperatureCompensator(TransformerMixin, Estimator):
