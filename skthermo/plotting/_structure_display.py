@@ -138,7 +138,7 @@ class StructureDisplay(Display):
         ------
         ValueError
             If a group, member or mode is unknown, two groups give a member different values, or the number of values is
-            not that of the members; if the model has no mode shapes, or not those of the structure's degrees of freedom.
+            not that of the members; if the model has no mode shapes of the structure's degrees of freedom.
         """
         check_structure(structure, groups)
         if values is not None and not (groups is None and model is None and modes is None):
