@@ -118,15 +118,13 @@ def panels(
     size: tuple[float, float],
     n_columns: int = 1,
     share_x: bool = False,
-    heights: Sequence[float] | None = None,
 ) -> np.ndarray:
-    """One axes for each name: those that are given, or those of a new figure, perhaps with heights of its rows."""
+    """One axes for each name: those that are given, or those of a new figure."""
     if ax is None:
         n_columns = min(n_columns, len(names))
         n_rows = -(-len(names) // n_columns)
-        height = size[1] * n_rows if heights is None else sum(heights)
-        figure = pyplot().figure(figsize=(size[0] * n_columns, height), layout="constrained")
-        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False, height_ratios=heights).ravel()
+        figure = pyplot().figure(figsize=(size[0] * n_columns, size[1] * n_rows), layout="constrained")
+        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False).ravel()
         for unused in axes[len(names) :]:
             unused.remove()
         for above in axes[max(len(names) - n_columns, 0) : len(names)] if share_x else ():
@@ -150,17 +148,6 @@ def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> 
         axes[0].figure.legend(handles, labels, loc="outside upper center", **style)
     else:
         axes[0].legend(handles, labels, frameon=False, markerscale=scale, fontsize="small")
-
-
-def panel_legend(ax: Axes, is_own_figure: bool, n_columns: int = 4) -> None:
-    """The legend of one panel: above it in a new figure, within given axes."""
-    handles, labels, scale = _labelled(np.array([ax]))
-    style: dict[str, object] = {"frameon": False, "markerscale": scale, "fontsize": "small"}
-    if is_own_figure:
-        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.2}
-        style |= place | {"ncols": legend_columns(labels, ax.figure, n_columns) if labels else 1}
-    if handles:
-        ax.legend(handles, labels, **style)
 
 
 def _labelled(axes: np.ndarray) -> tuple[list[Artist], list[str], float]:
@@ -264,7 +251,7 @@ def _mark_edge(
     _write(ax, text, gid=f"{BEYOND} {direction}", **place)
 
 
-def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
+def mark_not_evaluated(ax: Axes, places: dict[str, Array]) -> None:
     """Grey ticks at the bottom where records of each label are not evaluated, and a text that counts them."""
     texts = []
     for label, x in places.items():
@@ -272,8 +259,7 @@ def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> No
             style = {"linestyle": "", "marker": "|", "markersize": 7, "color": GREY, "markeredgewidth": 0.8}
             style["rasterized"] = len(x) > DENSE
             ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not evaluated", **style)
-            nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
-            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not evaluated")
+            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)} not evaluated")
     if texts:
         _write(ax, "; ".join(texts), x=0.01, y=0.95, ha="left", va="top", gid="not evaluated")
 
