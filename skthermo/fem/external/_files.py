@@ -205,7 +205,7 @@ def _read_folder(folder: Path, is_used: Callable[[str], bool]) -> NamedMatrices:
 
 
 def _named_files(files: Sequence[Path], is_used: Callable[[str], bool]) -> dict[str, Path]:
-    """The file of each matrix; a mass beside a stiffness of the same name is told apart from it."""
+    """The file of each matrix; a mass has another name than the stiffness of its job."""
     exports = {file: _export_of(file) for file in files}
     stiff = {name for name, kind in exports.values() if kind == "stiffness"}
     named: dict[str, Path] = {}

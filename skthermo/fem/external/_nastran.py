@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +32,14 @@ OP4_HEADING = re.compile(
 REAL_KINDS = 1, 2  # types of real numbers, in single and double precision; others are complex
 
 
+class Entry(NamedTuple):
+    """Four fields of a DMIG card or its continuation: the number of its head, its line, and the fields."""
+
+    head: int
+    line: int
+    fields: bytes
+
+
 def read_dmig(content: bytes) -> dict[str, Labelled | None]:
     """Matrices of Nastran's DMIG entries by name, in small, large or free field; None for complex or rectangular ones.
 
@@ -40,26 +48,42 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
     """
     text = lines_ended(content.upper())
     width = 32 if re.search(rb"^DMIG\*? *,", text, re.MULTILINE) else 16  # free fields may be longer
-    heads, entries, is_dmig = list[bytes](), list[bytes](), False
-    head_lines, entry_lines, owners = array("q"), array("q"), array("q")
-    for number, line in enumerate(text.split(b"\n"), start=1):
+    heads = list[Entry]()
+    entries = _entries(text.split(b"\n"), width, heads)
+    del text, content
+    parts = [_cells((), width)]
+    while batch := tuple(islice(entries, 100_000)):  # whose words take far more memory than their numbers
+        parts.append(_cells(batch, width))
+    owners, rows, values = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return _named_matrices(heads, width, owners, rows, values)
+
+
+def _entries(lines: list[bytes], width: int, heads: list[Entry]) -> Iterator[Entry]:
+    """Groups of node, component and value; cards that name a matrix and a column are added to the heads."""
+    is_column = False
+    for number, line in enumerate(lines, start=1):
         if line[:1].isalpha():
-            is_dmig = line[:4] == b"DMIG" and line[4:5] in b" *,"
-            if is_dmig:
-                heads.append(line)
-                head_lines.append(number)
-                groups = _groups(line, width)[1:]
-        elif is_dmig and line[:1] in b" +*,":
-            groups = _groups(line, width)
-        else:
+            is_column = line[:4] == b"DMIG" and line[4:5] in b" *,"
+            if not is_column:
+                continue
+            head, *groups = _groups(line, width)
+            heads.append(Entry(len(heads), number, head))
+            is_column = bool(head[width : 2 * width].strip(b" 0"))  # else it states the form
+        elif not (is_column and line[:1] in b" +*,"):
             continue
-        for group in groups if is_dmig else ():
+        else:
+            groups = _groups(line, width)
+        for group in groups if is_column else ():
             if group[: 3 * width].strip():
-                entries.append(group)
-                owners.append(len(heads) - 1)
-                entry_lines.append(number)
-    columns = fields([_groups(line, width)[0] for line in heads], 4, width), np.array(head_lines)
-    return _named_matrices(*columns, fields(entries, 4, width), np.array(entry_lines), np.array(owners))
+                yield Entry(len(heads) - 1, number, group)
+
+
+def _cells(entries: Sequence[Entry], width: int) -> tuple[Integers, Integers, Numbers]:
+    """Number of the head, label (n, 2) and value of each entry."""
+    words, lines = fields([entry.fields for entry in entries], 4, width), np.array([entry.line for entry in entries])
+    nodes = _whole_words(words[:, :1], lines, "a node", 1)
+    rows = np.column_stack([nodes, _whole_words(words[:, 1:2], lines, "a component", 0)])
+    return np.array([entry.head for entry in entries], dtype=np.int64), rows, reals(words[:, 2], lines)
 
 
 def _groups(line: bytes, width: int) -> list[bytes]:
@@ -76,13 +100,14 @@ def _groups(line: bytes, width: int) -> list[bytes]:
 
 
 def _named_matrices(
-    heads: Words, head_lines: Integers, entries: Words, lines: Integers, owners: Integers
+    heads: Sequence[Entry], width: int, owners: Integers, rows: Integers, values: Numbers
 ) -> dict[str, Labelled | None]:
-    """Matrices from the cards that name them and a column, and the entries of each such card."""
-    names = [name.strip().decode("latin-1") for name in heads[:, 0].tolist()]
-    columns = _whole_words(heads[:, 1:4], head_lines, "a node, component or form", 0)
+    """Matrices from the cards that name them and a column, and from the entries of each such card."""
+    lines, words = np.array([head.line for head in heads]), fields([head.fields for head in heads], 4, width)
+    names = [name.strip().decode("latin-1") for name in words[:, 0].tolist()]
+    columns = _whole_words(words[:, 1:4], lines, "a node, component or form", 0)
     forms = dict[str, list[int]]()
-    for name, (node, form, kind), line in zip(names, columns.tolist(), head_lines.tolist(), strict=True):
+    for name, (node, form, kind), line in zip(names, columns.tolist(), lines.tolist(), strict=True):
         if not 0 < len(name) <= 8:
             raise ValueError(f"line {line}: {name!r} is no name of one to eight characters")
         if node == 0:
@@ -92,18 +117,14 @@ def _named_matrices(
                 raise ValueError(f"line {line}: matrix {name!r} has {stated}; expected 6 and 2, or such")
     if not names:
         raise ValueError("no DMIG entry")
-    for name, line in zip(names, head_lines.tolist(), strict=True):
+    for name, line in zip(names, lines.tolist(), strict=True):
         if name not in forms:
             raise ValueError(f"line {line}: matrix {name!r} has no entry that states its form")
     found: dict[str, Labelled | None] = dict.fromkeys(names)
     for name, (form, kind) in forms.items():
         if form in (1, 6) and kind in REAL_KINDS:
-            own = (np.array([other == name for other in names]) & (columns[:, 0] != 0))[owners]
-            words, places = entries[own], lines[own]
-            nodes = _whole_words(words[:, :1], places, "a node", 1)
-            rows = np.column_stack([nodes, _whole_words(words[:, 1:2], places, "a component", 0)])
-            values = reals(words[:, 2], places)
-            found[name] = labelled(rows, columns[owners[own], :2], values, is_symmetric=form == 6)
+            own = np.array([other == name for other in names])[owners]
+            found[name] = labelled(rows[own], columns[owners[own], :2], values[own], is_symmetric=form == 6)
     return found
 
 
