@@ -5,7 +5,6 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
-from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -15,21 +14,11 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Matrix
 
-MATRIX, COMPRESSED = 14, 15  # types of elements that are variables
+COMPRESSED = 15  # the type of an element that holds a variable in compressed form
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 """NumPy's names of the types of numbers."""
 
 Part = tuple[int, memoryview]
-
-
-class MatlabClass(IntEnum):
-    """Classes of variables; those from 6 to 15 are full arrays of numbers."""
-
-    CELL = 1
-    STRUCT = 2
-    CHARACTERS = 4
-    SPARSE = 5
-    OPAQUE = 17
 
 
 def read_matlab(file: Path) -> dict[str, Any]:
@@ -94,14 +83,14 @@ def _elements(content: memoryview, order: str) -> Iterator[Part]:
 
 def _variable(kind: int, body: memoryview, order: str) -> tuple[str, Any]:
     """Name and value of a variable, of a cell or of a field."""
-    if kind != MATRIX:
+    if kind != 14:
         raise ValueError(f"an element of type {kind}; expected a variable")
     if not body:  # a cell that was never filled
         return "", np.empty((0, 0))
     (_, flags), *parts = _elements(body, order)
     (word,) = struct.unpack_from(order + "I", flags)
     own_class, is_complex = word & 0xFF, bool(word & 0x0800)
-    if own_class == MatlabClass.OPAQUE:  # which has no dimensions
+    if own_class == 17:  # an opaque object, which has no dimensions
         return bytes(parts[0][1]).decode("ascii"), None
     shape, name = tuple(_numbers(parts[0], order).tolist()), bytes(parts[1][1]).decode("ascii")
     try:
@@ -113,16 +102,16 @@ def _variable(kind: int, body: memoryview, order: str) -> tuple[str, Any]:
 def _value(own_class: int, shape: tuple[int, ...], parts: list[Part], order: str, *, n_values: int) -> Any:
     """The value that the parts of a variable hold; ``n_values`` is 2 for complex numbers."""
     match own_class:
-        case MatlabClass.SPARSE:
+        case 5:  # a sparse matrix
             rows, starts = (_numbers(part, order) for part in parts[:2])
             return _sparse(rows, starts, _complex(parts[2:], order, n_values), shape)
-        case n if 6 <= n <= 15:
+        case n if 6 <= n <= 15:  # numbers
             return _complex(parts, order, n_values).reshape(shape, order="F")
-        case MatlabClass.CHARACTERS:
+        case 4:  # text
             return _rows_of_text(parts[0], shape, order)
-        case MatlabClass.CELL:
+        case 1:  # a cell array
             return [_variable(*part, order)[1] for part in parts]
-        case MatlabClass.STRUCT:
+        case 2:  # structs
             width, names = int(_numbers(parts[0], order)[0]), bytes(parts[1][1])
             fields = [names[i : i + width].split(b"\0")[0].decode() for i in range(0, len(names), width)]
             values = [_variable(*part, order)[1] for part in parts[2:]]

@@ -32,9 +32,8 @@ if TYPE_CHECKING:
 
     from skthermo.studies import DetectabilityStudy
 
-SIMULATED, REFERENCE = "simulated", "reference"
 OF_RESULTS = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
-BOUNDED = ["false_alarms", "pod", "pod_deficit"]  # columns of a ranking that have bounds
+BOUNDED = ("false_alarms", "pod", "pod_deficit")
 OF_RANKING = [f"{name}{end}" for name in BOUNDED for end in ("", "_ci_low", "_ci_high")]
 OF_RANKING += ["within_limit", "pod_at_equal_pfa", "significantly_worse"]
 OF_CAUSES = ["probability", "severity", "ci_low", "ci_high"]
@@ -42,13 +41,6 @@ OF_SHIFTS = ["measured", "explained", "standard_error"]
 BEST, ONE_REPEAT = "not significantly worse", "order uncertain: one repeat"
 WORSE, FAILED = "significantly lower POD", "failed"
 
-ROW, MARGINS = 0.26, 1.5
-"""Inches that a row takes, and all that is above and below the rows."""
-
-PERCENT = (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100)  # ticks of an axis of small rates
-MARGIN = 0.02  # share of an axis of small rates that is below 0
-CLOSEST = 0.07  # share of the axis that two ticks are apart at least
-LONGEST_NOTE = 45  # number of letters above which a note in a row is cut
 RATES = ["low", "high", "value", "mark"]
 
 
@@ -145,7 +137,7 @@ class DetectorsDisplay(Display):
         what: Literal["ranking", "agreement"] = "ranking",
         *,
         max_false_alarms: float = 0.02,
-        source: str = SIMULATED,
+        source: str = "simulated",
         by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         **options: object,
     ) -> DetectorsDisplay:
@@ -258,7 +250,7 @@ class DetectorsDisplay(Display):
         n_columns = min(2 if len(self.panels) == 4 else 3, len(self.panels))
         n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
         width = 3.6 if n_columns > 1 else 5.0
-        size = width + LETTER * n_letters / n_columns, max(ROW * len(self.places) + MARGINS, 2.4)
+        size = width + LETTER * n_letters / n_columns, max(0.26 * len(self.places) + 1.5, 2.4)  # inches
         self._take_axes(ax, list(self.panels), size, n_columns=n_columns)
         self.bars_: dict[str, BarContainer] = {}
         self.values_: dict[str, PathCollection] = {}
@@ -303,7 +295,7 @@ class DetectorsDisplay(Display):
             text = printable(panel.notes.get(detector, ""))
             if not text:
                 continue
-            text = text if len(text) <= LONGEST_NOTE else f"{text[:LONGEST_NOTE].rstrip()} ..."
+            text = text if len(text) <= 45 else f"{text[:45].rstrip()} ..."
             is_right = False
             if detector in panel.rates.index:
                 drawn, (left, right) = panel.rates.loc[detector, RATES].astype(float), ax.get_xlim()
@@ -444,7 +436,9 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
         )
     n_unknown = results.get("n_not_evaluated", pd.Series(0, results.index))
     results = results.assign(unknown=n_unknown / (results.get("n_records", 0) + n_unknown))
-    simulated, measured = (results[results["source"] == source].set_index(keys) for source in (SIMULATED, REFERENCE))
+    simulated, measured = (
+        results[results["source"] == source].set_index(keys) for source in ("simulated", "reference")
+    )
     table = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
     measured = measured.rename(columns={"rate": "mark", "unknown": "unknown_measured", "n_repeats": "n_campaigns"})
     scenarios = measured.index.get_level_values("scenario")
@@ -501,9 +495,9 @@ def small_rates(ax: Axes, drawn: Array) -> None:
     largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
     functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
     ticks: list[float] = []
-    for value in PERCENT:
-        if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > CLOSEST * np.sqrt(largest)):
+    for value in (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100):
+        if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > 0.07 * np.sqrt(largest)):
             ticks.append(value)
     ax.set_xscale("function", functions=functions)
-    ax.set_xlim(-(MARGIN**2) * largest, largest)
+    ax.set_xlim(-0.0004 * largest, largest)  # 2 % of the axis
     ax.set_xticks(ticks, [f"{value:g}" for value in ticks])

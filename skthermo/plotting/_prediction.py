@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import PolyCollection
     from matplotlib.lines import Line2D
 
-FREQUENCIES, PARAMETERS = ("measured", "predicted"), ("from frequencies", "from temperatures")
 KINDS = ("time", "points", "lines", "scatter")
 
 
@@ -172,7 +171,11 @@ class PredictionDisplay(Display):
         if what == "parameters":
             tables = (estimator.estimate_parameters(y), estimator.predict_parameters(X))
             measured, predicted = (pd.DataFrame(table, columns=estimator.parameter_names_) for table in tables)
-            options = {"labels": PARAMETERS, "unit": "", "quantity": "multiple of nominal"} | options
+            options = {
+                "labels": ("from frequencies", "from temperatures"),
+                "unit": "",
+                "quantity": "multiple of nominal",
+            } | options
             return cls.from_predictions(measured, predicted, **options)
         if sensor is not None or options.get("kind") == "scatter":
             confidence = None
@@ -198,7 +201,7 @@ class PredictionDisplay(Display):
         highest: ArrayLike | None = None,
         *,
         temperature: ArrayLike | None = None,
-        labels: tuple[str, str] = FREQUENCIES,
+        labels: tuple[str, str] = ("measured", "predicted"),
         **options: object,
     ) -> PredictionDisplay:
         """Draw measured and predicted values, or true and estimated ones.

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
 
 WIDTH, THIN = 2.5, 0.8
-LOW = 0.4  # share of its width below which a structure is too low for a colour bar beside it
-HEIGHT_OF_BAR = 0.5  # inches, with its label
 
 
 @dataclass(eq=False, repr=False)
@@ -248,7 +246,7 @@ class StructureDisplay(Display):
             room = {"left": 0.03, "right": 0.97 if self.values is None else 0.87, "top": 0.97}
             self.ax_.get_gridspec().update(bottom=0.9 / self.figure_.get_figheight(), **room)
         set_view(self.ax_, nodes, is_own_figure)
-        is_low = is_own_figure and not view.is_space and height_of(nodes) < LOW
+        is_low = is_own_figure and not view.is_space and height_of(nodes) < 0.4  # no room beside it
         is_beside = is_own_figure and view.is_space
         self.colorbar_ = None if self.values is None else self._draw_colorbar(is_low, is_beside)
         self._draw_legend(view, supports, is_own_figure)
@@ -314,7 +312,7 @@ class StructureDisplay(Display):
         shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
         place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
         if is_low:
-            self.figure_.set_figheight(self.figure_.get_figheight() + HEIGHT_OF_BAR)
+            self.figure_.set_figheight(self.figure_.get_figheight() + 0.5)
             place = {"ax": self.ax_, "location": "top", "shrink": 0.5, "aspect": 40, "pad": 0.05}
         if is_beside:
             place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
