@@ -14,7 +14,7 @@ from sklearn.base import BaseEstimator
 from skthermo._core.arrays import Array, as_columns
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import check_same_rows
-from skthermo._core.warnings import warnings_once
+from skthermo._core.warnings import collected, warn_each
 from skthermo.plotting._display import (
     BLACK,
     BLUE,
@@ -185,11 +185,12 @@ class PredictionDisplay(Display):
                 "estimator with one, such as DataInformedFEM, or confidence=None"
             )
         ends: Sequence[ArrayLike] = ()
-        with warnings_once():
+        with collected() as findings:
             predicted = estimator.predict(X)
             if confidence is not None:
                 ends = estimator.predict_interval(X, confidence)
                 options = {"interval_label": f"interval, {100 * confidence:g} %"} | options
+        warn_each(findings)
         return cls.from_predictions(y, predicted, *ends, **options)
 
     @classmethod

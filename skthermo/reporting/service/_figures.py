@@ -114,6 +114,6 @@ def draw_drift(standing: Standing, alt: str) -> list[Html]:
     shown = changes.set_axis([str(name).removeprefix("drift ") for name in columns], axis=1)
 
     def make() -> PredictionDisplay:
-        return PredictionDisplay.from_predictions(shown, unit="%", kind="lines")
+        return PredictionDisplay.from_predictions(shown, unit="%", kind="lines", quantity="change")
 
     return [draw(make, alt, height=1.0 + 1.4 * len(columns), values=values)]
