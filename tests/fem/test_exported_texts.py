@@ -228,5 +228,5 @@ def test_errors_name_file_and_line(tmp_path, kind, pattern, new, message):
 )
 def test_a_matrix_too_large_for_its_file_is_refused(tmp_path, name, text):
     (tmp_path / name).write_text(text)
-    with pytest.raises(ValueError, match=rf"{re.escape(name)}: .*(expected at most ten million|as many|cut off)"):
+    with pytest.raises(ValueError, match=rf"{re.escape(name)}: .*(expected at most twenty million|as many|cut off)"):
         load_affine(tmp_path / name)

@@ -45,7 +45,7 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     ValueError
         Names the file, and the line that does not hold three finite numbers; if rows or columns are not positive
         integers, an entry is given twice, entries are on both sides of the diagonal but not in pairs, or rows are more
-        than ten million and ten for each entry.
+        than twenty million and ten for each entry.
 
     See Also
     --------

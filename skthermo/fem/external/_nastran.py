@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -32,12 +31,8 @@ OP4_HEADING = re.compile(
 REAL_KINDS = 1, 2  # types of real numbers, in single and double precision; others are complex
 
 
-class Entry(NamedTuple):
-    """Four fields of a DMIG card or its continuation: the number of its head, its line, and the fields."""
-
-    head: int
-    line: int
-    fields: bytes
+Entry = tuple[int, int, bytes]
+"""Four fields of a DMIG card or its continuation: the number of its head, its line, and the fields."""
 
 
 def read_dmig(content: bytes) -> dict[str, Labelled | None]:
@@ -47,63 +42,63 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
     ``EXTOUT=DMIGPCH`` writes them to the punch file. A half of a symmetric matrix (form 6) or all of it may be there.
     """
     text = lines_ended(content.upper())
-    width = 32 if re.search(rb"^DMIG\*? *,", text, re.MULTILINE) else 16  # free fields may be longer
-    heads = list[Entry]()
-    entries = _entries(text.split(b"\n"), width, heads)
+    is_free = b"," in text and re.search(rb"^DMIG\*? *,", text, re.MULTILINE)
+    width = 32 if is_free else 16  # free fields may be longer
+    heads, entries, parts = list[Entry](), list[Entry](), [_cells((), width)]
+    number = at = 0
+    for card in re.finditer(rb"^DMIG[ *,].*(?:\n(?![A-Z]).*)*", text, re.MULTILINE):  # with its continuations
+        number, at = number + text.count(b"\n", at, card.start()), card.start()
+        (_, _, head), *own = _groups(card[0].split(b"\n"), len(heads), number + 1, width)
+        heads.append((len(heads), number + 1, head))
+        if head[width : 2 * width].strip(b" 0"):  # a column; else the card states the form
+            entries += own
+        if len(entries) > 100_000:  # their words take far more memory than their numbers
+            parts.append(_cells(entries, width))
+            entries.clear()
+    parts.append(_cells(entries, width))
     del text, content
-    parts = [_cells((), width)]
-    while batch := tuple(islice(entries, 100_000)):  # whose words take far more memory than their numbers
-        parts.append(_cells(batch, width))
     owners, rows, values = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     return _named_matrices(heads, width, owners, rows, values)
 
 
-def _entries(lines: list[bytes], width: int, heads: list[Entry]) -> Iterator[Entry]:
-    """Groups of node, component and value; cards that name a matrix and a column are added to the heads."""
-    is_column = False
-    for number, line in enumerate(lines, start=1):
-        if line[:1].isalpha():
-            is_column = line[:4] == b"DMIG" and line[4:5] in b" *,"
-            if not is_column:
-                continue
-            head, *groups = _groups(line, width)
-            heads.append(Entry(len(heads), number, head))
-            is_column = bool(head[width : 2 * width].strip(b" 0"))  # else it states the form
-        elif not (is_column and line[:1] in b" +*,"):
+def _groups(lines: list[bytes], head: int, first: int, width: int) -> list[Entry]:
+    """Groups of four fields, each filled up to a width: name and column, then node, component and value."""
+    found: list[Entry] = []
+    for number, line in enumerate(lines, start=first):
+        if line[:1] not in b"D +*,":
             continue
+        if width == 16 and b"*" in line[:8]:
+            found.append((head, number, line[8:72]))
+            continue
+        if width == 32 and b"," in line:
+            parts = [part.strip() for part in line.partition(b"$")[0].split(b",")[1:9]]
+        elif b"*" in line[:8]:
+            parts = [line[i : i + 16] for i in range(8, 72, 16)]
         else:
-            groups = _groups(line, width)
-        for group in groups if is_column else ():
-            if group[: 3 * width].strip():
-                yield Entry(len(heads) - 1, number, group)
+            parts = [line[i : i + 8] for i in range(8, 72, 8)]
+        filled = [b"".join([part.ljust(width) for part in parts[i : i + 4]]) for i in range(0, len(parts), 4)]
+        found += [(head, number, group) for group in filled]
+    return found[:1] + [entry for entry in found[1:] if entry[2][: 3 * width].strip()]
 
 
 def _cells(entries: Sequence[Entry], width: int) -> tuple[Integers, Integers, Numbers]:
     """Number of the head, label (n, 2) and value of each entry."""
-    words, lines = fields([entry.fields for entry in entries], 4, width), np.array([entry.line for entry in entries])
+    heads, lines, words = _columns(entries, width)
     nodes = _whole_words(words[:, :1], lines, "a node", 1)
     rows = np.column_stack([nodes, _whole_words(words[:, 1:2], lines, "a component", 0)])
-    return np.array([entry.head for entry in entries], dtype=np.int64), rows, reals(words[:, 2], lines)
+    return heads, rows, reals(words[:, 2], lines)
 
 
-def _groups(line: bytes, width: int) -> list[bytes]:
-    """One or two groups of four fields, each filled up to a width: name and column, or node, component and value."""
-    if width == 16 and b"*" in line[:8]:
-        return [line[8:72]]
-    if width == 32 and b"," in line:
-        parts = [part.strip() for part in line.partition(b"$")[0].split(b",")[1:9]]
-    elif b"*" in line[:8]:
-        parts = [line[i : i + 16] for i in range(8, 72, 16)]
-    else:
-        parts = [line[i : i + 8] for i in range(8, 72, 8)]
-    return [b"".join([part.ljust(width) for part in parts[i : i + 4]]) for i in range(0, len(parts), 4)]
+def _columns(entries: Sequence[Entry], width: int) -> tuple[Integers, Integers, Words]:
+    heads, lines, groups = zip(*entries, strict=True) if entries else ((), (), ())
+    return np.array(heads, dtype=np.int64), np.array(lines, dtype=np.int64), fields(list(groups), 4, width)
 
 
 def _named_matrices(
     heads: Sequence[Entry], width: int, owners: Integers, rows: Integers, values: Numbers
 ) -> dict[str, Labelled | None]:
     """Matrices from the cards that name them and a column, and from the entries of each such card."""
-    lines, words = np.array([head.line for head in heads]), fields([head.fields for head in heads], 4, width)
+    _, lines, words = _columns(heads, width)
     names = [name.strip().decode("latin-1") for name in words[:, 0].tolist()]
     columns = _whole_words(words[:, 1:4], lines, "a node, component or form", 0)
     forms = dict[str, list[int]]()

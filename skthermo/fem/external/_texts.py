@@ -67,8 +67,8 @@ def whole(numbers: Numbers, what: str, least: int = -MOST_INTEGER) -> Integers:
 
 def check_size(n_rows: int, n_entries: int) -> None:
     """Refuse a number of rows that would take far more memory than the entries."""
-    if n_rows > max(10**7, 10 * n_entries):
-        raise ValueError(f"{n_rows:,} rows for {n_entries:,} entries; expected at most ten million, or ten an entry")
+    if n_rows > max(20_000_000, 10 * n_entries):
+        raise ValueError(f"{n_rows:,} rows for {n_entries:,} entries; expected at most twenty million, or ten an entry")
 
 
 def square(rows: Integers, columns: Integers, values: Numbers, size: int) -> scipy.sparse.csc_array:
