@@ -3,10 +3,9 @@
 import importlib
 
 PLACES = {
-    "_core.matrix_child": ["read"],
-    "_core.matrix_files": ["form_of"],
     "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
+    "fem.external._files": ["form_of", "read_file"],
     "fleet._fleet": ["Storage"],
     "fleet._workers": ["BridgeOutcome", "known_of", "pickled"],
     "monitoring._active": ["ActiveDetector"],
