@@ -77,26 +77,6 @@ def chains_fitted_once(monkeypatch):
     monkeypatch.setattr(DataInformedFEM, "fit", once)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _the_memory_of_records_is_found_once():
-    """Most chains of the tests learn from few records; each check of them would look for their memory again."""
-    import joblib
-
-    from skthermo.surrogate.chain import _records
-
-    found, find = {}, _records.find_memory
-
-    def once(*records):
-        key = joblib.hash(records)
-        if key not in found:
-            found[key] = find(*records)
-        return copy.deepcopy(found[key])
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(_records, "find_memory", once)
-        yield
-
-
 @pytest.fixture(autouse=True)
 def _chains_of_docstrings_are_fitted_once(request):
     if isinstance(request.node, pytest.DoctestItem):

@@ -92,8 +92,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/_evaluate.py", "fem/test_modes_at_sensors.py"): [
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
-    ("fleet/_workers.py", "fleet/test_fit_fleet.py"): [
-        ("bridges of a killed process are begun again", "if n_lost[name] > MOST_LOST", "if n_lost[name] > 0"),
+    ("monitoring/_fleet_bridge.py", "monitoring/test_fleet.py"): [
+        ("bridges whose records failed called healthy", "if not self.errors:", "if True:"),
+    ],
+    ("surrogate/_fleet_mapper.py", "surrogate/test_fleet_mapper.py"): [
+        ("bridges unlike the others", "(1.0, 10.0, 100.0)", "(1.0,)"),
     ],
     ("fem/_evaluate.py", "fem/test_progress.py"): [
         ("one warning of many chunks", "model.quiet() if thread_safe else model", "model"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._core.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
-from skthermo._core.estimators import last_step, offers, reach_of
+from skthermo._core.estimators import last_step
 from skthermo._core.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import capital
@@ -81,7 +81,7 @@ class FittedRows(SavesFrames):
         ]
         return lines
 
-    def warnings(self, n_parameters: int, *, knows_fleet: bool, per_parameter: int = 10) -> Iterator[SkthermoWarning]:
+    def warnings(self, n_parameters: int, per_parameter: int = 10) -> Iterator[SkthermoWarning]:
         """Warnings that few rows train, fewer than so many ``per_parameter``, or that most have a filled sensor."""
         if 2 * self.trained < self.given:
             yield FewRecordsWarning(
@@ -90,7 +90,7 @@ class FittedRows(SavesFrames):
                 "imputer=KNNGapImputer()",
                 "rows-left-out",
             )
-        if self.trained < per_parameter * n_parameters and not knows_fleet:
+        if self.trained < per_parameter * n_parameters:
             yield FewRecordsWarning(
                 f"fewer than {per_parameter} complete rows for each parameter train the temperature mapper. The fit is "
                 "unreliable. Give a season or a year of records",
@@ -194,11 +194,6 @@ class FitReport(SavesFrames):
         Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
     findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
-    fleet : DataFrame or None
-        With a mapper that has learned from a fleet: lowest and highest value of each input in these records and in the
-        fleet's.
-    pooling_probability : mapping or None
-        Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     doubts : list of SkthermoWarning
         What `fit` has found doubtful in the records and by its parts, a finding of each kind.
 
@@ -220,8 +215,6 @@ class FitReport(SavesFrames):
     parameters: FittedParameters
     solved: str
     findings: RecordFindings
-    fleet: pd.DataFrame | None
-    pooling_probability: Mapping[Any, float] | None
     doubts: list[SkthermoWarning]
 
     def __repr__(self) -> str:
@@ -243,13 +236,6 @@ class FitReport(SavesFrames):
                 "of them."
             )
         lines += self.parameters.sentences
-        if self.fleet is not None:
-            lines.append(
-                f"Outside the weather of these records, predictions are based on the fleet: {self._listed_weather()}."
-            )
-        if self.pooling_probability is not None:
-            listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.pooling_probability.items())
-            lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
         if len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"MAPE is in-sample, of {self.rows.scored} rows spread evenly over the training rows."]
@@ -263,16 +249,6 @@ class FitReport(SavesFrames):
         """Whether the aligner hides offsets between measurement and model that weather does not explain."""
         return self.unexplained_offset > 1
 
-    def _listed_weather(self) -> str:
-        """The inputs that the fleet has seen farthest beyond these records."""
-        own = self.fleet["highest"] - self.fleet["lowest"]
-        farther = (self.fleet["fleet highest"] - self.fleet["fleet lowest"]) / own.where(own > 0, 1.0)
-        widest = self.fleet.loc[farther.sort_values(ascending=False, kind="stable").index[:3]]
-        return ", ".join(
-            f"{name!r} from {lowest:.3g} to {highest:.3g}, here {own_lowest:.3g} to {own_highest:.3g}"
-            for name, own_lowest, own_highest, lowest, highest in widest.itertuples()
-        )
-
     def warnings(self) -> Iterator[SkthermoWarning]:
         """Warnings of `fit`, one of each kind: its doubts, and those about the rows, the modes and the outliers.
 
@@ -282,7 +258,7 @@ class FitReport(SavesFrames):
             Its text stands in the report, too.
         """
         yield from self.doubts
-        yield from self.rows.warnings(len(self.parameters.deviations), knows_fleet=self.fleet is not None)
+        yield from self.rows.warnings(len(self.parameters.deviations))
         modes, far = self.modes, self.findings.outliers.to_numpy()
         if modes["MAPE"].mean() > 1.2 * modes["MAPE of the mean"].mean():
             worst = (modes["MAPE"] / modes["MAPE of the mean"]).idxmax()
@@ -343,8 +319,6 @@ def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequen
         parameters=FittedParameters.found(chain, found, modes["scatter"].to_numpy() / 100),
         solved=chain.simulator_.described,
         findings=findings,
-        fleet=weather_of_fleet(chain),
-        pooling_probability=getattr(last_step(chain.mapper_), "pooling_probability_", None),
         doubts=list({doubt.kind: doubt for doubt in doubts}.values()),
     )
 
@@ -374,15 +348,6 @@ def modes_of(chain: Any) -> tuple[pd.DataFrame, float]:
     errors = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
     unexplained = unexplained_offset(table["hidden offset"], of_model, records.temperatures, errors)
     return pd.DataFrame(table, index=chain.mode_names_), unexplained
-
-
-def weather_of_fleet(chain: Any) -> pd.DataFrame | None:
-    """Range of each input in the chain's own records, and in the records of the fleet that taught its mapper."""
-    if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
-        return None
-    own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
-    limits = np.column_stack([own.lowest, own.highest, fleet.lowest, fleet.highest])
-    return pd.DataFrame(limits, index=list(own.names), columns=["lowest", "highest", "fleet lowest", "fleet highest"])
 
 
 def periods(T: Table, rows: NDArray[np.bool_]) -> str:

@@ -28,13 +28,11 @@ from skthermo._core.estimators import (
     inputs_of_last_step,
     last_step,
     predict_with_std,
-    reach_of,
-    rows_from_fleet,
 )
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
-from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
+from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
 from skthermo.residuals.sensors import PredictionError, SensorRegression, filled_text
 from skthermo.residuals.weather import TrainingRange, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
@@ -187,16 +185,7 @@ class ThermalModel(SavesFrames):
         message = unpredicted_text(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled))
         if message:
             findings.append(UnevaluatedRowsWarning(message, "not-predicted"))
-        reach, inputs = reach_of(self.mapper, weather.filled) or (self.training_range, weather.inputs)
-        findings += reach.doubts(inputs)
-        if rows_from_fleet(self.mapper, weather.filled).any():
-            findings.append(
-                WeatherWarning(
-                    "rows are in weather outside the training records, and are predicted from the fleet. Standard "
-                    "deviations and intervals include that uncertainty. Fit again when there are such records",
-                    "rows-from-fleet",
-                )
-            )
+        findings += self.training_range.doubts(weather.inputs)
         if weather.impossible.any():
             findings.append(
                 ModelWarning(
