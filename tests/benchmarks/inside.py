@@ -10,10 +10,10 @@ PLACES = {
     "fleet._fleet": ["Storage"],
     "fleet._workers": ["BridgeOutcome", "known_of", "pickled"],
     "monitoring._active": ["ActiveDetector"],
-    "monitoring._events": ["find_events"],
-    "monitoring._records": ["Memory"],
+    "monitoring._events": ["find_events", "followed"],
+    "monitoring._records": ["Lookback", "Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
-    "monitoring._threshold": ["estimate_false_alarms"],
+    "monitoring._threshold": ["EventLevels", "estimate_false_alarms"],
     "monitoring.drift._observations": ["GroupEffects"],
     "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }
