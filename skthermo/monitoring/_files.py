@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import joblib
+import pandas as pd
 import sklearn
+from joblib.numpy_pickle import NumpyUnpickler
 from sklearn.utils.validation import check_is_fitted
 
 import skthermo
@@ -107,6 +109,36 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
     if not all(hasattr(monitor, name) for name in ("update", "events_", "versions_")):
         raise ValueError(f"{file} holds {type(monitor).__name__!r}; expected a fitted Monitor")
     return monitor
+
+
+def acknowledgements_in(path: str | os.PathLike[str]) -> pd.DataFrame:
+    """What the owner has said of events, from the file of a monitor, also from a joblib file of version 0.2."""
+    file = _checked(path)
+    try:
+        return load_monitor(file).acknowledgements_
+    except ValueError as refused:
+        try:
+            content = io.BytesIO(zlib.decompress(file.read_bytes()))
+            monitor = _SomeMonitor(str(file), content, ensure_native_byte_order=True).load()
+            said = [vars(one) for one in vars(monitor.history_)["acknowledgements"]]
+        except Exception:  # damaged files raise errors of every type
+            raise refused from None
+    names = {"kind": "kind", "peak_time": "time", "time": "at", "harmless": "harmless", "note": "note"}
+    return pd.DataFrame(said, columns=list(names)).rename(columns=names)
+
+
+class _OfOtherVersion:
+    """An object of skthermo in the file of another version: its attributes alone."""
+
+    def __setstate__(self, state: Any) -> None:
+        vars(self).update(state if isinstance(state, dict) else {})
+
+
+class _SomeMonitor(NumpyUnpickler):
+    """Reads a file of joblib without the classes of skthermo."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        return type(name, (_OfOtherVersion,), {}) if module.startswith("skthermo") else super().find_class(module, name)
 
 
 def _checked(path: Any) -> Path:

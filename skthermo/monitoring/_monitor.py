@@ -50,7 +50,7 @@ from skthermo.monitoring._events import (
     leading,
     with_acknowledgements,
 )
-from skthermo.monitoring._files import versions, write_monitor
+from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
 from skthermo.monitoring._records import OF_TRAINING, Intake, Lookback, read_records
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
@@ -718,6 +718,29 @@ class Monitor(SavesFrames, Estimator):
         row = {"kind": kind, "time": time.value, "at": self.last_.value, "harmless": harmless, "note": note}
         said = pd.DataFrame([row]).astype(self.acknowledgements_.dtypes)
         self.acknowledgements_ = pd.concat([self.acknowledgements_, said], ignore_index=True)
+
+    def keep_acknowledgements(self, path: str | os.PathLike[str]) -> int:
+        """Take over what the owner has said of events, from the file of an earlier monitor of the structure.
+
+        Parameters
+        ----------
+        path : str or path
+            The file of `save`, also one that version 0.2 has written with the ending ``.joblib``.
+
+        Returns
+        -------
+        int
+            Number of acknowledgements. Each holds for an event of the same kind at the same time.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be read.
+        """
+        check_is_fitted(self)
+        said = acknowledgements_in(path).astype(self.acknowledgements_.dtypes)
+        self.acknowledgements_ = pd.concat([said, self.acknowledgements_], ignore_index=True)
+        return len(said)
 
     def discard(self, start: Any, end: Any = None) -> int:
         """Take back records that should not have been taken in, such as those stamped by a wrong clock.
