@@ -90,7 +90,7 @@ class Monitor(SavesFrames, Estimator):
     max_delay : str or timedelta, default="7D"
         How late records may come and still be evaluated as if they had come in time.
     retention : str or timedelta, default="400D"
-        How long raw records are kept, for a new fit and to tell repeated records.
+        How far back records may train a new detector. All records since the baseline are kept.
     sensors : bool, default=True
         Whether sensors are watched, and those that fail left out.
     units : str or mapping of str to str, optional
@@ -124,8 +124,11 @@ class Monitor(SavesFrames, Estimator):
         such. NaN where none is seen.
     watch_threshold_ : float or None
         An event of kind "watch" opens with an index above it, in the same way; None without ``watch_per_year``.
+    baseline_peaks_ : Series
+        Highest levels of the index in separate times of the baseline, in descending order: the k-th is exceeded by k
+        events in as long a time, if the structure is healthy.
     lookback_ : object
-        Which earlier records the evaluation of a record needs.
+        How far before a record the detector looks.
     events_ : DataFrame
         A row for each event, counted from 1: ``kind`` ("damage", "watch", or "measurement or structure":
         responses that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it
@@ -137,7 +140,7 @@ class Monitor(SavesFrames, Estimator):
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
         ``index_median``, ``index_max`` and, where drift is followed, a column ``drift GROUP`` for each group.
     evaluations_ : DataFrame
-        The latest evaluation of each record that is kept, as `update` gives it.
+        The latest evaluation of each record since the baseline, as `update` gives it.
     faults_ : DataFrame
         Sensors that have failed: ``column``, ``kind``, ``since``, ``detected``, ``until``, ``detail``.
     drift_ : DataFrame or None
@@ -148,7 +151,7 @@ class Monitor(SavesFrames, Estimator):
         same), ``n_too_late`` and ``n_ahead`` (set aside at present), neither of them evaluated; ``n_repeated``; and
         ``n_left_out``: values that came and were not used.
     baseline_, records_, corrected_ : DataFrame
-        Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
+        Records of the baseline and those since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
     left_out_ : dict
@@ -157,17 +160,33 @@ class Monitor(SavesFrames, Estimator):
     set_aside_ : DataFrame
         Values of the baseline that cannot be, and count as missing: a row for each finding, as in
         `~skthermo.preprocessing.SetAside`.
-    columns_ : list
-        Names of the columns that `fit` saw, which `update` expects.
+    columns_, reference_, features_ : list
+        Names of the columns that `fit` saw, which `update` expects, those of ``reference`` among them, and those that
+        the detector sees.
     trained_ : DataFrame
         What the detector in charge was fitted on: the baseline, or what `refit` or `rebaseline` made of it.
     prior_, since_ : DataFrame and Timestamp, or None
         After `rebaseline`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
-    active_, history_ : object
-        The detector in charge with all by which it evaluates, and all that was evaluated so far. Both are immutable:
-        `update`, `refit` and `rebaseline` put others in their place.
+    decisions_ : DataFrame
+        What was decided of each record since the baseline, from which ``events_``, ``evaluations_`` and ``days_`` are
+        computed: ``index``, levels of the detector in charge then, and what was left out, held or explained.
+    acknowledgements_ : DataFrame
+        What the owner has said: ``kind`` of the event, a ``time`` in it and the newest record ``at`` which it was said
+        (both in nanoseconds), ``harmless`` and ``note``.
+    transitions_ : tuple of dict
+        As `transitions` gives them.
+    restarts_ : tuple of int
+        Times (nanoseconds) at which a new baseline has ended all events.
+    ahead_ : DataFrame
+        Records that are set aside, because they are stamped too far ahead.
+    tallies_ : dict
+        Numbers of repeated, late and too late records.
+    corrections_, states_, began_ : object, tuple and Timestamp
+        Checks of sensors and drift; what they knew at the beginning of each of the last days; and their first day.
+    drift_days_ : DataFrame
+        Drift that was taken out of the frequencies, by day and group.
 
     See Also
     --------
@@ -179,8 +198,8 @@ class Monitor(SavesFrames, Estimator):
     batch of all of them. Lags and windows reach into earlier batches, and into the end of the baseline. Records that
     come late are evaluated with those around them, and later ones anew: what `update` says last of a stamp counts.
 
-    The damage index is rounded to six decimals, and one above 10 to seven digits. Where the last bits, which depend on
-    how many records are evaluated at once, would decide how, the index of the record alone with its memory counts.
+    The damage index is rounded to six decimals, and one above 10 to seven digits, as its last bits depend on how many
+    records are evaluated at once.
 
     A number that loggers write for a missing one (-999) is taken as missing where the baseline does not reach it, as is
     a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80 degrees Celsius, as in
