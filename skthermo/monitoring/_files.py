@@ -23,7 +23,6 @@ from skthermo._core.files import write_when_complete
 ENDINGS = (".joblib", ".skops")
 TRUSTED = ("skthermo", "sklearn")  # packages whose classes are read from skops' files
 PLAIN = {"zoneinfo.ZoneInfo", "datetime.timezone", "datetime.timedelta", "builtins.frozenset"}
-SPEED = 1  # fastest compression of zlib, which adds a checksum
 
 
 def versions() -> dict[str, str]:
@@ -156,12 +155,13 @@ def _by_joblib(monitor: Any) -> bytes:
     """A compressed file of joblib, which ends with a checksum."""
     stream = io.BytesIO()
     joblib.dump(monitor, stream)
-    return zlib.compress(stream.getbuffer(), SPEED)
+    compressor = zlib.compressobj(level=1, strategy=zlib.Z_RLE)  # the fastest, which adds a checksum
+    return compressor.compress(stream.getbuffer()) + compressor.flush()
 
 
 def _from_joblib(content: bytes) -> Any:
     """What joblib wrote, compressed as here or plain."""
-    is_compressed = content[:1] == zlib.compress(b"", SPEED)[:1]
+    is_compressed = content[:1] == zlib.compress(b"")[:1]
     return joblib.load(io.BytesIO(zlib.decompress(content) if is_compressed else content))
 
 

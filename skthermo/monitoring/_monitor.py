@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from datetime import timedelta
@@ -448,9 +447,15 @@ class Monitor(SavesFrames, Estimator):
 
     def _with(self, detector: Any, trained: pd.DataFrame) -> Monitor:
         """This monitor with another detector in charge, which was fitted on some records."""
-        other = copy.copy(self)
-        other._take_charge(detector, trained)
-        return other
+        twin = self._twin()
+        twin._take_charge(detector, trained)
+        return twin
+
+    def _twin(self) -> Monitor:
+        """A monitor that stands as this one, to be changed in its place: an error leaves this one as it was."""
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self))
+        return twin
 
     def _events(self) -> Events:
         return Events(self.decisions_, self.persistence, self.restarts_)
@@ -595,26 +600,21 @@ class Monitor(SavesFrames, Estimator):
             *(self._read(new), self.baseline_, self.records_, self.ahead_, max_delay),
             are_confirmed=check_flag(confirm, "confirm"),
         )
-        after, fresh = copy.copy(self), intake.fresh.index
+        after, fresh = self._twin(), intake.fresh.index
         numbers = intake.n_repeated, int((fresh < self.last_).sum()), len(intake.too_late)
         after.tallies_ = {name: self.tallies_[name] + n for name, n in zip(self.tallies_, numbers, strict=True)}
         after.ahead_ = intake.ahead
-        answers = self.evaluations_.iloc[:0].assign(revised=False)
+        reasons = pd.concat([intake.too_late, intake.early])
+        refused = self._decisions(reasons.index, reason=reasons.to_numpy())
+        answers = evaluations(refused, Events(refused, 1), self.acknowledgements_).assign(revised=False)
         if len(fresh):
-            after.records_ = (
-                pd.concat([self.records_, intake.fresh]).sort_index() if len(self.records_) else intake.fresh
-            )
+            known = pd.concat([self.records_, intake.fresh])
+            after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
             after._decide(fresh[0])
             after._note(self, fresh[0])
-            answers = _news(self.evaluations_, after.evaluations_, fresh)
-        refused = pd.concat([intake.too_late, intake.early])
-        if len(refused):
-            rows = evaluations(
-                self._decisions(refused.index, reason=refused),
-                Events(self._decisions(refused.index), 1),
-                self.acknowledgements_,
-            )
-            answers = pd.concat([answers, rows.assign(revised=False)]).sort_index(kind="stable")
+            before = self.evaluations_ if fresh[0] < self.last_ else answers[:0]
+            news = _news(before, after.evaluations_, fresh)
+            answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
         vars(self).update(vars(after))
         return answers
@@ -726,7 +726,7 @@ class Monitor(SavesFrames, Estimator):
             raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
         if not isinstance(note, str):
             raise ValueError(f"note is {note!r:.100}; expected text")
-        one, after = events.loc[event], copy.copy(self)
+        one, after = events.loc[event], self._twin()
         after._say(one["kind"], one["peak_time"], check_flag(harmless, "harmless"), note)
         done = {"what": "acknowledged", "time": self.last_, "kind": one["kind"], "event": int(event), "detail": note}
         after._note(after, self.last_, done)
@@ -794,7 +794,7 @@ class Monitor(SavesFrames, Estimator):
         def others(table: pd.DataFrame) -> pd.DataFrame:
             return table[(table.index < first) | (False if last is None else table.index > last)]
 
-        after = copy.copy(self)
+        after = self._twin()
         for name in ("records_", "ahead_", "corrected_", "decisions_"):
             setattr(after, name, others(getattr(self, name)))
         n_discarded = len(self.records_) - len(after.records_) + len(self.ahead_) - len(after.ahead_)
@@ -898,7 +898,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        after, trained, today = copy.copy(self), retraining.baseline, midnight(self.last_)
+        after, trained, today = self._twin(), retraining.baseline, midnight(self.last_)
         after._take_charge(retraining.detector, trained)
         after.prior_, after.since_ = retraining.prior, retraining.since
         if retraining.kind == "new baseline":
@@ -964,7 +964,7 @@ def _news(before: pd.DataFrame, after: pd.DataFrame, fresh: pd.DatetimeIndex) ->
     """Evaluations of new records, and of known ones whose evaluation has changed."""
     answers = after[after.index >= fresh[0]]
     is_new = answers.index.isin(fresh)
-    old = before.reindex(answers.index)
+    old = before.reindex(index=answers.index, columns=answers.columns)
     is_same = ((answers == old) | (answers.isna() & old.isna())).all(axis=1).to_numpy()
     return answers.assign(revised=~is_new & ~is_same)[is_new | ~is_same]
 
