@@ -123,7 +123,7 @@ def ruled(index, a_year, persistence):
     """Events of a series of indices, by the levels that a baseline's own indices give for so many a year."""
     try:
         from inside import EventLevels, followed
-    except AttributeError:  # in 0.2
+    except ImportError:  # in 0.2
         from inside import estimate_false_alarms, find_events
 
         rule = estimate_false_alarms(index, a_year, persistence=persistence).rule
