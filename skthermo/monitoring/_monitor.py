@@ -184,8 +184,6 @@ class Monitor(SavesFrames, Estimator):
         Numbers of repeated, late and too late records.
     corrections_, states_, began_ : object, tuple and Timestamp
         Checks of sensors and drift; what they knew at the beginning of each of the last days; and their first day.
-    drift_days_ : DataFrame
-        Drift that was taken out of the frequencies, by day and group.
 
     See Also
     --------
@@ -295,24 +293,22 @@ class Monitor(SavesFrames, Estimator):
                 "n_left_out": self.decisions_["n_left_out"],
             }
         ).astype(np.int64)
-        by_day = answers["index"].groupby(midnights(answers.index).rename("day"))
-        table = table.groupby(midnights(answers.index).rename("day")).sum()
-        return table.assign(index_median=by_day.median(), index_max=by_day.max()).join(self.drift_days_)
+        day = midnights(answers.index).rename("day")
+        index, drift = (one.groupby(day) for one in (answers["index"], self.decisions_.filter(regex="^drift ")))
+        table = table.groupby(day).sum().assign(index_median=index.median(), index_max=index.max())
+        return table.join(drift.first())
 
     @property
     def counts_(self) -> dict[str, int]:
         """Numbers of records that came, and what became of them."""
         n_outside = self.tallies_["n_too_late"] + len(self.ahead_)
-        n_unknown = int((self.evaluations_["state"] == "not evaluated").sum())
-        return (
-            {"n_records": len(self.decisions_) + n_outside}
-            | self.tallies_
-            | {
-                "n_ahead": len(self.ahead_),
-                "n_not_evaluated": n_unknown + n_outside,
-                "n_left_out": int(self.decisions_["n_left_out"].sum()),
-            }
-        )
+        return {
+            "n_records": len(self.decisions_) + n_outside,
+            **self.tallies_,
+            "n_ahead": len(self.ahead_),
+            "n_not_evaluated": int((self.evaluations_["state"] == "not evaluated").sum()) + n_outside,
+            "n_left_out": int(self.decisions_["n_left_out"].sum()),
+        }
 
     @property
     def faults_(self) -> pd.DataFrame:
@@ -406,7 +402,6 @@ class Monitor(SavesFrames, Estimator):
         self.records_ = self.ahead_ = nothing
         self.corrected_ = nothing.drop(columns=self.reference_)
         self.decisions_ = self._decisions(nothing.index)
-        self.drift_days_ = pd.DataFrame(index=nothing.index)
         kinds = {"kind": object, "time": np.int64, "at": np.int64, "harmless": bool, "note": object}
         self.acknowledgements_ = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
         self.transitions_, self.restarts_ = (), ()
@@ -481,9 +476,7 @@ class Monitor(SavesFrames, Estimator):
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
             self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
         seen = self.corrections_.corrected(begin, raw, self._explained())
-        days = pd.DatetimeIndex([one.day for one in seen.states])
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen.records])
-        self.drift_days_ = pd.concat([self.drift_days_[self.drift_days_.index < begin.day], seen.drift.reindex(days)])
         states = [*(one for one in earlier if one.day < begin.day), *seen.states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
@@ -513,7 +506,7 @@ class Monitor(SavesFrames, Estimator):
         said += [np.where(rows, text, "") for text, rows in remarks.items()]
         reason = ["; ".join(filter(None, parts)) for parts in zip(*said, strict=True)]
         columns = {"index": index, "is_blind": np.asarray(is_blind), "reason": reason}
-        return self._decisions(new.index, **columns, **notes[["n_held", "held", "n_left_out"]])
+        return self._decisions(new.index, **columns, **notes.drop(columns="note"))
 
     def _with_memory(self, n_before: int) -> tuple[pd.DataFrame, int]:
         """Records as the detector sees them, from those on that it looks back to, and the position of the first."""
@@ -884,12 +877,8 @@ class Monitor(SavesFrames, Estimator):
         return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
     def _check_times(self) -> None:
-        max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
-        if retention < max_delay + 2 * DAY:
-            raise ValueError(
-                f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
-                "least two days longer than they may be late"
-            )
+        for name in ("max_delay", "retention"):
+            check_duration(getattr(self, name), name)
         if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
             raise ValueError(
                 f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "

@@ -18,7 +18,6 @@ from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning
 from skthermo.monitoring._events import levels, open_events, runs
 
 WEEK = pd.Timedelta("7D")
-STEPS = (0.0, 0.5, 2.0, 5.0)  # standard deviations of a response, by which it is lowered
 
 
 def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = WEEK) -> NDArray[np.intp]:
@@ -217,11 +216,12 @@ class SmallestChanges:
         threshold: float,
         within: pd.Timedelta,
         losses: pd.DataFrame | None = None,
+        steps: Sequence[float] = (0.0, 0.5, 2.0, 5.0),
     ) -> SmallestChanges:
         """Falls by which the median of the indices, ``index_of`` records in order of time, exceeds a threshold.
 
         ``losses`` are relative changes of the responses, in their order, by the loss of each damage group that moves a
-        record by one standard deviation; their column ``"loss"`` is that loss.
+        record by one standard deviation; their column ``"loss"`` is that loss. ``steps`` are in standard deviations.
         """
         some = whole_weeks(records, 1000)
         responses = some[list(names)]
@@ -237,10 +237,10 @@ class SmallestChanges:
             changes["groups", group] = float(row["loss"]), {name: falls[name] for name in names}
         start, found = index_of(some), {"single": {}, "common": {}, "groups": {}}
         for (kind, name), (size, falls) in changes.items():
-            by_step = ({one: step * fall for one, fall in falls.items()} for step in STEPS[1:])
+            by_step = ({one: step * fall for one, fall in falls.items()} for step in steps[1:])
             indices = np.array([start, *(index_of(lowered(some, one)) for one in by_step)])
             known = indices[:, ~np.isnan(indices).any(axis=0)]
-            fall = crossing(size * np.array(STEPS), np.median(known, axis=1) / threshold) if known.size else np.nan
+            fall = crossing(size * np.array(steps), np.median(known, axis=1) / threshold) if known.size else np.nan
             found[kind][name] = fall if fall < 1 or not (is_relative or kind == "groups") else np.nan
         return cls(found["common"].get("", np.nan), found["single"], is_relative, within, found["groups"])
 
