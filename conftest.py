@@ -56,13 +56,6 @@ def shared_folder(tmp_path_factory):
 
 
 @pytest.fixture
-def in_process(request, monkeypatch):
-    """Files are read in this process, as in a frozen program, which saves half a second for each."""
-    if getattr(request, "param", True):
-        monkeypatch.setattr(sys, "frozen", True, raising=False)
-
-
-@pytest.fixture
 def chains_fitted_once(monkeypatch):
     """A chain that was fitted to the same records before becomes a copy of what it learned then."""
     import joblib

@@ -45,10 +45,11 @@ class WeatherLines:
             n_needed = 1 + np.searchsorted(np.cumsum(variances), 0.99 * max(variances.sum(), 1e-300))
             components = vectors[:, : min(3, n_needed)].T
             filled = np.where(known, standard, filled @ components.T @ components)
-        return cls(centre, scale, components, quartiles(filled @ components.T))
+        return cls(centre, scale, components, np.quantile(filled @ components.T, (0.25, 0.5, 0.75), axis=0))
 
-    def coordinates(self, temperatures: Array) -> Array:
-        """Components of each row, (n_samples, n_components); NaN where no sensor has a value."""
+    def inputs(self, temperatures: Array) -> tuple[Array, Array]:
+        """Components of each row, (n_samples, n_components), NaN where no sensor has a value; and a constant beside
+        piecewise-linear functions of them."""
         known = ~np.isnan(temperatures)
         standard = np.where(known, (temperatures - self.centre) / self.scale, 0.0)
         places = standard @ self.components.T
@@ -56,16 +57,7 @@ class WeatherLines:
         for _ in range(20 if gaps.any() else 0):
             places[gaps] = np.where(known[gaps], standard[gaps], places[gaps] @ self.components) @ self.components.T
         places[~known.any(axis=1)] = np.nan
-        return places
-
-    def inputs(self, places: Array) -> Array:
-        """A constant, and piecewise-linear functions of the coordinates."""
-        return np.hstack([np.ones((len(places), 1)), piecewise_linear(places, self.knots)])
-
-
-def quartiles(values: Array) -> Array:
-    """The quartiles of each column, at which piecewise-linear functions of it break."""
-    return np.quantile(values, (0.25, 0.5, 0.75), axis=0)
+        return places, np.hstack([np.ones((len(places), 1)), piecewise_linear(places, self.knots)])
 
 
 def ridge(inputs: Array, values: Array) -> Array:

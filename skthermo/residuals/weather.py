@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +15,7 @@ from sklearn.neighbors import NearestNeighbors
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._core.arrays import Array, as_floats, median, robust_deviation, spread_evenly
+from skthermo._core.arrays import Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
 from skthermo._core.frames import Table, column_names
 from skthermo.exceptions import RecordsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
@@ -41,9 +41,21 @@ class TrainingRange:
 
     def excess(self, inputs: Any) -> Array:
         """How far each value is outside, in units of the range of its column; 0 inside, NaN where it is missing."""
-        values, width = as_floats(inputs), self.highest - self.lowest
+        values = as_floats(inputs)
         beyond = np.maximum(np.maximum(self.lowest - values, values - self.highest), 0.0)
-        return beyond / np.where(width > 0, width, 1.0) + np.where(np.isnan(values), np.nan, 0.0)
+        return beyond / self.width + np.where(np.isnan(values), np.nan, 0.0)
+
+    @property
+    def width(self) -> Array:
+        """Width of each column, 1 where it is constant."""
+        width = self.highest - self.lowest
+        return np.where(width > 0, width, 1.0)
+
+    def ends(self, values: Array) -> Array:
+        """How far each row is below and above, by its farthest column, (n_rows, 2); 0 where a value is missing."""
+        excess = np.nan_to_num(self.excess(values))
+        sides = values < self.lowest, values > self.highest
+        return np.column_stack([np.where(side, excess, 0.0).max(axis=1) for side in sides])
 
     def doubts(self, inputs: Any) -> list[WeatherWarning]:
         """The finding that rows are far outside the range, in units of it."""
@@ -62,6 +74,50 @@ class TrainingRange:
                 "outside-training-weather",
             )
         ]
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """How residuals scatter outside the weather that a regression has learned.
+
+    Where the farthest input of a record is e ranges below the lowest value of the baseline, or above the highest, the
+    variance of its residuals is 1 + growth ln(1 + e^2) times the one inside; ``growth``, (2,), has a value for each
+    end.
+    """
+
+    reach: TrainingRange
+    growth: Array
+
+    @classmethod
+    def learned(
+        cls,
+        reach: TrainingRange,
+        weather: Array,
+        residuals_of: Callable[[NDArray[np.intp], NDArray[np.intp]], Array],
+        *,
+        usual: float = 9.0,
+    ) -> Extrapolation:
+        """Learn from the coldest and from the warmest fifth of the records of a range.
+
+        ``residuals_of(others, fifth)`` are residuals of records, in their usual standard deviations, by a regression on
+        the others. The usual growth has the weight of a record at 0.6 ranges.
+        """
+        warmth = means_of_known((weather - reach.lowest) / reach.width, axis=1)
+        coldest_first = np.argsort(warmth)[: (~np.isnan(warmth)).sum()]
+        n_apart, growth = len(coldest_first) // 5, np.full(2, usual)
+        for end, order in enumerate((coldest_first, coldest_first[::-1])):
+            fifth, others = np.sort(order[:n_apart]), np.sort(order[n_apart:])
+            if not n_apart:
+                continue
+            added = np.log1p(TrainingRange.spanned(weather, others).ends(weather[fifth])[:, end] ** 2)
+            excess = means_of_known(residuals_of(others, fifth) ** 2, axis=1) - 1
+            known = ~np.isnan(excess)
+            growth[end] = max((added[known] @ excess[known] + 0.1 * usual) / (added[known] @ added[known] + 0.1), 0.0)
+        return cls(reach, growth)
+
+    def variances(self, weather: Any) -> Array:
+        """Variance of the residuals of each row, in terms of the one inside; unknown weather counts as inside."""
+        return 1 + np.log1p(self.reach.ends(as_floats(weather)) ** 2) @ self.growth
 
 
 def implausible(known: TrainingRange, temperatures: Any) -> list[RecordsWarning]:

@@ -15,7 +15,7 @@ from skthermo._core.estimators import _fit_context, check_is_fitted
 from skthermo._core.frames import frame_like, has_stamps, like_targets, row_times
 from skthermo._core.warnings import collected, warn_each
 from skthermo.preprocessing import set_aside
-from skthermo.surrogate._regression import MultiplierRegressor, TemperatureMapper
+from skthermo.surrogate._regression import TableRegressor, TemperatureMapper
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Posterior:
         return self.level + away @ self.coefficients, np.sqrt(variances)
 
 
-class FleetMapper(MultiplierRegressor):
+class FleetMapper(TableRegressor):
     """Parameters or frequencies of a bridge from the weather, learned together with the mappers of other bridges.
 
     Parameters
@@ -84,8 +84,8 @@ class FleetMapper(MultiplierRegressor):
         By how much each output moves with the weather on the other bridges: a standard deviation.
     is_log_ : bool
         Whether logarithms are learned: where all outputs are positive.
-    parameter_names_ : list or None
-        Names of the outputs, where `fit` saw them.
+    n_parameters_, parameter_names_ : int, list or None
+        Number of outputs, and their names where `fit` saw them.
     y_is_vector_ : bool
         Whether `fit` saw one output as a vector.
     findings_ : list of SkthermoWarning
@@ -150,7 +150,7 @@ class FleetMapper(MultiplierRegressor):
         """
         inputs, targets = self._read_xy(X, y, ("temperatures", "outputs"))
         self.parameter_names_ = [y.name] if getattr(y, "name", None) is not None else self.parameter_names_
-        harmless = ("no-rows", "stuck-sensor", "implausible-values", "constant")  # in rows of any order
+        harmless = ("no-rows", "stuck", "implausible-values", "constant")  # in rows of any order
         with collected() as self.findings_:
             inputs = np.asarray(set_aside(frame_like(X, inputs), exclude=harmless, needs_all=True).temperatures)
         usable = ~(np.isnan(inputs).any(axis=1)[:, np.newaxis] | np.isnan(targets))

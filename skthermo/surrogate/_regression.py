@@ -112,7 +112,59 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
     return MLPRegressor(**(networks[purpose] | {"learning_rate_init": 0.001, "max_iter": 1000} | parameters))
 
 
-class MultiplierRegressor(RegressorMixin, Estimator):
+class TableRegressor(RegressorMixin, Estimator):
+    """Base of regressors whose inputs and outputs are tables with gaps, and names where frames have them."""
+
+    parameter_names_: list | None
+    predict: Callable[..., Any]
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+        """Coefficient of determination R2 over complete rows, averaged over parameters.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Inputs.
+        y : array-like or DataFrame of shape (n_samples, n_parameters)
+            Multipliers.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each row; weights in a series are matched to the rows of a frame by index.
+
+        Returns
+        -------
+        float
+            NaN if fewer than two rows are complete.
+        """
+        predicted = self.predict(X)
+        targets = by_name(y, self.parameter_names_, "y") if self.parameter_names_ and hasattr(y, "columns") else y
+        return complete_r2(as_columns(targets), as_columns(predicted), row_weights(sample_weight, X))
+
+    def _inputs(self, X: ArrayLike) -> Array:
+        check_is_fitted(self)
+        return validate_data(self, X, dtype=np.float64, reset=False)
+
+    def _read_xy(self, X: Table, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
+        """X and y, (n_samples, n_parameters), with NaN where something is missing."""
+        if y is None:
+            raise ValueError(
+                f"This {type(self).__name__} estimator requires y to be passed, but the target y is None; "
+                f"expected {names[1]}"
+            )
+        inputs = validate_data(self, X, dtype=np.float64)
+        targets = check_array(y, dtype=np.float64, ensure_2d=False)
+        plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
+        check_same_rows(X, targets if plain_rows else y, names)
+        self.y_is_vector_ = targets.ndim == 1
+        self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
+        return inputs, as_columns(targets)
+
+
+class MultiplierRegressor(TableRegressor):
     """Base of regressors that predict multipliers: fitted to complete rows, NaN where an input is missing.
 
     A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`. Hooks:
@@ -159,48 +211,8 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         table = like_targets(X, theta, names, is_vector=is_vector)
         return table if std is None else (table, like_targets(X, std, names, is_vector=is_vector))
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
-        """Coefficient of determination R2 over complete rows, averaged over parameters.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_features)
-            Inputs.
-        y : array-like or DataFrame of shape (n_samples, n_parameters)
-            Multipliers.
-        sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; weights in a series are matched to the rows of a frame by index.
-
-        Returns
-        -------
-        float
-            NaN if fewer than two rows are complete.
-        """
-        predicted = self.predict(X)
-        targets = by_name(y, self.parameter_names_, "y") if self.parameter_names_ and hasattr(y, "columns") else y
-        return complete_r2(as_columns(targets), as_columns(predicted), row_weights(sample_weight, X))
-
     def _default_part(self, name: str) -> BaseEstimator | None:
         return self._default_regressor() if name == "regressor" else None
-
-    def _inputs(self, X: ArrayLike) -> Array:
-        check_is_fitted(self)
-        return validate_data(self, X, dtype=np.float64, reset=False)
-
-    def _read_xy(self, X: Table, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
-        """X and y, (n_samples, n_parameters), with NaN where something is missing."""
-        if y is None:
-            raise ValueError(
-                f"This {type(self).__name__} estimator requires y to be passed, but the target y is None; "
-                f"expected {names[1]}"
-            )
-        inputs = validate_data(self, X, dtype=np.float64)
-        targets = check_array(y, dtype=np.float64, ensure_2d=False)
-        plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
-        check_same_rows(X, targets if plain_rows else y, names)
-        self.y_is_vector_ = targets.ndim == 1
-        self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
-        return inputs, as_columns(targets)
 
     def _learn(
         self,
@@ -260,11 +272,6 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         with np.errstate(over="ignore"):
             theta[complete] = np.exp(found) if self.log_targets_ else found
         return theta, std * theta if std is not None and self.log_targets_ else std
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
 
 class FrequencyInverse(TransformerMixin):

@@ -175,7 +175,7 @@ def wrong_rows(T, F, random):
     again = np.sort(np.append(np.arange(n_rows), random.integers(n_rows, size=5)))
     unsorted = random.permutation(n_rows)
     text = stamps.strftime("%Y-%m-%d %H:%M")
-    yield "stamps twice", {"unsorted-stamps"}, {""}, (T.iloc[again], F.iloc[again])
+    yield "stamps twice", {"repeated-stamps"}, {""}, (T.iloc[again], F.iloc[again])
     yield "stamps in disorder", {"unsorted-stamps"}, {""}, (T.iloc[unsorted], F.iloc[unsorted])
     for name, kind, index in (
         ("equal stamps", "wrong-stamps", pd.DatetimeIndex([stamps[0]] * n_rows)),

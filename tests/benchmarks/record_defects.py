@@ -99,7 +99,7 @@ def callables(T, F):
 
     fitted = monitor().fit(T.join(F))
     chain = DataInformedFEM(model, random_state=0).fit(T[half], F[half])
-    others, T_short, F_short = [(T, F * (1 + 0.01 * k)) for k in range(2)], healthy_T[months], healthy_F[months]
+    others = [TemperatureMapper().fit(T, F * (1 + 0.01 * k)) for k in range(2)]
     later = pd.Timedelta(366, "D")
 
     def updated(T, F):

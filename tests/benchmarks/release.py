@@ -72,8 +72,8 @@ PARTS = {
     "sensors": Part("monitor_sensors.py", **Z24),
     "drift": Part("parameter_drift.py --parts tracked"),
     "new-baselines": Part("monitor_retraining.py", "--seeds 1 --only refit", needs="kw51"),
-    "fleet-prior": Part("fleet_prior.py --members frequencies"),
-    "fleet-monitors": Part("fleet_monitor.py"),
+    "fleet-prior": Part("fleet_prior.py --members frequencies --against 43ba4fa4"),
+    "fleet-monitors": Part("fleet_monitor.py --against 43ba4fa4"),
     "mode-tracker": Part("mode_tracker.py", "--records 50"),
     "modal-identification": Part("modal_identification.py"),
     "shapes": Part("shape_inputs.py", "--rows 20 --models truss"),
@@ -90,7 +90,9 @@ PARTS = {
     "other-tools": Part("other_tools.py --seeds 5"),
     "kw51-study": Part("kw51_study.py"),
     "kw51-choices": Part("kw51_study.py --all --seeds 1"),
-    "false-alarms": Part("false_alarm_rates.py", "--baselines 6 --laws iid"),
+    "false-alarms": Part(
+        "false_alarm_rates.py --baselines 12 --against 43ba4fa4", "--baselines 6 --laws iid --days 365 --asked 1"
+    ),
     "nightly-call": timing("nightly_jobs.py --nights 3", "--nights 1 --bridges 2"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
     "solves-pynite": timing("solves.py --parts pynite"),

@@ -115,7 +115,7 @@ class TestUnits:
         for hint, values in (
             ("Fahrenheit", 1.8 * T[name] + 32),
             ("as in", 10 * T[name]),
-            ("correlation", -T[name]),
+            ("another sign", -T[name]),
         ):
             found = check_records(T.assign(**{name: values}))
             assert only(found)[:2] == ("unit-of-temperatures", name)
@@ -179,7 +179,7 @@ class TestTables:
 
     def test_repeated_times_and_disorder(self):
         rows = [0, 0, *range(1, 365), 364]
-        assert only(check_records(T.iloc[rows], F.iloc[rows])) == ("unsorted-stamps", "", 2, T.index[0], T.index[-1])
+        assert only(check_records(T.iloc[rows], F.iloc[rows])) == ("repeated-stamps", "", 2, T.index[0], T.index[-1])
         assert kinds(check_records(T[::-1], F[::-1])) == {"unsorted-stamps"}
         assert check_records(T.to_period("D"), F.to_period("D")).table.empty
 

@@ -9,7 +9,7 @@ import pandas as pd
 import scipy.fft
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, means_of_known, median, range_sums, robust_deviation, spread_evenly
+from skthermo._core.arrays import NORMAL, Array, means_of_known, median, range_sums, robust_deviation, spread_evenly
 from skthermo._core.frames import columns_by_sensor
 from skthermo.preprocessing._weather_lines import WeatherLines, predicted_by_weather
 from skthermo.preprocessing.checks._reading import Reading
@@ -30,22 +30,19 @@ def look_at_both(T: Reading, F: Reading, *, has_wrong_times: bool) -> NDArray[np
             sensors.append(places[0])
     temperatures, values = T.values[:, sensors], F.values.copy()
     values[:, list(F.useless)] = np.nan
-    known = ~np.isnan(temperatures).all(axis=1) & ~np.isnan(values).all(axis=1)
-    if np.count_nonzero(known) < 50:
-        far = implausible(values)
-        name_outliers(F, values, far)
-        return far
-    weather = WeatherLines.learned(temperatures)
-    places = weather.coordinates(temperatures)
-    lines = weather.inputs(places)
-    is_timed = isinstance(T.index, pd.DatetimeIndex) and not has_wrong_times
-    folds = BlockedKFold().fold_of(pd.DataFrame(index=T.index) if is_timed else temperatures)
+    if np.count_nonzero(~np.isnan(temperatures).all(axis=1) & ~np.isnan(values).all(axis=1)) < 50:
+        return find_outliers(F, values, None)
+    places, lines = WeatherLines.learned(temperatures).inputs(temperatures)
+    hours = None
+    if isinstance(T.index, pd.DatetimeIndex) and not has_wrong_times:
+        folds = BlockedKFold().fold_of(pd.DataFrame(index=T.index))
+        hours = max(float(np.median(np.diff(T.index.as_unit("ns").asi8))) / 3.6e12, 1e-6)
+    else:
+        folds = BlockedKFold().fold_of(temperatures)
     exchange_modes(F, values, lines, folds)
-    far = far_from_neighbours(values, lines, folds)
-    name_outliers(F, values, far)
+    far = find_outliers(F, values, lines, folds)
     values[far] = np.nan
-    hours = np.diff(T.index.as_unit("ns").asi8) / 3.6e12 if is_timed else np.array([1.0])
-    compare_times(T, F, values, places, lines, folds, max(float(np.median(hours)), 1e-6) if is_timed else None)
+    compare_times(T, F, values, places, lines, folds, hours)
     return far
 
 
@@ -86,41 +83,24 @@ def exchange_modes(F: Reading, values: Array, lines: Array, folds: Rows) -> None
         values[np.ix_(rows, both)] = values[np.ix_(rows, both[::-1])]
 
 
-def far_from_neighbours(values: Array, lines: Array, folds: Rows) -> NDArray[np.bool_]:
-    """Values far from their neighbours and from a regression on the weather or, without weather, implausible ones."""
-    has_weather = ~np.isnan(lines).any(axis=1)[:, np.newaxis]
-    rest = values - np.where(has_weather, predicted_by_weather(lines, values, folds), median(values))
-    floor = 0.1 * robust_deviation(values)
-    deviation = np.fmax(robust_deviation(rest), floor)
-    some = spread_evenly(np.arange(len(rest)), 4000)
-    usual = np.fmax(robust_deviation(beside_neighbours(rest, some)[0]), floor)
-    with np.errstate(invalid="ignore"):
-        far = (np.abs(rest - median(rest)) > 8 * deviation) & (deviation > 0) & (has_weather | implausible(values))
-        rows = np.flatnonzero(far.any(axis=1))
-        distances, local = beside_neighbours(rest, rows)
-        far[rows] &= np.abs(distances) > 8 * np.fmax(local, usual)
-    return far
+def find_outliers(F: Reading, values: Array, lines: Array | None, folds: Rows | None = None) -> NDArray[np.bool_]:
+    """Values far from their neighbours and from a regression on the weather; and name their modes.
 
-
-def beside_neighbours(values: Array, rows: Rows) -> tuple[Array, Array]:
-    """Distances of some rows from the median of the 25 rows around, and the standard deviation of these rows, by the
-    median of their distances."""
-    padded = np.pad(values, ((12, 12), (0, 0)), constant_values=np.nan)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 25, axis=0)[rows]
-    middle = median(np.moveaxis(around, 2, 0))
-    return values[rows] - middle, robust_deviation(np.moveaxis(around, 2, 0))
-
-
-def implausible(values: Array) -> NDArray[np.bool_]:
-    """Values of twice or half the median of their mode, which need no weather to be doubtful."""
+    Without weather, only values of twice or half the median of their mode are doubtful.
+    """
     middle, deviation = median(values), robust_deviation(values)
     with np.errstate(invalid="ignore"):
-        far = (2 * middle < values) | (middle / 2 > values)
-        return far & (middle > 0) & (np.abs(values - middle) > 8 * deviation)
-
-
-def name_outliers(F: Reading, values: Array, far: NDArray[np.bool_]) -> None:
-    """Name the modes that have outliers."""
+        far = ((2 * middle < values) | (middle / 2 > values)) & (middle > 0) & (np.abs(values - middle) > 8 * deviation)
+        if lines is not None:
+            has_weather, floor = ~np.isnan(lines).any(axis=1)[:, np.newaxis], 0.1 * deviation
+            rest = values - np.where(has_weather, predicted_by_weather(lines, values, folds), middle)
+            scatter = np.fmax(robust_deviation(rest), floor)
+            some = spread_evenly(np.arange(len(rest)), 4000)
+            usual = np.fmax(robust_deviation(beside_neighbours(rest, some)[0]), floor)
+            far = (np.abs(rest - median(rest)) > 8 * scatter) & (scatter > 0) & (has_weather | far)
+            rows = np.flatnonzero(far.any(axis=1))
+            distances, local = beside_neighbours(rest, rows)
+            far[rows] &= np.abs(distances) > 8 * np.fmax(local, usual)
     for place in np.flatnonzero(far.any(axis=0)):
         first, name = np.flatnonzero(far[:, place])[:1], F.columns[place]
         n_known = np.count_nonzero(~np.isnan(values[:, place]))
@@ -129,6 +109,19 @@ def name_outliers(F: Reading, values: Array, far: NDArray[np.bool_]) -> None:
             f"{values[first[0], place]:.4g}{F.unit} in {period_of(F.index, first)}"
         )
         F.found("frequency-outliers", name, far[:, place], detail, period=False)
+    return far
+
+
+def beside_neighbours(values: Array, rows: Rows) -> tuple[Array, Array]:
+    """Distances of some rows from the median of the 25 rows around, and the standard deviation of these rows, by the
+    median of their distances."""
+    padded = np.pad(values, ((12, 12), (0, 0)), constant_values=np.nan)
+    around = np.lib.stride_tricks.sliding_window_view(padded, 25, axis=0)[rows]
+    n_known = np.count_nonzero(~np.isnan(around), axis=2)[..., np.newaxis]
+    ends = np.maximum(np.concatenate([n_known - 1, n_known], axis=2) // 2, 0)
+    middle = np.take_along_axis(np.sort(around, axis=2), ends, axis=2).mean(axis=2)
+    distances = np.sort(np.abs(around - middle[..., np.newaxis]), axis=2)
+    return values[rows] - middle, NORMAL * np.take_along_axis(distances, ends, axis=2).mean(axis=2)
 
 
 def compare_times(
@@ -140,15 +133,21 @@ def compare_times(
     parts of the records, too, so that a change of the structure does not look like the season of another time.
     """
     inertia = 24 if hours is None else max(int(24 / hours), 1)
-    n_rows, left = len(values), {}
-    for shift in [0, *proposed_shifts(places, values, inertia)]:
-        rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
-        left[shift] = unexplained(lines[rows - shift], values[rows], folds[rows])
-        if not left[shift].size:
+    n_rows, left, shift = len(values), {}, 0
+    for other in [0, *proposed_shifts(places, values, inertia)]:
+        rows = spread_evenly(np.arange(max(other, 0), n_rows + min(other, 0)), 4000)
+        left[other] = unexplained(lines[rows - other], values[rows], folds[rows])
+        if not left[other].size:
             return
-    shift = min(left, key=lambda shift: np.mean(left[shift]))
+        shift = other if np.mean(left[other]) < np.mean(left[shift]) else shift
     rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
-    inputs, ratios = np.hstack([lines, with_past(places)]), []
+    columns, filled, ratios = [lines, np.roll(np.nan_to_num(places), 1, axis=0)], np.nan_to_num(places), []
+    for period in (6, 24, 168):  # means of the weather over more of the past
+        if 10 * period <= n_rows:
+            ends = np.arange(1, n_rows + 1)
+            starts = np.maximum(ends - period, 0)
+            columns.append(range_sums(filled, starts, ends) / (ends - starts)[:, np.newaxis])
+    inputs = np.hstack(columns)
     for n_parts in (4, 1):
         own = unexplained(inputs[rows], values[rows], folds[rows], n_parts)
         other = unexplained(inputs[rows - shift], values[rows], folds[rows], n_parts)
@@ -186,17 +185,6 @@ def unexplained(inputs: Array, values: Array, folds: Rows, n_parts: int = 1) -> 
         whole = means_of_known((values[rows] - means_of_known(values[rows])) ** 2)
         own[:] = means_of_known(left**2) / np.where(whole > 0, whole, np.nan)
     return np.median(shares[:, ~np.isnan(shares).any(axis=0)], axis=0)
-
-
-def with_past(places: Array) -> Array:
-    """Coordinates of the weather a row before, and their means over more of the past, side by side."""
-    n_rows, filled = len(places), np.nan_to_num(places)
-    ends, columns = np.arange(1, n_rows + 1), [np.vstack([filled[:1], filled[:-1]])]
-    for period in (6, 24, 168):
-        if 10 * period <= n_rows:
-            starts = np.maximum(ends - period, 0)
-            columns.append(range_sums(filled, starts, ends) / (ends - starts)[:, np.newaxis])
-    return np.hstack(columns)
 
 
 def proposed_shifts(places: Array, values: Array, inertia: int) -> list[int]:

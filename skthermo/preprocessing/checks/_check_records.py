@@ -4,6 +4,7 @@ records are named."""
 from __future__ import annotations
 
 from collections.abc import Collection
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -22,71 +23,60 @@ from skthermo.preprocessing.checks._reading import Reading
 from skthermo.preprocessing.checks._record_findings import (
     ASIDE_KINDS,
     LEFT_OUT_KINDS,
+    WARNINGS,
     RecordFinding,
     RecordFindings,
     SetAside,
     findings_table,
 )
-from skthermo.preprocessing.checks._rows import different_rows_found, exchanged_found, few_rows_found, times_found
+from skthermo.preprocessing.checks._rows import (
+    copies_found,
+    different_rows_found,
+    exchanged_found,
+    few_rows_found,
+    times_found,
+)
 
 
-class CheckedTables:
-    """Temperatures, frequencies or both, read, cleaned and looked at each by itself.
-
-    ``findings`` are those about rows and about both tables; a reading has its own. Statistics of both make sense only
-    if they ``belong_together``.
-    """
-
-    def __init__(self, temperatures: Any, frequencies: Any, *, unit: str, model: Any):
-        if not isinstance(unit, str):
-            raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
-        self.readings, tables, frames = [], [], []
-        for table, what in ((temperatures, "temperatures"), (frequencies, "frequencies")):
-            if table is not None:
-                self.readings.append(Reading(table, what, unit))
-        for reading in self.readings:
-            if reading.values.size:
-                tables.append(reading)
-            if reading.is_frame:
-                frames.append(reading)
-        self.findings: list[RecordFinding] = []
-        self.n_rows = max(map(len, (reading.values for reading in self.readings)), default=0)
-        for reading in tables:
-            alike = [one.given_index for one in frames if len(one.values) == len(reading.values)]
-            reading.sort(reading.given_index if reading.is_frame or not alike else alike[0])
-        is_pair, in_hertz = len(tables) == 2, unit == "Hz"
-        exchanged = exchanged_found(*tables, in_hertz=in_hertz) if is_pair else []
-        self.findings += different_rows_found(*tables) if is_pair else []
-        self.belong_together = is_pair and not exchanged and not self.findings
-        for number, frame in enumerate(frames):
-            if number == 0 or not frame.given_index.equals(frames[0].given_index):
-                self.findings += times_found(frame.given_index) if frame.values.size else []
-        self.findings += few_rows_found(tables) if tables else []
-        self.findings += exchanged
-        for reading in tables if not exchanged and self.n_rows > 1 else ():
-            if reading.what == "temperatures":
-                look_at_temperatures(reading)
-            else:
-                look_at_responses(reading, in_hertz=in_hertz, beside_weather=is_pair)
-                if model is not None and in_hertz:
-                    check_model(model)
-                    compare_with_model(reading, model)
-            put_stuck_aside(reading)
-
-    def all_findings(self) -> list[RecordFinding]:
-        """Findings about rows, then those of each table."""
-        found = list(self.findings)
-        for reading in self.readings:
-            found += reading.findings
-        return found
-
-    def cleaned(self, exclude: Collection[str] = ()) -> dict[str, Any]:
-        """The tables as they were given, without what was put aside, and the columns that cannot be used."""
-        parts: dict[str, Any] = {"temperatures": None, "frequencies": None, "left_out": {}}
-        for reading in self.readings:
-            parts[reading.what] = reading.table()
-            parts["left_out"] |= reading.left_out(exclude)
-        return parts
+def examine(
+    temperatures: Any, frequencies: Any, unit: str, model: Any
+) -> tuple[list[Reading], list[RecordFinding], bool]:
+    """Temperatures, frequencies or both, read, cleaned and looked at each by itself; findings about rows; and whether
+    statistics of both make sense."""
+    if not isinstance(unit, str):
+        raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
+    readings, tables, findings, indexes = [], [], [], []
+    for table, what, beside in (
+        (temperatures, "temperatures", frequencies),
+        (frequencies, "frequencies", temperatures),
+    ):
+        if table is not None:
+            readings.append(Reading(table, what, unit, beside))
+    for reading in readings:
+        if reading.values.size:
+            tables.append(reading)
+            if reading.is_frame and not any(map(reading.given_index.equals, indexes)):
+                indexes.append(reading.given_index)
+                findings += times_found(reading.given_index)
+    is_pair = len(tables) == 2
+    differing = different_rows_found(*tables) if is_pair else []
+    findings += few_rows_found(tables) if tables else []
+    copies = copies_found(tables)
+    exchanged = exchanged_found(*tables) if is_pair and unit == "Hz" and not copies else []
+    if exchanged or "exchanged-tables" in map(itemgetter(0), copies):
+        return readings, [*differing, *findings, *copies, *exchanged], False
+    for reading in tables:
+        if len(reading.values) < 2:
+            continue
+        if reading.what == "temperatures":
+            look_at_temperatures(reading)
+        else:
+            look_at_responses(reading, in_hertz=unit == "Hz", beside_weather=is_pair)
+            if model is not None and unit == "Hz":
+                check_model(model)
+                compare_with_model(reading, model)
+        put_stuck_aside(reading)
+    return readings, [*differing, *findings, *copies], is_pair and not differing
 
 
 def check_records(
@@ -149,18 +139,22 @@ def check_records(
     kelvin: 'T1' lies between 268.093 and 309.327 in 365 rows, 2025-01-01 to 2025-12-31
         Bounds and reports are in degrees Celsius. Subtract 273.15
     """
-    checked = CheckedTables(temperatures, frequencies, unit=unit, model=model)
-    outliers, parts = None, checked.cleaned()
-    for reading in checked.readings:
+    readings, findings, belong_together = examine(temperatures, frequencies, unit, model)
+    outliers, tables, left_out, n_rows = None, {}, {}, 0
+    for reading in readings:
+        tables[reading.what], reasons = reading.cleaned()
+        left_out, n_rows = left_out | reasons, max(n_rows, len(reading.values))
         if reading.what == "frequencies":
             far = np.isnan(reading.values) & ~np.isnan(reading.before)
-            if checked.belong_together:
-                wrong_times = {"wrong-stamps", "stamps-as-text"}.intersection(found.what for found in checked.findings)
-                far |= look_at_both(*checked.readings, has_wrong_times=bool(wrong_times))
+            if belong_together:
+                wrong_times = {"wrong-stamps", "stamps-as-text"}.intersection(map(itemgetter(0), findings))
+                far |= look_at_both(*readings, has_wrong_times=bool(wrong_times))
             index = reading.given_index if reading.is_frame else None
-            names = pd.Index(reading.columns, tupleize_cols=False)
-            outliers = pd.DataFrame(far[np.argsort(reading.order)], index, names)
-    return RecordFindings(findings_table(checked.all_findings()), checked.n_rows, outliers, **parts)
+            outliers = pd.DataFrame(
+                far[np.argsort(reading.order)], index, pd.Index(reading.columns, tupleize_cols=False)
+            )
+        findings += reading.findings
+    return RecordFindings(findings_table(findings), n_rows, outliers, **tables, left_out=left_out)
 
 
 def set_aside(
@@ -207,8 +201,9 @@ def set_aside(
     Raises
     ------
     ValueError
-        If the unit is no text, or what is left is meaningless as a whole: tables of other units, of different rows, or
-        exchanged; text; no record; or no column of a table that can be used. All of it is listed.
+        If the unit is no text, a kind to exclude is unknown, or what is left is meaningless as a whole: tables of
+        other units, of different rows, or exchanged; text; no record; or no column of a table that can be used. All of
+        it is listed.
 
     Warns
     -----
@@ -231,19 +226,29 @@ def set_aside(
     >>> int(found.temperatures["T1"].isna().sum())
     31
     """
-    checked = CheckedTables(temperatures, frequencies, unit=unit, model=model)
+    unknown = set(exclude).difference(WARNINGS)
+    if unknown:
+        raise ValueError(f"exclude has {sorted(unknown)}; expected some of {[*WARNINGS]}")
+    readings, findings, _ = examine(temperatures, frequencies, unit, model)
     kinds = (ASIDE_KINDS if is_baseline else {"placeholders"}).difference(exclude)
-    table = findings_table(checked.all_findings())
+    tables, left_out, n_rows = {"temperatures": None, "frequencies": None}, {}, 0
+    for reading in readings:
+        findings += reading.findings
+        n_rows = max(n_rows, len(reading.values))
+    table = findings_table(findings)
     harmless = {*ASIDE_KINDS, *(() if needs_all else LEFT_OUT_KINDS), *exclude}
-    others = RecordFindings(table[~table["what"].isin(harmless)], checked.n_rows)
+    others = RecordFindings(table[~table["what"].isin(harmless)], n_rows)
     others.refuse_meaningless()
-    for reading in checked.readings:
+    for reading in readings:
         reading.use(ASIDE_KINDS - kinds)
-    found = SetAside(table=table[table["what"].isin(LEFT_OUT_KINDS | kinds)], others=others, **checked.cleaned(exclude))
-    for reading in checked.readings:
-        if reading.columns and set(reading.columns) <= set(found.left_out):
-            reasons = "; ".join(map(found.left_out.get, reading.columns))
-            raise ValueError(f"no column of the {reading.what} can be used: {reasons}; expected measurements")
-    RecordFindings(table[:0], 0, left_out=found.left_out).refuse_meaningless(needs_all=needs_all)
+        tables[reading.what], reasons = reading.cleaned(exclude)
+        left_out |= reasons
+        if reading.columns and set(reading.columns) == set(reasons):
+            raise ValueError(
+                f"no column of the {reading.what} can be used: {'; '.join(reasons.values())}; expected measurements"
+            )
+    RecordFindings(table[:0], n_rows, left_out=left_out).refuse_meaningless(needs_all=needs_all)
+    aside = table[table["what"].isin(LEFT_OUT_KINDS | kinds)]
+    found = SetAside(**tables, table=aside, left_out=left_out, others=others)
     warn_each(found.warnings())
     return found

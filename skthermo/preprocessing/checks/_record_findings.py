@@ -27,8 +27,10 @@ WARNINGS = {
     "are unknown. Drop rows without a time, and read the others by pandas.to_datetime with format= or unit=",
     "stamps-as-text": "the index holds times that are no DatetimeIndex: {}. Rows would count as equally spaced, in "
     "the given order. Convert the index by pandas.to_datetime",
-    "unsorted-stamps": "rows are not in order of time, or times repeat: {}. Folds and lags take rows for periods of "
-    "time. Sort them by sort_index(), and keep one row for each time, such as by groupby(level=0).mean()",
+    "repeated-stamps": "times occur more than once: {}. Lags and memory cannot know which of the rows was earlier. "
+    "Keep one row for each time, such as by groupby(level=0).mean()",
+    "unsorted-stamps": "rows are not in order of time: {}. Folds and lags take rows for periods of time. Sort them by "
+    "sort_index()",
     "missing-column": "a column has no value: {}. Nothing can be learned from it. Leave it out, or check why it is "
     "empty",
     "constant": "a column is constant: {}. It carries no information, and its spread of zero makes any change "
@@ -179,8 +181,7 @@ class RecordFindings(SavesFrames):
         return self.summary()
 
     def warnings(self, *, exclude: Collection[str] = ()) -> Iterator[RecordsWarning]:
-        """A warning that counts and names values that count as missing, one that names columns that are left out, and
-        one for each other kind of finding.
+        """Warnings of values that count as missing, of columns that are left out, and of each other kind of finding.
 
         Parameters
         ----------
@@ -271,9 +272,9 @@ class SetAside(SavesFrames):
     def warnings(self) -> Iterator[RecordsWarning]:
         """One warning that counts and names the values, and one that names the columns that are left out.
 
-        Yields
-        ------
-        RecordsWarning
+        Returns
+        -------
+        iterator of RecordsWarning
             Of kind "set-aside" or "left-out".
         """
         return RecordFindings(self.table, 0, left_out=self.left_out).warnings()

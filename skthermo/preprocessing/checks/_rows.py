@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from skthermo._core.arrays import Array, spread_evenly
+from skthermo._core.arrays import spread_evenly
 from skthermo._core.frames import as_stamps
-from skthermo.preprocessing.checks._columns import contents_of
 from skthermo.preprocessing.checks._reading import Reading
 from skthermo.preprocessing.checks._record_findings import RecordFinding, period_of
 
@@ -36,7 +35,7 @@ def times_found(index: pd.Index) -> list[RecordFinding]:
     if len(again):
         again = again[np.argsort(stamps[again], kind="stable")]
         detail = f"{len(again)} of {n_rows} rows have the time of another"
-        found.append(RecordFinding.in_rows(index, "unsorted-stamps", "", again, detail))
+        found.append(RecordFinding.in_rows(index, "repeated-stamps", "", again, detail))
     if len(late):
         detail = f"{len(late)} of {n_rows} rows are earlier than the row before, the first row {late[0]}"
         detail = f"{detail} ({period_of(index, late[:1])})"
@@ -61,13 +60,13 @@ def labels_found(index: pd.Index) -> list[RecordFinding]:
 
 def few_rows_found(tables: list[Reading]) -> list[RecordFinding]:
     """Whether few rows have a value in each table."""
-    n_rows = min(len(table.values) for table in tables)
-    is_known, has_findings = np.ones(n_rows, dtype=bool), False
+    n_rows, n_findings = len(tables[0].values), 0
+    is_known = np.ones(n_rows, dtype=bool)
     for table in tables:
-        is_known &= ~np.isnan(table.values[:n_rows]).all(axis=1)
-        has_findings |= len(table.findings) > 0
+        n_rows, n_findings = min(n_rows, len(table.values)), n_findings + len(table.findings)
+        is_known = is_known[:n_rows] & ~np.isnan(table.values[:n_rows]).all(axis=1)
     known = np.flatnonzero(is_known)
-    if len(known) >= 50 or (not len(known) and has_findings):
+    if len(known) >= 50 or (not len(known) and n_findings):
         return []
     what, detail = "few-rows" if len(known) > 1 else "no-rows", f"{len(known)} of {n_rows} rows have values"
     return [RecordFinding.in_rows(tables[0].index, what, "", known, detail)]
@@ -87,30 +86,36 @@ def different_rows_found(T: Reading, F: Reading) -> list[RecordFinding]:
     return [RecordFinding.in_rows(here, what, "", np.array(differ), detail, period=False)]
 
 
-def exchanged_found(T: Reading, F: Reading, *, in_hertz: bool) -> list[RecordFinding]:
-    """Columns that stand in both tables, or temperatures that are frequencies and frequencies that are none."""
-    modes, details = {}, {}
-    for name, content in contents_of(F):
-        modes[content] = name
-    for name, content in contents_of(T):
-        if content in modes:
-            details[name] = f"{name!r} of the temperatures equals {modes[content]!r}"
-    if not details and in_hertz and min(len(T.values), len(F.values)) >= 50:
-        (steady, is_positive), (changing, _) = relative_change(T.values), relative_change(F.values)
-        if is_positive and steady < min(0.1, changing / 4):
-            part = f"{steady:.1%} of their median, of the frequencies within {changing:.0%}"
-            details[""] = f"half of the temperatures lie within {part}"
-    found = []
-    for name, detail in details.items():
-        found.append(RecordFinding.in_rows(T.index, "exchanged-tables", name, np.arange(len(T.values)), detail))
+def copies_found(tables: list[Reading]) -> list[RecordFinding]:
+    """Columns that vary and are copies of another one, in their table or in both."""
+    found, seen = [], {}
+    for table in tables:
+        everywhere = np.arange(len(table.values))
+        for place in np.flatnonzero(np.fmax.reduce(table.values) > np.fmin.reduce(table.values)):
+            name, content = table.columns[place], table.values[:, place].tobytes()
+            owner, other = seen.setdefault(content, (table, place))
+            if owner is not table:
+                detail = f"{owner.columns[other]!r} of the temperatures equals {name!r}"
+                found.append(RecordFinding.in_rows(table.index, "exchanged-tables", name, everywhere, detail))
+            elif other != place:
+                detail = f"{name!r} equals {owner.columns[other]!r} in {len(everywhere)} rows"
+                found.append(RecordFinding.in_rows(table.index, "equal-columns", name, everywhere, detail))
     return found
 
 
-def relative_change(values: Array) -> tuple[float, bool]:
-    """Distance of the quartiles over the median of a typical column, and whether all columns are positive."""
-    some = values[spread_evenly(np.arange(len(values)), 1000)]
-    known = some[:, np.fmax.reduce(some) > np.fmin.reduce(some)]
-    if not known.size:
-        return np.nan, False
-    low, middle, high = np.nanquantile(known, [0.25, 0.5, 0.75], axis=0)
-    return float(np.median((high - low) / np.maximum(np.abs(middle), 1e-300))), bool((low > 0).all())
+def exchanged_found(T: Reading, F: Reading) -> list[RecordFinding]:
+    """Temperatures that are frequencies: they change much less, relative to their median, than the frequencies do."""
+    changes, is_positive = [], False
+    for table in (F, T):
+        some = table.values[spread_evenly(np.arange(len(table.values)), 1000)]
+        some = some[:, np.fmax.reduce(some) > np.fmin.reduce(some)]
+        if len(some) < 50 or not some.size:
+            return []
+        low, middle, high = np.nanquantile(some, [0.25, 0.5, 0.75], axis=0)
+        changes.append(float(np.median((high - low) / np.maximum(np.abs(middle), 1e-300))))
+        is_positive = bool((low > 0).all())
+    if not is_positive or changes[1] >= min(0.1, changes[0] / 4):
+        return []
+    detail = f"half of the temperatures lie within {changes[1]:.1%} of their median, of the frequencies within"
+    everywhere = np.arange(len(T.values))
+    return [RecordFinding.in_rows(T.index, "exchanged-tables", "", everywhere, f"{detail} {changes[0]:.0%}")]

@@ -125,8 +125,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Whether M1, predictions and simulations use a reduced model, as ``reduce`` of `PosteriorInverse` says, which
         gets this value if its own is "auto" (:doc:`/guide/costs`). ``report_`` says which model solved.
     memory : str or joblib.Memory, optional
-        Folder for the checks of the training records and, unless the inverse has a memory of its own, for all that
-        its ``memory`` stores.
+        Folder for the means of earlier temperatures that the records have and, unless the inverse has a memory of its
+        own, for all that its ``memory`` stores.
     n_jobs : int, optional
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None

@@ -22,6 +22,7 @@ from skthermo.fem import linearise
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
 from skthermo.residuals.sensors import SensorRegression
+from skthermo.surrogate._fleet_mapper import FleetMapper
 from skthermo.surrogate.chain._records import TrainingRecords, mode_offsets
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior, unconverged
 
@@ -37,10 +38,14 @@ class FittedRows(SavesFrames):
     scored: int
     left_out: pd.Series
     filled: pd.DataFrame
+    expected: int
 
     @classmethod
-    def counted(cls, records: TrainingRecords, sensors: SensorRegression) -> FittedRows:
-        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found."""
+    def counted(cls, records: TrainingRecords, sensors: SensorRegression, expected: int) -> FittedRows:
+        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found.
+
+        With fewer than ``expected`` ones the fit is unreliable.
+        """
         T, trained = records.temperatures, records.trained
         inputs, F = as_floats(T), as_floats(records.frequencies)
         deviations, filled, missing = sensors.fill(T)[1], {}, {}
@@ -64,6 +69,7 @@ class FittedRows(SavesFrames):
             scored=min(n_trained, MOST_SCORED),
             left_out=pd.Series(left_out, dtype=int),
             filled=pd.DataFrame.from_dict(filled, orient="index", columns=["rows", "standard deviation", "when"]),
+            expected=expected,
         )
 
     def __repr__(self) -> str:
@@ -81,8 +87,8 @@ class FittedRows(SavesFrames):
         ]
         return lines
 
-    def warnings(self, n_parameters: int, per_parameter: int = 10) -> Iterator[SkthermoWarning]:
-        """Warnings that few rows train, fewer than so many ``per_parameter``, or that most have a filled sensor."""
+    def warnings(self) -> Iterator[SkthermoWarning]:
+        """Warnings that few rows train, or that most have a filled sensor."""
         if 2 * self.trained < self.given:
             yield FewRecordsWarning(
                 "most rows did not train the temperature mapper (report_.rows says why). The chain has learned little "
@@ -90,9 +96,9 @@ class FittedRows(SavesFrames):
                 "imputer=KNNGapImputer()",
                 "rows-left-out",
             )
-        if self.trained < per_parameter * n_parameters:
+        if self.trained < self.expected:
             yield FewRecordsWarning(
-                f"fewer than {per_parameter} complete rows for each parameter train the temperature mapper. The fit is "
+                "fewer than 10 complete rows for each parameter train the temperature mapper. The fit is "
                 "unreliable. Give a season or a year of records",
                 "few-rows",
             )
@@ -258,7 +264,7 @@ class FitReport(SavesFrames):
             Its text stands in the report, too.
         """
         yield from self.doubts
-        yield from self.rows.warnings(len(self.parameters.deviations))
+        yield from self.rows.warnings()
         modes, far = self.modes, self.findings.outliers.to_numpy()
         if modes["MAPE"].mean() > 1.2 * modes["MAPE of the mean"].mean():
             worst = (modes["MAPE"] / modes["MAPE of the mean"]).idxmax()
@@ -312,8 +318,9 @@ def named(columns: Iterable[Any]) -> str:
 def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequence[SkthermoWarning]) -> FitReport:
     """The report of a chain that is fitted otherwise; its inverse has ``found`` parameters of the records."""
     modes, unexplained = modes_of(chain)
+    expected = 0 if isinstance(last_step(chain.mapper_), FleetMapper) else 10 * len(chain.parameter_names_)
     return FitReport(
-        rows=FittedRows.counted(chain.records_, chain.sensors_),
+        rows=FittedRows.counted(chain.records_, chain.sensors_, expected),
         modes=modes,
         unexplained_offset=unexplained,
         parameters=FittedParameters.found(chain, found, modes["scatter"].to_numpy() / 100),

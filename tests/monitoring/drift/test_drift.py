@@ -196,7 +196,7 @@ def test_columns_that_say_nothing_and_repeated_records_change_nothing_of_the_oth
         constant = track_parameters(fem, T, F.assign(f2=F["f2"].iloc[0]), GROUPS, WEEK, random_state=0)
     pd.testing.assert_frame_equal(constant.rates, missing.rates)
     again = [*range(len(F)), *range(9)]
-    with pytest.warns(UserWarning, match="unsorted-stamps"):
+    with pytest.warns(UserWarning, match="repeated-stamps"):
         repeated = track_parameters(fem, T.iloc[again], F.iloc[again], GROUPS, WEEK, random_state=0)
     once = track_parameters(fem, T, F, GROUPS, WEEK, random_state=0)
     pd.testing.assert_frame_equal(repeated.rates, once.rates)
