@@ -256,7 +256,7 @@ class Observed(NamedTuple):
 
     def some(self, rows: NDArray[np.intp]) -> Observed:
         """Some of the rows."""
-        return Observed(*(values[rows] for values in self))
+        return Observed(self.log_frequencies[rows], self.units[rows], self.noise[rows])
 
     def beside(self, frequencies: Array, slopes: Array, *shapes: Array) -> tuple[Array, Array]:
         """Residuals beside a solved model, 0 where one is missing, and derivatives of the observations by ln theta.
