@@ -3,7 +3,6 @@
 It uses ``_core``. Start with ``checks/_check_records.py``, through which all fits go.
 """
 
-from skthermo.preprocessing._find_memory import MemoryFindings, find_memory
 from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._mode_tracker import ModeTracker
@@ -22,13 +21,11 @@ __all__ = [
     "HingeFeatures",
     "KNNGapImputer",
     "LagFeatures",
-    "MemoryFindings",
     "ModeTracker",
     "RecordFindings",
     "SensorMeans",
     "SetAside",
     "check_records",
-    "find_memory",
     "read_records",
     "residual_trend",
     "set_aside",

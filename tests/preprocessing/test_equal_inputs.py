@@ -27,7 +27,7 @@ VALUES = RECORDS.to_numpy(copy=True, dtype=float)
 TRANSFORMERS = [
     BiasAligner(),
     BiasAligner(method="scale"),
-    ExponentialMeans([3, 20]),
+    ExponentialMeans(half_lives=[3, 20]),
     HampelFilter(),
     HampelFilter(targets=[3, 4, 5]),
     HingeFeatures(),
@@ -87,7 +87,7 @@ def test_arrays_with_equal_values_give_equal_bits(transformer, kind):
 @pytest.mark.parametrize("kind", FRAMES)
 def test_frames_with_equal_values_give_equal_bits(transformer, kind):
     if isinstance(transformer, ExponentialMeans):
-        transformer = ExponentialMeans(["3D", "20D"])
+        transformer = ExponentialMeans(half_lives=["3D", "20D"])
     for found, expected in zip(
         fitted_and_transformed(transformer, FRAMES[kind]), fitted_and_transformed(transformer, RECORDS), strict=True
     ):
