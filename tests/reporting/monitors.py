@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from skthermo.fleet._discoveries import COLUMNS, Discoveries
+from skthermo.monitoring._discoveries import Discoveries
 from skthermo.monitoring._status import status_of
 from skthermo.monitoring._threshold import SmallestChanges
 
@@ -145,7 +145,8 @@ class FakeFleet:
             for number, event in monitor.events_.to_dict("index").items()
             if event["kind"] == "damage"
         ]
-        table = pd.DataFrame(rows, columns=[*COLUMNS, "is_discovery"])
+        columns = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged", "is_discovery"]
+        table = pd.DataFrame(rows, columns=columns)
         table["is_discovery"] = table["end"].isna() & (table["p_value"] < 0.01)
         p_values = pd.Series(1.0, list(self.monitors))
         return Discoveries(fdr, table, p_values, 0.01, [], 0.5, float(len(self.monitors)))
