@@ -75,12 +75,6 @@ use(
 method("monitoring.Monitor.status", SERVED, now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
 method("monitoring.Monitor.transitions", SERVED, after=(1, number(-1, 1.5, 10**6)))
 method("monitoring.Monitor.years_watched", SERVED, since=("2025-06-10", MOMENT))
-method(
-    "monitoring.Monitor.event_p_values",
-    SERVED,
-    since=("2025-06-10", MOMENT),
-    tail_shape=(0.1, number(-1, 1, 2, but=("None",))),
-)
 use(
     *served("acknowledge", lambda monitor: monitor.events_),
     event=(1, number(0, -1, 1.5, 1000)),

@@ -99,9 +99,7 @@ class FakeMonitor:
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
         self.trained_, self.since_ = self.baseline_, None
         self.counts_ = {"n_records": len(stamps), "n_not_evaluated": int((~known).sum()), "n_repeated": 2}
-        rule = SimpleNamespace(threshold=3.0, release=2.0, hold=pd.Timedelta("1D"))
         self.false_alarm_estimate_ = SimpleNamespace(
-            rule=rule,
             expected=false_alarms_per_year,
             lowest=0,
             highest=3,
@@ -112,12 +110,6 @@ class FakeMonitor:
         self.watch_per_year, self.watch_threshold_ = watch_per_year, None if watch_per_year is None else 2.5
         self.smallest_changes_ = smallest_changes(0.01, {"f1": 0.02, "f2": 0.03}, True)
         self.detector_ = SimpleNamespace()
-
-    @property
-    def history_(self):
-        opened = set(self.events_.loc[self.events_["end"].isna(), "kind"])
-        newest = "watch" if "watch" in opened else str(self.evaluations_["state"].iloc[-1])
-        return SimpleNamespace(state="alarm" if opened & {"damage", "measurement or structure"} else newest)
 
     def transitions(self, after=0):
         return []
