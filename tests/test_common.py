@@ -51,10 +51,9 @@ pytestmark = [  # scikit-learn checks detectors on 20 to 50 rows
     pytest.mark.filterwarnings(f"ignore:.*{cause}")
     for cause in (
         "few-baseline-records",
-        "fahrenheit",
+        "unit-of-temperatures",
         "implausible-values",  # of normal values about 100, those above, as temperatures
         "no-thermal-effect",
-        "sudden-change",
         "windows.*not-evaluated",
     )
 ]
@@ -109,7 +108,7 @@ def expected_failures(estimator):
 
 
 ESTIMATORS = [
-    ExponentialMeans([3]),
+    ExponentialMeans(half_lives=[3]),
     LagFeatures(),
     HampelFilter(),
     HingeFeatures(),

@@ -125,7 +125,7 @@ BY_POSITION = TemperatureCompensator(Ridge(), targets=[3])
 STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, uncertainty="noise", random_state=0)
 CASES = {
     "lags": Case(LagFeatures(3), (BOTH,), TRANSFORMED),
-    "means": Case(ExponentialMeans([3]), (BOTH,), TRANSFORMED),
+    "means": Case(ExponentialMeans(half_lives=[3]), (BOTH,), TRANSFORMED),
     "outliers": Case(HampelFilter(), (BOTH,), TRANSFORMED),
     "hinges": Case(HingeFeatures(), (T,), TRANSFORMED),
     "sensors": Case(SensorMeans(), (T,), TRANSFORMED),

@@ -231,6 +231,14 @@ def last_step(estimator: Any) -> Any:
     return estimator
 
 
+def with_means(estimator: Any, X: Any, y: Any) -> Any:
+    """An estimator whose last step, a mapper that chooses means of earlier inputs, has them in a step before it."""
+    last = last_step(estimator)
+    if not hasattr(last, "behind_means") or isinstance(estimator, BaseSearchCV):
+        return estimator
+    return last.behind_means(X, y, estimator.steps[:-1] if isinstance(estimator, Pipeline) else ())
+
+
 def held(path: str, *, is_copied: bool = False) -> Any:
     """A property that a part of an object holds, such as "active_.threshold"; the object's class says what it is."""
     get = attrgetter(path)

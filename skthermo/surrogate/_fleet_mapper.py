@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.base import RegressorMixin
 
 from skthermo._core.arrays import Array, as_columns, check_flag
-from skthermo._core.estimators import Estimator, _fit_context, check_array, check_is_fitted, validate_data
-from skthermo._core.frames import check_same_rows, column_names, frame_like, has_stamps, like_targets, row_times
+from skthermo._core.estimators import _fit_context, check_is_fitted
+from skthermo._core.frames import frame_like, has_stamps, like_targets, row_times
 from skthermo._core.warnings import collected, warn_each
-from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import set_aside
-from skthermo.surrogate._regression import TemperatureMapper
+from skthermo.surrogate._regression import TableRegressor, TemperatureMapper
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class Posterior:
         return self.level + away @ self.coefficients, np.sqrt(variances)
 
 
-class FleetMapper(RegressorMixin, Estimator):
+class FleetMapper(TableRegressor):
     """Parameters or frequencies of a bridge from the weather, learned together with the mappers of other bridges.
 
     Parameters
@@ -87,7 +85,7 @@ class FleetMapper(RegressorMixin, Estimator):
     is_log_ : bool
         Whether logarithms are learned: where all outputs are positive.
     n_parameters_, parameter_names_ : int, list or None
-        Number of outputs and, where `fit` saw them, their names.
+        Number of outputs, and their names where `fit` saw them.
     y_is_vector_ : bool
         Whether `fit` saw one output as a vector.
     findings_ : list of SkthermoWarning
@@ -150,8 +148,9 @@ class FleetMapper(RegressorMixin, Estimator):
         NotFittedError
             If a mapper is not fitted.
         """
-        inputs, targets = self._read(X, y)
-        harmless = ("no-rows", "stuck-sensor", "implausible-values", "constant")  # in rows of any order
+        inputs, targets = self._read_xy(X, y, ("temperatures", "outputs"))
+        self.parameter_names_ = [y.name] if getattr(y, "name", None) is not None else self.parameter_names_
+        harmless = ("no-rows", "stuck", "implausible-values", "constant")  # in rows of any order
         with collected() as self.findings_:
             inputs = np.asarray(set_aside(frame_like(X, inputs), exclude=harmless, needs_all=True).temperatures)
         usable = ~(np.isnan(inputs).any(axis=1)[:, np.newaxis] | np.isnan(targets))
@@ -159,6 +158,7 @@ class FleetMapper(RegressorMixin, Estimator):
             raise ValueError(
                 f"an output has {usable.sum(axis=0).min()} of n_samples={len(inputs)} rows complete; expected 2 or more"
             )
+        self.n_parameters_ = targets.shape[1]
         mappers = self._mappers()
         self._check(mappers)
         own = inputs[usable.any(axis=1)]
@@ -195,8 +195,7 @@ class FleetMapper(RegressorMixin, Estimator):
         std : ndarray or DataFrame of the same shape
             Only with ``return_std``: standard deviations of the expected outputs, without the noise of a record.
         """
-        check_is_fitted(self)
-        inputs = validate_data(self, X, dtype=np.float64, reset=False)
+        inputs = self._inputs(X)
         both = [
             (mean, *posterior.at(functions))
             for posterior, (mean, functions) in zip(self.posteriors_, self._functions(X, inputs), strict=True)
@@ -208,42 +207,6 @@ class FleetMapper(RegressorMixin, Estimator):
             return table
         deviations = values * deviations if self.is_log_ else deviations
         return table, like_targets(X, deviations, self.parameter_names_, is_vector=self.y_is_vector_)
-
-    def score(self, X: ArrayLike, y: ArrayLike) -> float:
-        """Coefficient of determination R2 over complete rows, averaged over outputs.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_inputs)
-            Inputs.
-        y : array-like, Series or DataFrame of shape (n_samples,) or (n_samples, n_outputs)
-            Outputs, in the order of `fit`.
-
-        Returns
-        -------
-        float
-            NaN if fewer than two rows are complete.
-        """
-        return complete_r2(as_columns(y), as_columns(self.predict(X)))
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
-
-    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """Inputs and outputs, (n_samples, n_outputs)."""
-        if y is None:
-            raise ValueError("This FleetMapper estimator requires y to be passed, but the target y is None")
-        inputs = validate_data(self, X, dtype=np.float64)
-        targets = check_array(y, dtype=np.float64, ensure_2d=False)
-        plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
-        check_same_rows(X, targets if plain_rows else y, ("inputs", "outputs"))
-        self.y_is_vector_, name = targets.ndim == 1, getattr(y, "name", None)
-        self.parameter_names_ = column_names(y, "") if hasattr(y, "columns") else None if name is None else [name]
-        targets = as_columns(targets)
-        self.n_parameters_ = targets.shape[1]
-        return inputs, targets
 
     def _functions(self, X: ArrayLike, inputs: Array) -> list[tuple[Array, Array]]:
         """For each output: mean response of the other bridges, and functions whose coefficients scatter by 1."""

@@ -3,13 +3,12 @@
 import importlib
 
 PLACES = {
-    "_core.matrix_child": ["read"],
-    "_core.matrix_files": ["form_of"],
     "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
+    "fem.external._files": ["form_of", "read_file"],
     "monitoring._active": ["ActiveDetector"],
-    "monitoring._events": ["find_events", "followed"],
     "monitoring._fleet_bridge": ["KnownBridge"],
+    "monitoring._events": ["find_events", "followed"],
     "monitoring._records": ["Lookback", "Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._threshold": ["EventLevels", "estimate_false_alarms"],

@@ -68,6 +68,7 @@ PARTS = {
     "later-weather": Part("later_weather.py", **Z24),
     "plain-call": Part("plain_call.py"),
     "regressors": Part("regressors.py", **Z24),
+    "earlier-weather": Part("earlier_weather.py", "--parts truss", **Z24),
     "sensors": Part("monitor_sensors.py", **Z24),
     "drift": Part("parameter_drift.py --parts tracked"),
     "new-baselines": Part("monitor_retraining.py", "--seeds 1 --only refit", needs="kw51"),

@@ -242,8 +242,6 @@ class FitReport(SavesFrames):
                 "of them."
             )
         lines += self.parameters.sentences
-        if getattr(self.findings.memory, "features", None) is not None:
-            lines.append(self.findings.memory.summary())
         if len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"MAPE is in-sample, of {self.rows.scored} rows spread evenly over the training rows."]
