@@ -35,11 +35,10 @@ class IdentifiedDamageDisplay(Display):
     Parameters
     ----------
     identified : IdentifiedDamage
-        With the frames ``summary_table`` (explanations in rows, the most probable first; probability), ``table``
-        (causes in rows; probability, severity, ci_low, ci_high, and perhaps highest_if_damaged) and ``shifts`` (modes
-        in rows; measured, explained, standard_error; relative), and perhaps the names ``separability.unobservable`` of
-        causes that the modes do not show. The first sentence of its ``answer()``, if it has one, heads a figure of its
-        own.
+        With the frames ``explanations`` (in rows, the most probable first; probability, text), ``table`` (causes in
+        rows; probability, severity, ci_low, ci_high, and perhaps highest_if_damaged) and ``shifts`` (modes in rows;
+        measured, explained, standard_error; relative), and perhaps the names ``unobservable`` of causes that the modes
+        do not show. The first sentence of its ``answer()``, if it has one, heads a figure of its own.
 
     Attributes
     ----------
@@ -64,7 +63,7 @@ class IdentifiedDamageDisplay(Display):
     >>> from types import SimpleNamespace
     >>> from skthermo.plotting import IdentifiedDamageDisplay
     >>> identified = SimpleNamespace(
-    ...     summary_table=pd.DataFrame({"probability": [0.8, 0.2]}, ["piers 20 %", "deck 4 %, piers 12 %"]),
+    ...     explanations=pd.DataFrame({"probability": [0.8, 0.2], "text": ["piers 20 %", "deck 4 %, piers 12 %"]}),
     ...     table=pd.DataFrame(
     ...         {"probability": [0.2, 1.0], "severity": [0.01, 0.18], "ci_low": [0, 0.1], "ci_high": [0.04, 0.22]},
     ...         ["deck", "piers"]),
@@ -99,7 +98,7 @@ class IdentifiedDamageDisplay(Display):
         ValueError
             If a frame is missing.
         """
-        cls._check_has(identified, ("summary_table", "table", "shifts"), "identified", "an IdentifiedDamage")
+        cls._check_has(identified, ("explanations", "table", "shifts"), "identified", "an IdentifiedDamage")
         return cls(identified).plot(**options)
 
     def plot(self, ax: np.ndarray | None = None) -> IdentifiedDamageDisplay:
@@ -115,7 +114,7 @@ class IdentifiedDamageDisplay(Display):
         IdentifiedDamageDisplay
             Itself.
         """
-        has_long_labels = self.identified.summary_table.index[:MOST_BARS].astype(str).str.len().max() > LABEL
+        has_long_labels = self.identified.explanations["text"][:MOST_BARS].astype(str).str.len().max() > LABEL
         height = max(4.9 if has_long_labels else 3.8, 1.4 + 0.3 * len(self.identified.table))
         names = ["explanations", "severities", "shifts"]
         explanations, severities, shifts = self._take_axes(ax, names, (4.6, height), n_columns=3)
@@ -129,7 +128,7 @@ class IdentifiedDamageDisplay(Display):
 
     def _draw_explanations(self, ax: Axes) -> BarContainer:
         """Bars with the causes above and the probability behind them."""
-        probabilities = 100 * self.identified.summary_table["probability"].astype(float)
+        probabilities = 100 * self.identified.explanations.set_index("text")["probability"].astype(float)
         shown = probabilities.iloc[:MOST_BARS]
         if (others := 100 - shown.sum()) >= 0.1:
             shown = pd.concat([shown, pd.Series({"all others": others})])
@@ -149,10 +148,7 @@ class IdentifiedDamageDisplay(Display):
 
     def _draw_severities(self, ax: Axes) -> ErrorbarContainer:
         """Severities with their bands, darker the more probable a cause is, and this probability at the right."""
-        table, unobservable = (
-            self.identified.table,
-            set(getattr(getattr(self.identified, "separability", None), "unobservable", ())),
-        )
+        table, unobservable = self.identified.table, set(getattr(self.identified, "unobservable", ()))
         places, is_known = np.arange(len(table)), ~table.index.isin(unobservable)
         severity, lowest, highest = 100 * table[["severity", "ci_low", "ci_high"]].to_numpy(dtype=float).T
         probability, side = table["probability"].to_numpy(dtype=float), ax.get_yaxis_transform()
