@@ -261,12 +261,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/modal/_core.py", "fem/test_divide.py"): [
         ("parts of calibrated terms", "(self.stiffness.factors[origin])", "(np.ones(len(origin)))"),
     ],
-    ("studies/identification/_shift.py", "studies/test_identify_parts.py"): [
-        ("known scatter of outliers", "np.hypot(deviations, OF_WEATHER * usual)", "0.0"),
-    ],
-    ("studies/identification/_identified.py", "studies/test_identify_sentences.py"): [
-        ("alike groups reported together", "similarity.loc[one, other] >= ALIKE", "similarity.loc[one, other] > 1"),
-        ("groups that are not seen", "seen if seen in known else causes", "causes"),
+    ("studies/identification/_evidence.py", "studies/test_identify.py"): [
+        ("probability of the bounds", "logs = logs + inside", "logs = logs + 0 * inside"),
+        ("exact effects of several causes", "self.rotation\n        added", "0 * self.rotation\n        added"),
     ],
     ("studies/detectability/_simulation.py", "studies/test_study.py"): [
         (
@@ -274,9 +271,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[1]))",
             "self.reference(scenario, int(seeds[0]))",
         ),
-    ],
-    ("studies/identification/_shapes.py", "studies/test_identify_shapes.py"): [
-        ("scale of a shape in its derivatives", "d_turned -= turned", "d_turned -= 0 * turned"),
     ],
     ("studies/detectability/_replicates.py", "studies/test_replicates.py"): [
         ("weather of any season", "SEASON = 15", "SEASON = 90"),

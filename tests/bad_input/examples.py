@@ -1780,8 +1780,6 @@ NOT_CALLED |= {
     "preprocessing.RecordFindings": "made by check_records",
     "preprocessing.SetAside": "made by set_aside",
     "studies.IdentifiedDamage": "made by identify_damage",
-    "studies.LocatedDamage": "made by locate_damage",
-    "studies.locate_damage": "not tried: it wants a structure whose model is fitted",
     "preprocessing.MemoryFindings": "made by find_memory",
     "datasets.BridgeFleet": "made by make_fleet",
     "datasets.FleetBridge": "made by make_fleet",

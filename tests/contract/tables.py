@@ -13,7 +13,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import Bunch
 
-from skthermo.datasets import make_fleet, make_truss, make_truss_campaign, truss_structure
+from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import match_modes
 from skthermo.metrics import error_table
@@ -24,7 +24,6 @@ from skthermo.studies import (
     compare_extensions,
     detection_task,
     identify_damage,
-    locate_damage,
     pod_curve,
     sweep,
 )
@@ -125,8 +124,6 @@ def results_of_studies(fem, later):
     damaged = make_truss_campaign(samples_per_year=120, damage={"bottom": 0.2}, random_state=1)
     identified = identify_damage(fem, damaged.temperatures, damaged.frequencies, GROUPS[:2], random_state=0)
     yield "studies.IdentifiedDamage", identified
-    of_members = truss_structure(), damaged.temperatures, damaged.frequencies, ["bottom"]
-    yield "studies.LocatedDamage", locate_damage(fem, *of_members, random_state=0)
 
 
 def results_of_monitoring(fem, year, later):

@@ -132,12 +132,12 @@ def given(n_groups=3, **changed):
     columns = ["probability", "severity", "ci_low", "ci_high", "if_damaged", "highest_if_damaged"]
     labels = ["piers 20 %", "deck 4 %, piers 12 %", "soil 8 %", "deck 5 %", "piers 3 %, soil 2 %", "no damage"]
     frames = {
-        "summary_table": pd.DataFrame({"probability": [0.5, 0.2, 0.1, 0.08, 0.06, 0.05]}, labels),
+        "explanations": pd.DataFrame({"probability": [0.5, 0.2, 0.1, 0.08, 0.06, 0.05], "text": labels}),
         "table": pd.DataFrame(values, groups, columns),
         "shifts": pd.DataFrame(
             {"measured": [-0.01, -0.05], "explained": [-0.012, -0.04], "standard_error": [0.002, 0.003]}, ["f1", "f2"]
         ),
-        "separability": SimpleNamespace(unobservable=groups[-1:]),
+        "unobservable": groups[-1:],
     }
     return SimpleNamespace(**frames | changed)
 
@@ -146,12 +146,12 @@ def test_explanations_beyond_the_fifth_share_a_bar_and_shifts_are_in_percent():
     found = given()
     display = IdentifiedDamageDisplay.from_predictions(found)
     np.testing.assert_allclose([bar.get_width() for bar in display.bars_], [50, 20, 10, 8, 6, 6])
-    assert [text.get_text() for text in display.axes_[0].texts][::2] == [*found.summary_table.index[:5], "all others"]
+    assert [text.get_text() for text in display.axes_[0].texts][::2] == [*found.explanations["text"][:5], "all others"]
     np.testing.assert_allclose(display.shifts_[0].get_ydata(), [-1, -5])
     np.testing.assert_allclose(display.explained_.get_ydata(), [-1.2, -4])
     np.testing.assert_allclose(display.shifts_[2][0].get_segments()[1][:, 1], [-5.6, -4.4])
     whole = IdentifiedDamageDisplay.from_predictions(
-        given(summary_table=pd.DataFrame({"probability": [0.9, 0.1]}, ["a", "b"]))
+        given(explanations=pd.DataFrame({"probability": [0.9, 0.1], "text": ["a", "b"]}))
     )
     assert len(whole.bars_) == 2
 
@@ -173,11 +173,9 @@ def test_severities_have_bands_and_probabilities_and_what_is_not_seen_has_none()
 @pytest.mark.parametrize("n_groups", [1, 14])
 def test_nothing_that_is_written_overlaps_in_a_figure_of_its_own(n_groups):
     long = "Rebar of the upper floors in the eastern wing"
-    found = given(n_groups, separability=SimpleNamespace(unobservable=[]))
+    found = given(n_groups, unobservable=[])
     found.table = found.table.rename(index={"deck": long})
-    found.summary_table = found.summary_table.rename(
-        index={"piers 20 %": f"{long} 12 %, main stays of the western pylon 4 %"}
-    )
+    found.explanations = found.explanations.replace("piers 20 %", f"{long} 12 %, main stays of the western pylon 4 %")
     display = IdentifiedDamageDisplay.from_predictions(found)
     display.figure_.canvas.draw()
     for ax in display.axes_[:2]:

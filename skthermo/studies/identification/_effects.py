@@ -18,7 +18,7 @@ from skthermo.studies.identification._shift import FrequencyShift, stated_deviat
 
 N_STEPS = 400  # between 0 and the bound of an amount, for which effects are tabulated
 Response = Callable[[Sequence[Cause], Sequence[float]], Array]
-"""What is observed after some amounts of causes, (n_observed,)."""
+"""Change of what is observed by some amounts of causes, (n_observed,)."""
 
 
 @dataclass(frozen=True)
@@ -41,16 +41,18 @@ def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any
         solved = after.frequencies(theta)
         return np.log(as_floats(fem.aligner_.inverse_transform(solved)))[0, known]
 
+    before = frequencies([], [])
     covariance = shift.covariance[np.ix_(known, known)]
     if shapes is None:
-        return Observed(shift.mean[known], covariance, frequencies, [])
+        return Observed(shift.mean[known], covariance, lambda *change: frequencies(*change) - before, [])
     of_shapes, theta, change, variances, findings = _shape_changes(
         model, shift.theta, shapes, dofs, shape_noise, fem.mode_names_
     )
 
     def both(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
-        after, rows = changed(model, theta, causes, amounts)
-        return np.append(frequencies(causes, amounts), of_shapes.components(after.modes(rows)[1][0][of_shapes.dofs]))
+        after, rows = changed(model, theta, causes, amounts)  # the model's own components are 0
+        components = of_shapes.components(after.modes(rows)[1][0][of_shapes.dofs])
+        return np.append(frequencies(causes, amounts) - before, components)
 
     covariance = block_diag(covariance, np.diag(variances))
     return Observed(np.append(shift.mean[known], change), covariance, both, findings)
@@ -72,11 +74,10 @@ class ShapeComponents:
     def components(self, shapes: NDArray) -> Array:
         """Components of real or complex shapes (..., n_sensors, n_modes), mode after mode, (..., n_observed)."""
         found = []
-        for mode in range(self.reference.shape[1]):
+        for mode in np.flatnonzero(self.known.any(axis=0)):
             rows = self.known[:, mode]
             reference, shape = self.reference[rows, mode], shapes[..., rows, mode]
-            along = shape @ reference
-            turned = np.real(shape * np.where(along == 0, 1.0, np.conj(along) / np.abs(along))[..., np.newaxis])
+            turned = np.real(shape * np.exp(-1j * np.angle(shape @ reference))[..., np.newaxis])
             turned *= np.linalg.norm(reference) / np.linalg.norm(turned, axis=-1, keepdims=True)
             found.append(turned @ np.linalg.svd(reference[np.newaxis])[2][1:].T)
         return np.concatenate(found, axis=-1)
@@ -187,11 +188,11 @@ class Curves:
     @classmethod
     def tabulated(cls, response: Response, causes: Sequence[Cause], n_solved: int = 9) -> Curves:
         """Cubic splines over the logarithm of what changes, through effects at a few amounts."""
-        before, values, slopes = response([], []), [], []
+        values, slopes = [], []
         for cause in causes:
-            ends = np.linspace(0, np.log1p(cause.direction * cause.bound), n_solved)
-            changes = [response([cause], [cause.direction * np.expm1(end)]) - before for end in ends[1:]]
-            curve = CubicSpline(np.abs(ends), np.vstack([0 * before, *changes]))
+            ends = np.linspace(0, 1, n_solved) ** 2 * np.log1p(cause.direction * cause.bound)  # small amounts are usual
+            changes = [response([cause], [cause.direction * np.expm1(end)]) for end in ends[1:]]
+            curve = CubicSpline(np.abs(ends), np.vstack([0 * changes[0], *changes]))
             factors = 1 + cause.direction * np.linspace(0, cause.bound, N_STEPS + 1)
             places = np.abs(np.log(factors))
             values.append(curve(places))

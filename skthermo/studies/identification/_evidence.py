@@ -120,8 +120,7 @@ class Evidence:
     def _refined(self, weight: Weight) -> Weight:
         """The weight with the exact effect of all causes together at the most probable amounts."""
         causes, place = [self.causes[one] for one in weight.causes], int(weight.logs.argmax())
-        response = self.observed.response
-        exact = (response(causes, weight.places[place].tolist()) - response([], [])) @ self.rotation
+        exact = self.observed.response(causes, weight.places[place].tolist()) @ self.rotation
         added = self.curves.at(np.array([weight.causes]), weight.places[[place]][np.newaxis])[1][0, 0]
         return self.weigh([weight.causes], [weight.log_prior], exact - added)[0]
 

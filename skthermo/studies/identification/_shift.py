@@ -51,14 +51,14 @@ def measured_shift(fem: Any, T: ArrayLike, F: ArrayLike, noise: Any) -> Frequenc
     shifts = np.where(rows[:, np.newaxis] & ~np.isnan(healthy).all(axis=0), shifts, np.nan)
     _check_ratios(np.exp(means_of_known(shifts)), fem.mode_names_)
     n_records, n_healthy = ((~np.isnan(values)).sum(axis=0) for values in (shifts, healthy))
-    factor = 1.0 if deviations is not None else _records_for_one(healthy)
-    n_independent, n_trained = (np.maximum(number / factor, 1.0) for number in (n_records, n_healthy))
+    factors = np.ones(len(n_healthy)) if deviations is not None else _records_for_one(healthy)
+    n_independent, n_trained = (np.maximum(number / factors, 1.0) for number in (n_records, n_healthy))
     known = n_records > 0
     roots = np.sqrt(1 / n_independent + 1 / n_trained)[known]
     single = (
         np.diag(deviations[known] ** 2) if deviations is not None else Gaussian.fitted(healthy[:, known]).covariance
     )
-    freedom = float(n_trained[known].min() - 1)
+    freedom = float(n_trained[known].mean() - 1)
     covariance = np.eye(len(known))
     covariance[np.ix_(known, known)] = single * np.outer(roots, roots)
     if deviations is None:  # Hotelling: the covariance of the modes is estimated, too
@@ -93,15 +93,16 @@ def stated_deviations(noise: Any, n_modes: int, *, what: str, **options: Any) ->
     return deviations
 
 
-def _records_for_one(residuals: Array) -> float:
-    """How many records in a row are worth one independent one, the mean of the modes.
+def _records_for_one(residuals: Array) -> Array:
+    """How many records in a row are worth one independent one, (n_modes,).
 
     From the variance of the means of a dozen parts or, if that gives more, from the correlation of neighbours.
     """
-    columns = [column for column in residuals.T if (~np.isnan(column)).sum() > 1]
-    parts = np.mean([(~np.isnan(column)).sum() / independent_records(column) for column in columns])
-    neighbours = np.clip(np.mean([pd.Series(column).autocorr() for column in columns]), 0, 0.98)
-    return float(max(parts, (1 + neighbours) / (1 - neighbours)))
+    number = (~np.isnan(residuals)).sum(axis=0)
+    parts = number / [independent_records(column) for column in residuals.T]
+    neighbours = [pd.Series(column).autocorr() if n > 2 else 0.0 for column, n in zip(residuals.T, number, strict=True)]
+    neighbours = np.clip(np.nan_to_num(neighbours), 0, 0.98)
+    return np.maximum(parts, (1 + neighbours) / (1 - neighbours))
 
 
 def _left_out(fem: Any, T: Any, frequencies: Array, shifts: Array, deviations: Array) -> dict[str, Array]:
