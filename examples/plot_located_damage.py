@@ -4,7 +4,8 @@ From an alarm to the damaged elements
 
 A footbridge of three equal spans is monitored for a year. In the next spring, three neighbouring elements of its first
 span have lost a part of their stiffness. :func:`~skthermo.studies.identify_damage` says which span has changed and,
-given the structure, where in it, element by element, as far as the records tell. The bridge is symmetric, so that frequencies alone cannot tell the first span from the last; measured mode shapes can.
+given the structure, where in it, element by element, as far as the records tell. The bridge is symmetric, so that
+frequencies alone cannot tell the first span from the last; measured mode shapes can.
 
 Run it with ``python examples/plot_located_damage.py``; figures go to the folder ``figures``. It needs
 :download:`page_recipes.py` beside it. The guide is :doc:`/guide/identify`.

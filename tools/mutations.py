@@ -300,10 +300,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
     ],
-    ("studies/detectability/_waits.py", "studies/test_time_to_detection.py"): [
-        ("no season after the last record", "np.hstack([alarms, alarms])", "np.hstack([alarms, 0 * alarms > 0])"),
-        ("windows that never held healthy records", "steps = _after_transitions(", "_after_transitions("),
-    ],
     ("surrogate/chain/_service.py", "surrogate/test_service_records.py"): [
         ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
     ],

@@ -114,7 +114,6 @@ def results_of_studies(fem, later):
     yield "studies.DetectabilityStudy", study
     yield "studies.DetectabilityStudy.ranking", study.ranking()
     yield "studies.DetectabilityStudy.minimum_detectable_damage", study.minimum_detectable_damage()
-    yield "studies.DetectabilityStudy.time_to_detection", study.time_to_detection()
     yield "studies.DetectabilityStudy.labelled_scores", study.labelled_scores()
     yield "studies.compare_extensions", compare_extensions(study, T, modes=[6])
     task = detection_task(fem, T, scenarios, columns=fem.mode_names_, n_repeats=2, random_state=0)

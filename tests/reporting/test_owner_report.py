@@ -304,16 +304,3 @@ def test_what_does_not_fit_is_named(study, tmp_path, place, options, message):
         owner_report("study", tmp_path / "a.html")
     with pytest.raises(NotFittedError, match="run"):
         owner_report(DetectabilityStudy(None, None, []), tmp_path / "a.html")
-
-
-def test_it_leads_with_the_smallest_damage_and_how_soon_it_is_detected(study, page):
-    waits, smallest = study.time_to_detection(), study.time_to_detection(smallest=True)
-    order = ("The structure as it is now", "Smallest damage", "False alarms", "Time to detection", "Alarm within a day")
-    places = [page.text.index(text) for text in order]
-    assert places == sorted(places)
-    for text in smallest["text"]:
-        assert text in page.text
-    weeks = [float(cell.partition("\xa0%")[0]) for cell in page.cells if re.fullmatch(r"[\d.]+\xa0% \(.*%\)", cell)]
-    assert all(np.isclose(weeks, 100 * share, rtol=0.05).any() for share in waits["7D"] if 0 < share < 0.99)
-    assert "Alarm within a week" in page.heads
-    assert "with the first record of the simulated weather, 2024-01-01 00:00." in page.text

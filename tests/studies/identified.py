@@ -6,10 +6,10 @@ import pandas as pd
 from skthermo.studies import IdentifiedDamage
 from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._evidence import Explanation
-from skthermo.studies.identification._identified import listed_explanations, tabulated
+from skthermo.studies.identification._identified import tabulated
 
 
-def identified(explanations, *, groups=None, **changed):
+def identified(explanations, *, groups=None, unobservable=(), alike=(), **changed):
     """An identification with these explanations: by name, the probability and each group's severity and error."""
     random = np.random.default_rng(0)
     names = list(groups or dict.fromkeys(name for _, amounts in explanations.values() for name in amounts))
@@ -25,13 +25,14 @@ def identified(explanations, *, groups=None, **changed):
         )
         for name, (probability, amounts) in explanations.items()
     ]
-    listed, estimates = listed_explanations(explained)
     table = tabulated(explained, {name: [name] for name in names})
-    table = table.assign(error_alone=0.02, error_together=0.03, kind="damage")
+    errors = [0.3 if name in unobservable else 0.02 for name in names]
+    table = table.assign(error_alone=errors, error_together=0.5, kind="damage")
+    similarity = pd.DataFrame(np.eye(len(names)), names, names)
+    for one, other in alike:
+        similarity.loc[[one, other], [one, other]] = 0.999
     shifts = {"measured": [-0.021, -0.012], "explained": [-0.02, -0.013], "standard_error": [0.001, 0.001]}
     given = {
-        "explanations": listed,
-        "estimates": estimates,
         "table": table,
         "groups": table,
         "shifts": pd.DataFrame(shifts, ["f1", "f2"]).assign(n_records=60, n_independent=30.0),
@@ -39,11 +40,7 @@ def identified(explanations, *, groups=None, **changed):
         "damage": {},
         "p_value": 0.0003,
         "misfit_p_value": 0.6,
-        "probability_of_damage": 1 - explanations.get("no damage", (0.0,))[0],
-        "probability_other": sum(one.probability for one in explained if one.has_else),
-        "similarity": pd.DataFrame(np.eye(len(names)), names, names),
-        "indistinguishable": [],
-        "unobservable": [],
+        "similarity": similarity,
         "records": pd.Series(
             {"given": 60, "compared": 60, "independent": 30, "trained": 365, "independent of trained": 99}
         ),

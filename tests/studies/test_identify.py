@@ -322,6 +322,7 @@ def test_one_record_says_less_than_many(fem):
     assert one.table.loc["diagonal", "standard_error"] > many.table.loc["diagonal", "standard_error"]
 
 
+@pytest.mark.filterwarnings("ignore:.*few-independent-records")
 def test_records_that_depend_on_those_before_count_less():
     errors = {}
     for correlation in (0.0, 0.9):
@@ -380,7 +381,7 @@ def test_what_is_most_probable_what_else_could_be_and_what_is_left_open():
         "stays + bearings": (0.09, {"stays": (0.04, 0.01), "bearings": (0.03, 0.01)}),
         "something else": (0.05, {}),
     }
-    found = identified(clear, indistinguishable=[("side span", "stays")])
+    found = identified(clear, alike=[("side span", "stays")])
     said = found.summary()
     assert "a loss of 12 % of stiffness in side span (90 % interval" in said
     assert "probability 85 %" in said

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -25,14 +27,6 @@ class IdentifiedDamage(Sentences):
 
     Parameters
     ----------
-    explanations : DataFrame
-        One row an explanation, the most probable first, down to a probability of .1 %. Its name joins its causes by
-        " + "; "no damage" is the one without, and "something else" stands for any other shift. ``probability``;
-        ``misfit``, the sum of squared differences between measured and explained shifts, in standard errors, at its
-        most probable severities; ``text``, such as "side span 12 %, main stays 4 %".
-    estimates : DataFrame
-        Amount of each cause in each explanation, by explanation and cause, if that explanation is right: mean
-        ``severity``, ``standard_error``, and ``ci_low`` and ``ci_high``, which cover it with a probability of 90 %.
     table : DataFrame
         One row a cause or, with a structure, a member: ``probability`` that it has changed; ``severity``, its mean over
         all explanations, where those without it count as 0, with ``standard_error``; ``ci_low`` and ``ci_high``, which
@@ -58,18 +52,13 @@ class IdentifiedDamage(Sentences):
     misfit_p_value : float
         Of a larger misfit than that of the most probable explanation, if it is right; NaN if it has as many causes as
         there are modes. A low one says that something else changed too.
-    probability_of_damage, probability_other : float
-        That anything changed; that something else than the named causes shifted the frequencies.
     similarity : DataFrame
         Cosines between the effects of the causes, in standard errors of the shifts.
-    indistinguishable : list of tuple of str
-        Pairs of causes that these modes cannot tell apart.
-    unobservable : list of str
-        Causes whose severity alone would have a standard error above 10 %. Their probability hardly differs from what
-        the prior says.
     records : Series
         How many records were given and compared, and left out by reason; how many independent ones they and the
         training records are worth.
+    explained : sequence of explanations
+        All explanations with a probability above .001 %, with draws of their amounts.
 
     Examples
     --------
@@ -87,8 +76,6 @@ class IdentifiedDamage(Sentences):
     'identified damage'
     """
 
-    explanations: pd.DataFrame
-    estimates: pd.DataFrame
     table: pd.DataFrame
     groups: pd.DataFrame
     shifts: pd.DataFrame
@@ -96,13 +83,69 @@ class IdentifiedDamage(Sentences):
     damage: dict[str, float]
     p_value: float
     misfit_p_value: float
-    probability_of_damage: float
-    probability_other: float
     similarity: pd.DataFrame = field(repr=False)
-    indistinguishable: list[tuple[str, ...]]
-    unobservable: list[str]
     records: pd.Series = field(repr=False)
     explained: Sequence[Explanation] = field(repr=False)
+
+    @cached_property
+    def explanations(self) -> pd.DataFrame:
+        """One row an explanation, the most probable first, down to a probability of .1 %.
+
+        Its name joins its causes by " + "; "no damage" is the one without, and "something else" stands for any other
+        shift. ``probability``; ``misfit``, the sum of squared differences between measured and explained shifts, in
+        standard errors, at its most probable severities; ``text``, such as "side span 12 %, main stays 4 %".
+        """
+        rows = []
+        for one in _listed(self.explained):
+            texts = [f"{cause.name} {_percent(self.estimates.loc[(one.name, cause.name)])}" for cause in one.causes]
+            text = ", ".join(texts + [SOMETHING_ELSE] * one.has_else) or NO_DAMAGE
+            rows.append({"probability": one.probability, "misfit": one.misfit, "text": text})
+        return pd.DataFrame(rows, [one.name for one in _listed(self.explained)])
+
+    @cached_property
+    def estimates(self) -> pd.DataFrame:
+        """Amount of each cause in each explanation, by explanation and cause, if that explanation is right.
+
+        Mean ``severity``, ``standard_error``, and ``ci_low`` and ``ci_high``, which cover it with a probability of
+        90 %.
+        """
+        amounts = {
+            (one.name, cause.name): summary(values, np.ones(len(values)))
+            for one in _listed(self.explained)
+            for cause, values in zip(one.causes, one.draws.T, strict=True)
+        }
+        index = pd.MultiIndex.from_tuples(amounts, names=["explanation", "cause"])
+        return pd.DataFrame(list(amounts.values()), index, AMOUNT)
+
+    @property
+    def probability_of_damage(self) -> float:
+        """Probability that anything changed."""
+        return 1 - min(sum(one.probability for one in self.explained if not one.causes and not one.has_else), 1.0)
+
+    @property
+    def probability_other(self) -> float:
+        """Probability that something else than the named causes shifted the frequencies."""
+        return min(sum(one.probability for one in self.explained if one.has_else), 1.0)
+
+    @property
+    def unobservable(self) -> list[str]:
+        """Causes whose severity alone would have a standard error above 10 %.
+
+        Their probability hardly differs from what the prior says.
+        """
+        return list(self.groups.index[self.groups["error_alone"] > 0.1])
+
+    @property
+    def indistinguishable(self) -> list[tuple[str, str]]:
+        """Pairs of causes that these modes show, but do not tell apart."""
+        shown = self.similarity.drop(index=self.unobservable, columns=self.unobservable)
+        errors = self.groups["error_alone"]
+        found = []
+        for one, other in combinations(shown, 2):
+            apart = np.sqrt(max(1 - max(shown.loc[one, other], 0.0) ** 2, 0.0))  # of the effect of each
+            if apart * 0.1 < max(errors[one], errors[other]):
+                found.append((one, other))
+        return found
 
     @property
     def most_probable(self) -> tuple[str, ...]:
@@ -301,22 +344,9 @@ def summary(values: Array, weights: Array) -> dict[str, float]:
     return dict(zip(AMOUNT, [mean, float(np.sqrt(weights @ (values - mean) ** 2)), *ends], strict=True))
 
 
-def listed_explanations(explained: Sequence[Explanation]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Probable explanations, and the amounts of their causes."""
-    listed_ = [one for one in explained if one.probability >= 1e-3] or [explained[0]]
-    amounts = {
-        (one.name, cause.name): summary(values, np.ones(len(values)))
-        for one in listed_
-        for cause, values in zip(one.causes, one.draws.T, strict=True)
-    }
-    index = pd.MultiIndex.from_tuples(list(amounts), names=["explanation", "cause"])
-    estimates = pd.DataFrame(list(amounts.values()), index, AMOUNT)
-    rows = []
-    for one in listed_:
-        texts = [f"{cause.name} {_percent(estimates.loc[(one.name, cause.name)])}" for cause in one.causes]
-        text = ", ".join(texts + [SOMETHING_ELSE] * one.has_else) or NO_DAMAGE
-        rows.append({"probability": one.probability, "misfit": one.misfit, "text": text})
-    return pd.DataFrame(rows, [one.name for one in listed_]), estimates
+def _listed(explained: Sequence[Explanation]) -> Sequence[Explanation]:
+    """Explanations with a probability of .1 % or more, or the most probable one."""
+    return [one for one in explained if one.probability >= 1e-3] or explained[:1]
 
 
 def drawn(

@@ -23,7 +23,6 @@ from skthermo.studies.identification._evidence import Evidence, Explanation
 from skthermo.studies.identification._identified import (
     IdentifiedDamage,
     drawn,
-    listed_explanations,
     severities_of,
     tabulated,
 )
@@ -227,17 +226,8 @@ def _identified(
             f"no group can be seen; expected a standard error of 0.1 or less for one of them, but they are {errors}. "
             "More records or other modes would lower them"
         )
-    cosines = slopes.T @ slopes / np.outer(lengths, lengths)
-    rest = np.sqrt(np.maximum(1 - np.maximum(cosines, 0) ** 2, 0)) * lengths  # of each beside each other one
-    is_seen = lengths * 0.1 >= 1
-    first, second = np.triu_indices(len(asked), 1)
-    alike = np.minimum(rest[first, second], rest[second, first]) * 0.1 < 1
-    alike &= is_seen[first] & is_seen[second]
-    listed, estimates = listed_explanations(explained)
     seen, best = evidence.observed, explained[0]
     return IdentifiedDamage(
-        explanations=listed,
-        estimates=estimates,
         table=table,
         groups=table,
         shifts=_shifts(shift, explained, fem.mode_names_),
@@ -247,11 +237,7 @@ def _identified(
             seen.change @ np.linalg.solve(seen.covariance, seen.change), len(seen.change), shift.freedom
         ),
         misfit_p_value=_p_of_misfit(best.misfit, len(seen.change) - len(best.causes), shift.freedom),
-        probability_of_damage=_any_change(explained),
-        probability_other=sum(one.probability for one in explained if one.has_else),
-        similarity=pd.DataFrame(cosines, names, names),
-        indistinguishable=[(names[a], names[b]) for a, b in zip(first[alike], second[alike], strict=True)],
-        unobservable=[name for name, is_shown in zip(names, is_seen, strict=True) if not is_shown],
+        similarity=pd.DataFrame(slopes.T @ slopes / np.outer(lengths, lengths), names, names),
         records=shift.counts,
         explained=explained,
     )
@@ -297,27 +283,18 @@ def _located(
     located = Evidence(seen, causes, curves.summed(incidence, causes), evidence.prior, shift.freedom)
     explained = located.explanations(random)
     best = explained[0]
-    explanations, estimates = listed_explanations(explained)
     groups = tabulated(explained, {name: [name] for name in found.groups.index})
     table = tabulated(explained, {member: [member] for member in members})
     table = table.join(pd.DataFrame(members.values(), table.index)).rename_axis("member")
     found = replace(
         found,
-        explanations=explanations,
-        estimates=estimates,
         table=table,
         groups=groups.join(found.groups[["error_alone", "error_together", "kind"]]),
         shifts=_shifts(shift, explained, fem.mode_names_),
         misfit_p_value=_p_of_misfit(best.misfit, len(seen.change) - len(best.causes), shift.freedom),
-        probability_of_damage=_any_change(explained),
-        probability_other=sum(one.probability for one in explained if one.has_else),
         explained=explained,
     )
     return replace(found, table=table.assign(is_likely=table.index.isin(found.likely_members())))
-
-
-def _any_change(explained: Sequence[Explanation]) -> float:
-    return 1 - min(sum(one.probability for one in explained if not one.causes and not one.has_else), 1.0)
 
 
 def _p_of_misfit(misfit: float, freedom: int, of_errors: float) -> float:
