@@ -120,7 +120,7 @@ class StudyFindings:
         return detector
 
     def pod_curve(
-        self, family: str, source: str = "simulated", *, log: bool = False, detector: str | None = None
+        self, family: str, source: str = "simulated", *, log: bool = True, detector: str | None = None
     ) -> PODCurve:
         """Probability of detection over severity for one family of scenarios.
 
@@ -130,7 +130,7 @@ class StudyFindings:
             Of the scenarios.
         source : str, default="simulated"
             "simulated" or "reference".
-        log : bool, default=False
+        log : bool, default=True
             Whether the logit is linear in the logarithm of the severity.
         detector : str, optional
             Name of the detector, where there are several.
