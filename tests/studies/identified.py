@@ -28,7 +28,7 @@ def identified(explanations, *, groups=None, unobservable=(), alike=(), **change
     table = tabulated(explained, {name: [name] for name in names})
     errors = [0.3 if name in unobservable else 0.02 for name in names]
     table = table.assign(error_alone=errors, error_together=0.5, kind="damage")
-    similarity = pd.DataFrame(np.eye(len(names)), names, names)
+    similarity = pd.DataFrame(np.eye(len(names)), table.index, table.index)
     for one, other in alike:
         similarity.loc[[one, other], [one, other]] = 0.999
     shifts = {"measured": [-0.021, -0.012], "explained": [-0.02, -0.013], "standard_error": [0.001, 0.001]}
@@ -36,7 +36,7 @@ def identified(explanations, *, groups=None, unobservable=(), alike=(), **change
         "table": table,
         "groups": table,
         "shifts": pd.DataFrame(shifts, ["f1", "f2"]).assign(n_records=60, n_independent=30.0),
-        "draws": pd.DataFrame({name: [0.1, 0.2] for name in names}),
+        "draws": pd.DataFrame(np.full((2, len(names)), 0.1), columns=table.index),
         "damage": {},
         "p_value": 0.0003,
         "misfit_p_value": 0.6,

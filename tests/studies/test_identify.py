@@ -29,9 +29,8 @@ N_MASSES = 9
 
 
 def simulated(fem, damage=None, T=WEATHER):
-    """Records without noise, with the mean of what the chain leaves of its training records out of fold."""
-    left = np.exp(np.nanmean(np.log1p(fem.recorder_.residuals.values), axis=0))
-    return fem.simulate(T, damage=damage) * left
+    """Records without noise, with what the chain leaves in such weather."""
+    return fem.simulate(T, damage=damage) * (1 + fem.recorder_.residuals.expected(fem.weather(T).inputs))
 
 
 def most_probable(found):

@@ -237,7 +237,7 @@ def _identified(
             seen.change @ np.linalg.solve(seen.covariance, seen.change), len(seen.change), shift.freedom
         ),
         misfit_p_value=_p_of_misfit(best.misfit, len(seen.change) - len(best.causes), shift.freedom),
-        similarity=pd.DataFrame(slopes.T @ slopes / np.outer(lengths, lengths), names, names),
+        similarity=pd.DataFrame(slopes.T @ slopes / np.outer(lengths, lengths), table.index, table.index),
         records=shift.counts,
         explained=explained,
     )

@@ -20,7 +20,7 @@ from skthermo.residuals.numbers import independent_records
 
 @dataclass(frozen=True)
 class FrequencyShift:
-    """Mean of ln(measured / predicted) of each mode, NaN where it is not known, and its covariance.
+    """Mean of ln(measured / expected) of each mode, NaN where it is not known, and its covariance.
 
     Errors follow Student's law with some degrees of ``freedom``. ``n_records`` and ``n_independent`` are numbers of
     records by mode, ``theta`` (1, n_parameters) the mean parameters of the records. ``counts`` says how many records
@@ -38,12 +38,14 @@ class FrequencyShift:
 
 
 def measured_shift(fem: Any, T: ArrayLike, F: ArrayLike, noise: Any) -> FrequencyShift:
-    """The shift of records against what a chain predicts in their weather."""
+    """The shift of records against what a chain expects in their weather."""
     deviations = stated_deviations(noise, len(fem.mode_names_), what="noise", mode_names=fem.mode_names_)
     frequencies = _checked(fem, T, F)
-    shifts = np.log(frequencies / as_floats(fem.predict(T)))
+    residuals = fem.recorder_.residuals
+    expected = residuals.expected(fem.weather(T).inputs)  # what the chain leaves in such weather
+    shifts = np.log(frequencies / (as_floats(fem.predict(T)) * (1 + expected)))
     theta = as_floats(fem.predict_parameters(T))
-    healthy = np.log1p(fem.recorder_.residuals.values)  # out of fold, in order of time
+    healthy = np.log1p(residuals.values)  # out of fold, in order of time
     healthy = np.where(np.abs(healthy - median(healthy)) > 6 * robust_deviation(healthy), np.nan, healthy)
     healthy[:, (~np.isnan(healthy)).sum(axis=0) < 20] = np.nan
     left_out = _left_out(fem, T, frequencies, shifts, np.nanstd(healthy, axis=0))
@@ -70,7 +72,7 @@ def measured_shift(fem: Any, T: ArrayLike, F: ArrayLike, noise: Any) -> Frequenc
     counts |= {"independent": n_independent[known].min(), "trained": len(healthy)}
     counts |= {"independent of trained": n_trained[known].min()}
     return FrequencyShift(
-        means_of_known(shifts) - means_of_known(healthy),
+        means_of_known(shifts),
         covariance,
         freedom,
         n_records,
