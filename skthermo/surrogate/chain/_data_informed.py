@@ -55,7 +55,8 @@ from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner
-from skthermo.residuals.weather import SensorRegression, TrainingRange
+from skthermo.residuals.sensors import SensorRegression
+from skthermo.residuals.weather import TrainingRange
 from skthermo.surrogate._regression import TemperatureMapper, fit_checked
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.chain._fit_report import report_of

@@ -21,7 +21,7 @@ from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning,
 from skthermo.fem import linearise
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
-from skthermo.residuals.weather import SensorRegression
+from skthermo.residuals.sensors import SensorRegression
 from skthermo.surrogate.chain._records import TrainingRecords, mode_offsets
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior, unconverged
 

@@ -35,7 +35,8 @@ from skthermo._core.frames import Table, check_same_rows, column_names, frame_li
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
-from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, filled_text, unpredicted_text
+from skthermo.residuals.sensors import PredictionError, SensorRegression, filled_text
+from skthermo.residuals.weather import TrainingRange, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
 from skthermo.surrogate._simulator import Simulator
 
