@@ -29,7 +29,7 @@ from skthermo.updating import ModelUpdater
 
 RIGHT, WRONG, ENSEMBLE, FREQUENCIES, SHAPES = "right model", "wrong model", "ensemble", "frequencies", "shapes"
 DESIGNS = {"truss": (RIGHT, WRONG), "footbridge": (RIGHT, WRONG, ENSEMBLE), "KW51": (FREQUENCIES, SHAPES)}
-N_CAMPAIGNS = {"truss": 18, "footbridge": 6, "KW51": 3}
+N_CAMPAIGNS = {"truss": 6, "footbridge": 3, "KW51": 3}
 N_HEALTHY = 4  # windows without damage of each campaign
 N_MODELS = 6  # of an ensemble
 VISIBLE = 2.0  # Cramer-Rao deviations from which on damage should be named

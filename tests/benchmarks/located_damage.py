@@ -138,7 +138,7 @@ def main():
         __doc__,
         structures=dict.fromkeys(["truss", "footbridge"]),
         seeds=(2, "chains of each structure and model"),
-        cases=(12, "of each chain"),
+        cases=(8, "of each chain"),
     )
     models, table = {"right model": 0.0, "members 5 % off": OFF}, {}
     for kind in (Truss, Footbridge):

@@ -100,7 +100,7 @@ class IdentifiedDamage(Sentences):
             texts = [f"{cause.name} {_percent(self.estimates.loc[(one.name, cause.name)])}" for cause in one.causes]
             text = ", ".join(texts + [SOMETHING_ELSE] * one.has_else) or NO_DAMAGE
             rows.append({"probability": one.probability, "misfit": one.misfit, "text": text})
-        return pd.DataFrame(rows, pd.Index([one.name for one in _listed(self.explained)], dtype=object))
+        return pd.DataFrame(rows, [one.name for one in _listed(self.explained)])
 
     @cached_property
     def estimates(self) -> pd.DataFrame:
@@ -114,8 +114,7 @@ class IdentifiedDamage(Sentences):
             for one in _listed(self.explained)
             for cause, values in zip(one.causes, one.draws.T, strict=True)
         }
-        levels = [pd.Index([key[level] for key in amounts], dtype=object) for level in (0, 1)]
-        index = pd.MultiIndex.from_arrays(levels, names=["explanation", "cause"])
+        index = pd.MultiIndex.from_tuples(list(amounts), names=["explanation", "cause"])
         return pd.DataFrame(list(amounts.values()), index, AMOUNT)
 
     @property
@@ -331,7 +330,7 @@ def tabulated(explained: Sequence[Explanation], rows: Mapping[Hashable, Collecti
         farthest = present["ci_low" if present["severity"] < 0 else "ci_high"]
         extremes = {"if_damaged": present["severity"], "highest_if_damaged": farthest}
         found.append({"probability": probability, **averages, **extremes})
-    return pd.DataFrame(found, pd.Index(list(rows), dtype=object, tupleize_cols=False))  # names may be any text
+    return pd.DataFrame(found, pd.Index(list(rows), tupleize_cols=False))
 
 
 AMOUNT = ["severity", "standard_error", "ci_low", "ci_high"]
