@@ -254,6 +254,7 @@ def _located(
 ) -> IdentifiedDamage:
     """Explanations by stretches of groups that may be damaged; of all if whole ones do not explain the shifts."""
     is_open = found.probability_other > 0.1 or found.misfit_p_value < 0.05
+    probable = found.table["probability"][found.table["kind"] == "damage"]
     causes: list[Cause] = []
     pieces: list[Cause] = []
     parts: dict[str, dict[str, set[Hashable]]] = {}
@@ -263,16 +264,19 @@ def _located(
             causes.append(cause)
             continue
         lines = lines_of(structure, members_of(fem.model, cause.of))
-        is_probable = is_open or found.table.loc[cause.name, "probability"] >= 0.02
-        divided = pieces_of(lines) if is_probable else [[[member for line in lines for member in line]]]
-        all_pieces = [piece for line in divided for piece in line]
-        names = [f"{cause.name}, piece {number}" for number in range(1, len(all_pieces) + 1)]
-        for name in cause.of:
-            inside = set(members_of(fem.model, [name]))
-            named = {piece: inside.intersection(rows) for piece, rows in zip(names, all_pieces, strict=True)}
-            parts[name] = {piece: rows for piece, rows in named.items() if rows}
-        pieces += [Cause(name, of=(name,)) for name in names]
-        causes += stretches(cause.name, cause.of, divided, names)
+        if is_open or probable[cause.name] >= min(0.02, probable.max()):
+            divided = pieces_of(lines)
+            all_pieces = [piece for line in divided for piece in line]
+            names = [f"{cause.name}, piece {number}" for number in range(1, len(all_pieces) + 1)]
+            for name in cause.of:
+                inside = set(members_of(fem.model, [name]))
+                named = {piece: inside.intersection(rows) for piece, rows in zip(names, all_pieces, strict=True)}
+                parts[name] = {piece: rows for piece, rows in named.items() if rows}
+            pieces += [Cause(name, of=(name,)) for name in names]
+            causes += stretches(cause.name, cause.of, divided, names)
+        else:  # which `divide` checks, too
+            parts |= {name: {} for name in cause.of if name not in parts}
+            causes.append(replace(cause, rows=tuple(member for line in lines for member in line)))
         for place, line in enumerate(lines, 1):
             members |= {one: {"group": cause.name, "line": place, "element": i} for i, one in enumerate(line, 1)}
     seen = observed(fem, structure.divide(fem.model, parts), shift, **measured)
