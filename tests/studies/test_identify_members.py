@@ -119,7 +119,7 @@ def symmetric():
     return bridge, model, fem, T, theta
 
 
-def test_mirrored_places_are_told_apart_by_shapes_alone(symmetric):
+def test_shapes_alone_distinguish_mirrored_places(symmetric):
     """Damage is in the third and fourth element."""
     bridge, model, fem, T, theta = symmetric
     damaged = bridge.divide(model, {"deck": {"x": [2, 3]}}).damaged({"x": 0.4})

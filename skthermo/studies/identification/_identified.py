@@ -137,7 +137,7 @@ class IdentifiedDamage(Sentences):
 
     @property
     def indistinguishable(self) -> list[tuple[str, str]]:
-        """Pairs of causes that these modes show, but do not tell apart."""
+        """Pairs of causes that these modes show, but do not distinguish."""
         shown = self.similarity.drop(index=self.unobservable, columns=self.unobservable)
         errors = self.groups["error_alone"]
         found = []

@@ -113,12 +113,12 @@ def _left_out(fem: Any, T: Any, frequencies: Array, shifts: Array, deviations: A
     usual = median(shifts)
     scale = np.fmax(robust_deviation(shifts), np.hypot(deviations, 0.05 * usual))  # effects depend on the weather
     outlying = (np.nan_to_num(np.abs(shifts - usual)) > 6 * scale).any(axis=1)
-    is_told = len(shifts) >= 8 and outlying.mean() < 0.5
+    is_known = len(shifts) >= 8 and outlying.mean() < 0.5
     reasons = {
         "without a frequency": np.isnan(frequencies).all(axis=1),
         "without all temperatures and lagged ones": np.isnan(excess).any(axis=1) | np.isnan(shifts).all(axis=1),
         "in weather far outside that of the training records": (np.nan_to_num(excess) > 0.25).any(axis=1),
-        "far from the other records": outlying & is_told,
+        "far from the other records": outlying & is_known,
     }
     taken = np.zeros(len(shifts), dtype=bool)
     for reason, rows in reasons.items():
