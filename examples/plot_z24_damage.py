@@ -27,7 +27,7 @@ from z24_damage_recipes import FROST, changes, identify, in_parameters
 from z24_detector_recipes import DAMAGED, agreement, choose, compare, detectors, side_by_side
 from z24_recipes import GREY, PAVEMENT, REGIMES, Records, alarm_table, compensated, plot_kinds, read_arguments
 
-from skthermo.plotting import DetectorsDisplay, IdentifiedDamageDisplay
+from skthermo.plotting import DetectorsDisplay
 
 bridge, folder = read_arguments()
 warnings.filterwarnings("ignore", ".*outside-training-weather")
@@ -155,12 +155,12 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 # changed is not: damage of the soil beside something else has a probability of 42 %, that of three groups 12 %. The
 # truth, a pier that was lowered, is not a loss of stiffness of one group.
 
-IdentifiedDamageDisplay.from_predictions(found)
+DetectorsDisplay.from_predictions(found.table)
 
 # %%
 # .. image:: /images/z24_damage.png
-#    :alt: Explanations with their probabilities, 42 % for the soil and something else and 12 % for three groups; mean
-#          severities of five groups with credible intervals of 90 %, that of the soil the largest; shifts of four modes
+#    :alt: Probabilities of five groups; their mean severities with credible intervals of 90 %, that of the soil the
+#          largest
 #
 # Simulated rates beside measured ones
 # ------------------------------------

@@ -21,6 +21,7 @@ from skthermo._core.estimators import (
     _fit_context,
     check_is_fitted,
     validate_data,
+    with_means,
 )
 from skthermo._core.frames import column_names, frame_like, marker_findings, positions_of
 from skthermo._core.warnings import collected, warn_each
@@ -363,6 +364,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Targets that are far from a first regression do not train the second one.
         """
         estimator, Y = self._default_part("estimator") if self.estimator is None else self.estimator, as_floats(F)
+        estimator = with_means(estimator, T, F)
         for _ in range(2):
             with collected() as found:
                 self.regression_ = RowsRegression.fitted(estimator, T, F)

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import io
 import os
-import warnings
 import zlib
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import joblib
+import pandas as pd
 import sklearn
-from sklearn.exceptions import InconsistentVersionWarning
+from joblib.numpy_pickle import NumpyUnpickler
 from sklearn.utils.validation import check_is_fitted
 
 import skthermo
 from skthermo._core.arrays import check_path
 from skthermo._core.estimators import import_optional
 from skthermo._core.files import write_when_complete
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import SkthermoWarning
 
 ENDINGS = (".joblib", ".skops")
 TRUSTED = ("skthermo", "sklearn")  # packages whose classes are read from skops' files
 PLAIN = {"zoneinfo.ZoneInfo", "datetime.timezone", "datetime.timedelta", "builtins.frozenset"}
-SPEED = 1  # fastest compression of zlib, which adds a checksum
 
 
 def versions() -> dict[str, str]:
@@ -71,11 +68,6 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
     ImportError
         If the file ends with ``.skops``, and skops is not installed.
 
-    Warns
-    -----
-    UserWarning
-        If the monitor was fitted with another version of skthermo or scikit-learn, each time that it is read.
-
     See Also
     --------
     Monitor.save : Writes the file.
@@ -102,9 +94,12 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
     if file.suffix == ".skops":
         import_optional("skops.io", extra="drop-ins")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", InconsistentVersionWarning)  # one warning below stands for all
-            monitor = _from_skops(content) if file.suffix == ".skops" else _from_joblib(content)
+        monitor = _from_skops(content) if file.suffix == ".skops" else _from_joblib(content)
+    except (ImportError, AttributeError) as error:  # of classes that there were in 0.2
+        raise ValueError(
+            f"{file} was saved by another version of skthermo; expected a monitor that is fitted anew, as by skthermo "
+            "fit FOLDER --replace, which keeps settings, records and acknowledgements"
+        ) from error
     except Exception as error:  # damaged files raise errors of every type
         raise ValueError(
             f"{file} cannot be read: {type(error).__name__}: {error}; expected the whole file of a monitor, saved with "
@@ -112,14 +107,37 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
         ) from error
     if not all(hasattr(monitor, name) for name in ("update", "events_", "versions_")):
         raise ValueError(f"{file} holds {type(monitor).__name__!r}; expected a fitted Monitor")
-    if monitor.versions_ != versions():
-        warn_user(
-            f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}. Decisions may "
-            "differ from those of the fitted monitor. Refit it with these versions",
-            SkthermoWarning,
-            "other-versions",
-        )
     return monitor
+
+
+def acknowledgements_in(path: str | os.PathLike[str]) -> pd.DataFrame:
+    """What the owner has said of events, from the file of a monitor, also from a joblib file of version 0.2."""
+    file = _checked(path)
+    try:
+        return load_monitor(file).acknowledgements_
+    except ValueError as refused:
+        try:
+            content = io.BytesIO(zlib.decompress(file.read_bytes()))
+            monitor = _SomeMonitor(str(file), content, ensure_native_byte_order=True).load()
+            said = [vars(one) for one in vars(monitor.history_)["acknowledgements"]]
+        except Exception:  # damaged files raise errors of every type
+            raise refused from None
+    names = {"kind": "kind", "peak_time": "time", "time": "at", "harmless": "harmless", "note": "note"}
+    return pd.DataFrame(said, columns=list(names)).rename(columns=names)
+
+
+class _OfOtherVersion:
+    """An object of skthermo in the file of another version: its attributes alone."""
+
+    def __setstate__(self, state: Any) -> None:
+        vars(self).update(state if isinstance(state, dict) else {})
+
+
+class _SomeMonitor(NumpyUnpickler):
+    """Reads a file of joblib without the classes of skthermo."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        return type(name, (_OfOtherVersion,), {}) if module.startswith("skthermo") else super().find_class(module, name)
 
 
 def _checked(path: Any) -> Path:
@@ -137,12 +155,13 @@ def _by_joblib(monitor: Any) -> bytes:
     """A compressed file of joblib, which ends with a checksum."""
     stream = io.BytesIO()
     joblib.dump(monitor, stream)
-    return zlib.compress(stream.getbuffer(), SPEED)
+    compressor = zlib.compressobj(level=1, strategy=zlib.Z_RLE)  # the fastest, which adds a checksum
+    return compressor.compress(stream.getbuffer()) + compressor.flush()
 
 
 def _from_joblib(content: bytes) -> Any:
     """What joblib wrote, compressed as here or plain."""
-    is_compressed = content[:1] == zlib.compress(b"", SPEED)[:1]
+    is_compressed = content[:1] == zlib.compress(b"")[:1]
     return joblib.load(io.BytesIO(zlib.decompress(content) if is_compressed else content))
 
 

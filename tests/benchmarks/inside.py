@@ -3,17 +3,15 @@
 import importlib
 
 PLACES = {
-    "_core.matrix_child": ["read"],
-    "_core.matrix_files": ["form_of"],
     "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
-    "fleet._fleet": ["Storage"],
-    "fleet._workers": ["BridgeOutcome", "known_of", "pickled"],
+    "fem.external._files": ["form_of", "read_file"],
     "monitoring._active": ["ActiveDetector"],
-    "monitoring._events": ["find_events"],
-    "monitoring._records": ["Memory"],
+    "monitoring._fleet_bridge": ["KnownBridge"],
+    "monitoring._events": ["find_events", "followed"],
+    "monitoring._records": ["Lookback", "Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
-    "monitoring._threshold": ["estimate_false_alarms"],
+    "monitoring._threshold": ["EventLevels", "estimate_false_alarms"],
     "monitoring.drift._observations": ["GroupEffects"],
     "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }

@@ -381,12 +381,11 @@ def test_modes_are_named_whatever_the_order_of_targets(own, options):
 def test_results_do_not_share_the_state():
     monitor = fitted()
     answers = monitor.update(changed({}, 2))
-    for table in (answers, monitor.days_, monitor.evaluations_, monitor.records_, monitor.baseline_, monitor.trained_):
+    for table in (answers, monitor.days_, monitor.evaluations_):
         table.iloc[:, 0] = 0
     monitor.counts_["n_records"] = 0
     assert monitor.counts_["n_records"] == 8
     assert set(monitor.evaluations_["state"]) == {"healthy"}
-    assert (monitor.records_ != 0).all(axis=None)
 
 
 @pytest.mark.parametrize(
@@ -435,7 +434,7 @@ def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(s
     assert monitor.threshold_ == expected.threshold_
 
 
-@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records|few-peaks)")
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records)")
 def test_a_column_that_says_nothing_is_left_out_and_named():
     records = truss()
     baseline = records[:N_BASELINE].assign(f2=records["f2"].iloc[0], T1=np.where(np.arange(N_BASELINE) % 4, 484.6, 5))

@@ -17,7 +17,7 @@ from skthermo._core.frames import DAY, YEAR, as_index, days_later, midnights_bet
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import warnings_once, without_warnings
 from skthermo.fem.damage import ALL_GROUPS
-from skthermo.monitoring._records import Memory
+from skthermo.monitoring._records import Lookback
 from skthermo.monitoring.drift._explanations import SIGNIFICANT, Explanations, ModeTrends
 from skthermo.monitoring.drift._kalman import DailyNoise, DailySteps, DayShown, State, absorb
 from skthermo.monitoring.drift._observations import (
@@ -90,7 +90,7 @@ class DriftFollower:
     members: Mapping[str, Sequence[str]]
     slopes: Array
     noise: DailyNoise
-    memory: Memory
+    memory: Lookback
     years: float
     start_: FollowerState = field(repr=False)
 
@@ -114,7 +114,7 @@ class DriftFollower:
             )
         T, F = T[temperatures], F[list(fem.mode_names_)]
         T, F = checked_records(fem, T, F)
-        records, memory, days = DailyRecords.of(fem, T), Memory.of(fem.mapper_), calendar(F.index, "1D")
+        records, memory, days = DailyRecords.of(fem, T), Lookback.learned(fem.mapper_), calendar(F.index, "1D")
         daily, effects = records.means(T, F, days), GroupEffects.of(fem, T, F, groups).without_even()
         noise = DailyNoise.of(daily.values, with_time(daily, 1), daily.counts)
         n_groups, n_modes, span = len(effects.names), F.shape[1], len(days) * A_DAY
@@ -313,7 +313,7 @@ class DriftFollower:
         return (design @ known.mean)[modes], spread[np.ix_(modes, modes)]
 
 
-def _latest(memory: Memory, T: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
+def _latest(memory: Lookback, T: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
     """Stamps in nanoseconds and temperatures of the last records that those of the next day look back to."""
     times = T.index.as_unit("ns").asi8
     first = memory.start(times, len(times), int(times[-1]) + 1) if len(times) else 0

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 from operator import itemgetter
 from typing import Any
 
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.frames import DAY_NS, as_index, columns_by_sensor, frame_like
-from skthermo.monitoring._events import Transition
 from skthermo.monitoring.sensors._expected import (
     CERTAIN,
     LEAST_DAYS,
@@ -420,28 +418,6 @@ class SensorWatch:
         if not np.array_equal(self._trusted(state.faults), self._trusted(before)):
             state = self._departing(state)
         return self._with_departures(self._without_ended(state, midnight), midnight)
-
-    def changes(self, before: WatchState, after: WatchState, newest: int) -> Iterator[Transition]:
-        """Sensors that have failed, in another way than before perhaps, and those that are used again."""
-        for old, new in zip_longest(before.faults.faults, after.faults.faults):
-            if old == new:
-                continue
-            is_other = old is None or new is None or (old.column, old.other) != (new.column, new.other)
-            is_again = not is_other and old.until is not None and new.until is None
-            failed = new is not None and (is_other or old.kind != new.kind or is_again)
-            ended = new if new is not None and new.until is not None and (failed or old.until is None) else None
-            if is_other and old is not None and old.until is None:
-                yield self._transition("put back", old, newest, newest)
-            if failed:
-                yield self._transition("fault", new, new.since, newest)
-            if ended is not None:
-                yield self._transition("put back", ended, ended.until, newest)
-
-    def _transition(self, what: str, fault: Fault, time: int, newest: int) -> Transition:
-        names = [*self.sensors, *self.modes]
-        columns = ", ".join(str(names[place]) for place in (fault.column, fault.other) if place >= 0)
-        detail = fault.detail(names[fault.other], self.units[fault.column]) if what == "fault" else ""
-        return Transition(what, time, newest, fault.kind, column=columns, detail=detail)
 
     def _midnight(self, day: int) -> np.int64:
         stamp = pd.Timestamp(day * DAY_NS)

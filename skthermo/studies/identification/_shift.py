@@ -109,7 +109,7 @@ def _records_for_one(residuals: Array) -> Array:
 
 def _left_out(fem: Any, T: Any, frequencies: Array, shifts: Array, deviations: Array) -> dict[str, Array]:
     """Rows that cannot be compared, by the first reason that holds; an error if none is left."""
-    excess = as_floats(fem.extrapolation_distance(T).drop(columns="from_fleet", errors="ignore"))
+    excess = as_floats(fem.extrapolation_distance(T))
     usual = median(shifts)
     scale = np.fmax(robust_deviation(shifts), np.hypot(deviations, 0.05 * usual))  # effects depend on the weather
     outlying = (np.nan_to_num(np.abs(shifts - usual)) > 6 * scale).any(axis=1)
