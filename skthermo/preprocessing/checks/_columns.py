@@ -129,7 +129,7 @@ def has_levels(table: Reading, place: int, known: Array) -> bool:
 def in_degrees(T: Reading, places: list[int]) -> list[int]:
     """The sensors in degrees Celsius; those in degrees Fahrenheit, in parts of a degree or with another sign are named.
 
-    A sensor has another unit if it lies much nearer to most of the others in this unit, and varies as they do. All
+    A sensor has another unit if it lies much nearer to the others in this unit, and varies as they do. All
     sensors together, or one alone, have another unit if no bridge in the open is as warm, or if their values span more
     than the open does, smoothly. Of two sensors, either may be the one with another sign.
     """
@@ -149,12 +149,12 @@ def in_degrees(T: Reading, places: list[int]) -> list[int]:
         widths = np.maximum(np.ptp(np.quantile(some, [0.05, 0.95], axis=0), axis=0), 1e-300)
         for number, (factor, zero, unit) in product(range(n_sensors), OTHER_UNITS):
             others, own = np.arange(n_sensors) != number, some[:, [number]]
-            before = np.median(np.abs(own - some[:, others]), axis=0)
-            after = np.median(np.abs((own - zero) / factor - some[:, others]), axis=0)
-            ratios = widths[number] / widths[others] / abs(factor)
-            is_so = (before > 10) & (after < 0.4 * before) & (ratios > 0.3) & (ratios < 3)
-            is_so &= correlations[number, others] * np.sign(factor) > 0.6
-            if is_so.mean() > 0.5 and (n_sensors > 2 or not hints):
+            before = np.median(np.abs(own - some[:, others]), axis=0).mean()
+            after = np.median(np.abs((own - zero) / factor - some[:, others]), axis=0).mean()
+            is_near = before > 10 and after < 0.4 * before if factor > 0 else after < 0.7 * before
+            is_alike = 0.3 < np.median(widths[number] / widths[others]) / abs(factor) < 3
+            is_alike &= np.median(correlations[number, others]) * np.sign(factor) > 0.6
+            if is_near and is_alike and (n_sensors > 2 or not hints):
                 hints.setdefault(number, f"as in {unit} beside the others")
     for number in range(n_sensors):
         series = values[~np.isnan(values[:, number]), number]
