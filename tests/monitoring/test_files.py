@@ -5,6 +5,7 @@ import json
 import sys
 import zipfile
 import zlib
+from pathlib import Path
 
 import joblib
 import numpy as np
@@ -15,7 +16,8 @@ from sklearn.exceptions import NotFittedError
 from sklearn.linear_model import LinearRegression
 
 from skthermo.datasets import make_truss
-from skthermo.monitoring import load_monitor
+from skthermo.detection import MahalanobisDetector
+from skthermo.monitoring import Monitor, load_monitor
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
 
@@ -204,3 +206,21 @@ def test_a_plain_zlib_stream_is_no_monitor(tmp_path):
     (tmp_path / "bridge.joblib").write_bytes(zlib.compress(np.zeros(3).tobytes()))
     with pytest.raises(ValueError, match="cannot be read"):
         load_monitor(tmp_path / "bridge.joblib")
+
+
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|extrapolated-threshold|baseline-peak|few-baseline-records)")
+def test_a_file_of_version_0_2_is_refused_in_one_sentence_and_its_acknowledgements_are_kept(tmp_path):
+    old = Path(__file__).with_name("monitor_of_0_2.joblib")
+    with pytest.raises(ValueError, match=r"another version of skthermo; .* skthermo fit FOLDER --replace"):
+        load_monitor(old)
+    rng = np.random.default_rng(0)
+    F = np.array([2.0, 3.0]) + 0.01 * rng.normal(size=(90, 2))
+    F[75:] *= 0.95
+    records = pd.DataFrame(F, pd.date_range("2025-01-01", periods=90), ["f1", "f2"])
+    monitor = Monitor(MahalanobisDetector(), targets=["f1", "f2"], sensors=False).fit(records[:60])
+    assert monitor.keep_acknowledgements(old) == 1
+    monitor.update(records[60:])
+    assert monitor.events_["note"].tolist()[-1] == "crack found"
+    monitor.save(tmp_path / "new.joblib")
+    later = Monitor(MahalanobisDetector(), targets=["f1", "f2"], sensors=False).fit(records[:60])
+    assert later.keep_acknowledgements(tmp_path / "new.joblib") == 1
