@@ -41,7 +41,7 @@ known, new = list(campaign)[:16], list(campaign)[16:]
 
 def make_chain(name, mapper=None):
     bridge = campaign[name]
-    mapper = make_pipeline(SensorMeans(bridge.roles), TemperatureMapper() if mapper is None else mapper)
+    mapper = make_pipeline(SensorMeans(bridge.roles), TemperatureMapper(means=None) if mapper is None else mapper)
     return DataInformedFEM(bridge.model, mapper=mapper, random_state=0)
 
 

@@ -357,15 +357,13 @@ class Fleet:
     @property
     def events(self) -> pd.DataFrame:
         """Events of all monitors."""
+        known = [one for one in self._known.values() if one.events is not None]
         tables = []
-        for name, one in self._known.items():
-            if one.events is not None and len(one.events):
-                table = one.events.reset_index()
-                table.insert(0, "bridge", pd.Series([name] * len(table), dtype=object))
-                tables.append(table)
-        columns = ["bridge", "event", "kind", "start", "end", "peak", "peak_time", "modes", "groups", "n_alarms"]
-        columns += ["acknowledged", "harmless", "note"]
-        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
+        for one in [one for one in known if len(one.events)] or known[:1]:
+            table = one.events.reset_index()
+            table.insert(0, "bridge", pd.Series([one.name] * len(table), dtype=object))
+            tables.append(table)
+        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["bridge", "event"])
 
     @property
     def warnings(self) -> pd.DataFrame:

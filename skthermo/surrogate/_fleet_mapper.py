@@ -162,13 +162,13 @@ class FleetMapper(TableRegressor):
         mappers = self._mappers()
         self._check(mappers)
         own = inputs[usable.any(axis=1)]
-        known = [(one.inputs_.mean_, one.inputs_.scale_) for one in mappers] or [(own.mean(axis=0), own.std(axis=0))]
-        self.centre_, self.scale_ = np.mean(known, axis=0)
+        first = slice(self.n_features_in_)  # means of earlier temperatures follow
+        known = [(one.inputs_.mean_[first], one.inputs_.scale_[first]) for one in mappers]
+        self.centre_, self.scale_ = np.mean(known or [(own.mean(axis=0), own.std(axis=0))], axis=0)
         self.is_log_ = not (targets <= 0).any() and all(mapper.log_targets_ for mapper in mappers)
         link, columns = np.log if self.is_log_ else np.positive, [targets[rows, j] for j, rows in enumerate(usable.T)]
-        path = self.centre_ + self.scale_ * np.linspace(-2, 2, 9)[:, np.newaxis]  # from cold to warm
-        responses = self._others(path, len(path)) if mappers else [column[np.newaxis] for column in columns]
-        self.sizes_ = np.array([link(one).std(axis=1).mean() for one in responses])
+        sizes = [self._sizes(mapper) for mapper in mappers] or [[link(column).std() for column in columns]]
+        self.sizes_ = np.nanmean(sizes, axis=0)
         days = np.median(np.diff(row_times(X))) / 86_400e9 if has_stamps(X) and len(inputs) > 1 else 1.0
         dependence = 2.0 / np.clip(days, 1e-3, 2.0)
         self.posteriors_ = [
@@ -233,6 +233,15 @@ class FleetMapper(TableRegressor):
                 found[output].append(predicted[:, column])
         return [np.reshape(one, (len(one), n_rows)) for one in found]
 
+    def _sizes(self, mapper: Any) -> Array:
+        """Standard deviation of each output, or of its logarithm, on another bridge; NaN where it has none."""
+        scales = mapper.targets_.scale_
+        if mapper.log_targets_ and not self.is_log_:
+            scales = scales * np.exp(mapper.targets_.mean_)
+        sizes, columns = np.full(self.n_parameters_, np.nan), self._columns_of(mapper)
+        sizes[list(columns)] = scales[list(columns.values())]
+        return sizes
+
     def _mappers(self) -> list[Any]:
         return list(self.mappers.values() if isinstance(self.mappers, Mapping) else self.mappers)
 
@@ -252,7 +261,7 @@ class FleetMapper(TableRegressor):
             if mapper.n_features_in_ != self.n_features_in_:
                 raise ValueError(
                     f"X has {self.n_features_in_} inputs, and a mapper {mapper.n_features_in_}; expected the same "
-                    "inputs on all bridges, such as the means that SensorMeans gives"
+                    "inputs on all bridges, such as the means that SensorMeans gives, and TemperatureMapper(means=None)"
                 )
             columns = self._columns_of(mapper)
             if max(columns.values(), default=-1) >= mapper.n_parameters_:

@@ -20,6 +20,7 @@ from tests.bad_input.values import (
     jobs,
     names,
     number,
+    table,
     weather,
 )
 
@@ -180,10 +181,10 @@ use(
     lambda X, y, **a: surrogate.FleetMapper(**a).fit(X, y).predict(X),
     mappers=(OTHERS, bad(3, True, "a", ["a"], {"no such name": 3}, str)),
     X=(T, weather(T, rows=True, fixed=False, fitting=True)),
-    y=(FEW, frequencies(FEW, rows=True, fixed=False)),
+    y=(FEW, table(FEW, rows=True, fixed=False, fitting=True, but=("a number", "constant"))),
 )
 MAPPER = surrogate.FleetMapper(OTHERS).fit(T, FEW)
-method("surrogate.FleetMapper.predict", MAPPER, X=(T, weather(T, rows=False)), return_std=(False, flag()))
+method("surrogate.FleetMapper.predict", MAPPER, X=(T, table(T, rows=False)), return_std=(False, flag()))
 LEGAL |= {
     "lookback": {("zero", "monitoring.Monitor"): "the detector looks at single records"},
     "max_age": {("zero", f"monitoring.{one}.status"): "any age is too old" for one in ("Monitor", "Fleet")},
