@@ -50,11 +50,9 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "fleet": {"fleet.prior"},
     "fleet.prior": set(),
     "monitoring": {
-        "monitoring.drift",
         "monitoring.sensors",
         "preprocessing.checks",
     },  # the monitor joins them
-    "monitoring.drift": set(),
     "monitoring.sensors": {"preprocessing.checks"},
     "reporting": {"reporting.fleet", "reporting.service"},
     "reporting.fleet": {"reporting.service"},

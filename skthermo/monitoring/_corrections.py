@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
 from skthermo._core.frames import MISSING_CODES
-from skthermo.monitoring.drift import DriftFollower
+from skthermo.monitoring._drift import DriftFollower
 from skthermo.monitoring.sensors import Dispute, SensorWatch
 from skthermo.preprocessing.checks import Plausible
 
@@ -86,7 +86,7 @@ class Corrections:
         cleaned = baseline.mask(plausible.implausible(baseline.to_numpy()))
         T, F = cleaned.drop(columns=targets), cleaned[targets]
         watch = SensorWatch.of(T, F, reference=reference, units=units) if sensors else None
-        follower = None if fem is None else DriftFollower.of(fem, T.drop(columns=reference), F)
+        follower = None if fem is None else DriftFollower.fitted(fem, T.drop(columns=reference), F)
         return cls(list(T.columns), list(targets), list(reference), dict(units), plausible, watch, follower)
 
     def start(self) -> CorrectionState:

@@ -14,7 +14,6 @@ PLACES = {
     "monitoring._records": ["Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._threshold": ["estimate_false_alarms"],
-    "monitoring.drift._observations": ["GroupEffects"],
     "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }
 

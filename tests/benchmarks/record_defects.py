@@ -120,7 +120,7 @@ def callables(T, F):
         "MahalanobisDetector.fit": lambda T, F: MahalanobisDetector().fit(F).score_samples(healthy_F),
         "Monitor.fit": lambda T, F: monitor().fit(T.join(F)).update(healthy[months])["index"],
         "Monitor.update": updated,
-        "track_parameters": lambda T, F: track_parameters(chain, T, F, random_state=0).rates["per_year"],
+        "track_parameters": lambda T, F: track_parameters(chain, T, F).rates["per_year"],
         "FleetPrior.fit": lambda T, F: (
             FleetMapper(FleetPrior().fit([*others, (T, F)])).fit(T_short, F_short).predict(healthy_T)
         ),
