@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,69 +21,62 @@ from skthermo.detection import (
 from skthermo.preprocessing.checks import SetAside, set_aside
 
 
+def compensators_of(detector: BaseEstimator | None) -> list[Any]:
+    """Parts of an unfitted detector that say which columns are responses."""
+    parts = [] if detector is None else [detector, *detector.get_params(deep=True).values()]
+    return [part for part in parts if isinstance(part, TemperatureCompensator | CompensatedDetector)]
+
+
 @dataclass(frozen=True)
 class Columns:
-    """Names of columns: ``inputs`` are all but those of ``reference``, and the detector sees ``seen`` of them."""
+    """Roles of columns: ``inputs`` are all but those of ``reference``, and ``targets`` the responses among them."""
 
     inputs: list[Any]
     reference: list[Any]
     targets: list[Any]
-    seen: list[Any]
     units: dict[Any, str]
 
     @classmethod
-    def of(cls, monitor: Any, detector: BaseEstimator, columns: list[Any]) -> Columns:
-        """Those of a baseline, by the parameters of a monitor and the compensators of its detector."""
-        parts = [detector, *detector.get_params(deep=True).values()]
-        compensators = [part for part in parts if isinstance(part, TemperatureCompensator | CompensatedDetector)]
+    def assigned(cls, monitor: Any, columns: list[Any], detector: BaseEstimator | None) -> Columns:
+        """By the parameters of a monitor, the compensators of its detector, or its chain."""
         reference = _among(monitor.reference or [], columns, "reference")
         inputs = [name for name in columns if name not in reference]
-        places = [positions_of(one.targets, len(inputs), inputs) for one in compensators]
+        places = [positions_of(one.targets, len(inputs), inputs) for one in compensators_of(detector)]
         own = [inputs[k] for k in sorted(set(np.concatenate(places).tolist()))] if places else None
-        targets = _responses(monitor, inputs, own)
-        return cls(inputs, reference, targets, inputs if compensators else targets, _units(monitor, columns, targets))
+        wanted = own if monitor.targets is None else monitor.targets
+        if wanted is None and monitor.fem is None:
+            raise ValueError(
+                "the detector has no TemperatureCompensator whose targets say which columns are responses, and there "
+                "is no fem; expected targets=[names of the responses]"
+            )
+        if wanted is None:
+            check_is_fitted(monitor.fem)
+            wanted = monitor.fem.mode_names_
+        targets = _among(wanted, inputs, "targets")
+        if not targets or (own is not None and set(targets) != set(own)):
+            expected = f"some of the columns {inputs}" if own is None else f"those of the compensator {own}"
+            raise ValueError(f"targets are {targets}; expected {expected}")
+        of_targets = monitor.units if isinstance(monitor.units, str) else "" if monitor.fem is None else "Hz"
+        given = dict(monitor.units) if isinstance(monitor.units, Mapping) else {}
+        if set(given) - set(columns) or not all(isinstance(unit, str) for unit in given.values()):
+            raise ValueError(f"units are {given}; expected a text for some of the columns {columns}")
+        units = {name: of_targets if name in targets else "°C" for name in columns} | given
+        return cls(inputs, reference, [name for name in inputs if name in targets], units)
 
+    def without(self, names: Collection[Any]) -> Columns:
+        """The roles of the other columns."""
+        lists = ([name for name in some if name not in names] for some in (self.inputs, self.reference, self.targets))
+        return Columns(*lists, {name: unit for name, unit in self.units.items() if name not in names})
 
-def default_detector(monitor: Any, columns: list[Any]) -> BaseEstimator:
-    """Directions of damage for responses in Hz, the Mahalanobis distance for others, of what the rest leaves."""
-    reference = _among(monitor.reference or [], columns, "reference")
-    inputs = [name for name in columns if name not in reference]
-    targets = _responses(monitor, inputs, None)
-    directions = "softening" if monitor.fem is None else monitor.fem
-    in_hertz = {_units(monitor, columns, targets)[name] for name in targets} == {"Hz"}
-    last = DirectionalDetector(directions) if in_hertz else MahalanobisDetector()
-    if len(targets) == len(inputs):
-        return last
-    return CompensatedDetector(last, targets=targets)
+    def seen(self, detector: BaseEstimator) -> list[Any]:
+        """Columns that a detector gets: without a compensator the responses alone."""
+        return self.inputs if compensators_of(detector) else self.targets
 
-
-def _responses(monitor: Any, columns: list[Any], own: list[Any] | None) -> list[Any]:
-    """Names of the responses: as given, ``own`` ones of the compensators, or those of the chain."""
-    if monitor.targets is None and own is not None:
-        return own
-    if monitor.targets is None and monitor.fem is None:
-        raise ValueError(
-            "the detector has no TemperatureCompensator whose targets say which columns are responses, and there is no "
-            "fem; expected targets=[names of the responses]"
-        )
-    if monitor.targets is None:
-        check_is_fitted(monitor.fem)
-    wanted = _among(monitor.fem.mode_names_ if monitor.targets is None else monitor.targets, columns, "targets")
-    if not wanted or (own is not None and set(wanted) != set(own)):
-        raise ValueError(
-            f"targets are {wanted}; expected {'some of the columns' if own is None else 'those of the compensator'}"
-            f" {columns if own is None else own}"
-        )
-    return [name for name in columns if name in wanted]
-
-
-def _units(monitor: Any, columns: list[Any], targets: list[Any]) -> dict[Any, str]:
-    of_targets = monitor.units if isinstance(monitor.units, str) else "" if monitor.fem is None else "Hz"
-    given = dict(monitor.units) if isinstance(monitor.units, Mapping) else {}
-    unknown = [name for name in given if name not in columns]
-    if unknown or not all(isinstance(unit, str) for unit in given.values()):
-        raise ValueError(f"units are {given}; expected a text for some of the columns {columns}")
-    return {name: of_targets if name in targets else "°C" for name in columns} | given
+    def default_detector(self, fem: Any) -> BaseEstimator:
+        """Directions of damage for responses in Hz, the Mahalanobis distance for others, of what the rest leaves."""
+        in_hertz = {self.units[name] for name in self.targets} == {"Hz"}
+        last = DirectionalDetector("softening" if fem is None else fem) if in_hertz else MahalanobisDetector()
+        return last if len(self.targets) == len(self.inputs) else CompensatedDetector(last, targets=self.targets)
 
 
 def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
@@ -96,27 +88,16 @@ def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
 
 def usable_baseline(monitor: Any, baseline: pd.DataFrame) -> tuple[pd.DataFrame, BaseEstimator, Columns, SetAside]:
     """What can be used of a baseline, by which unfitted detector and columns, and what was set aside."""
-    given, is_default = list(baseline.columns), monitor.detector is None
-    detector = default_detector(monitor, given) if is_default else clone(monitor.detector)
-    columns = Columns.of(monitor, detector, given)
+    detector = None if monitor.detector is None else clone(monitor.detector)
+    columns = Columns.assigned(monitor, list(baseline.columns), detector)
     records, found = without_what_cannot_be(baseline, columns.targets, columns.units)
-    if not found.left_out:
-        return records, detector, columns, found
-    if monitor.fem is not None:
-        raise ValueError(f"the chain needs columns that cannot be used: {'; '.join(found.left_out.values())}")
-    records = records.drop(columns=list(found.left_out))
-    wanted = SimpleNamespace(
-        fem=None,
-        reference=[name for name in columns.reference if name in records],
-        targets=[name for name in columns.targets if name in records],
-        units={name: unit for name, unit in columns.units.items() if name in records},
-    )
-    if is_default:
-        detector = default_detector(wanted, list(records.columns))
-    for part in (detector, *detector.get_params(deep=True).values()):
-        if isinstance(part, TemperatureCompensator | CompensatedDetector):
-            part.set_params(targets=wanted.targets)
-    return records, detector, Columns.of(wanted, detector, list(records.columns)), found
+    if found.left_out:
+        if monitor.fem is not None:
+            raise ValueError(f"the chain needs columns that cannot be used: {'; '.join(found.left_out.values())}")
+        records, columns = records.drop(columns=list(found.left_out)), columns.without(found.left_out)
+        for part in compensators_of(detector):
+            part.set_params(targets=columns.targets)
+    return records, columns.default_detector(monitor.fem) if detector is None else detector, columns, found
 
 
 def without_what_cannot_be(

@@ -1,26 +1,28 @@
-"""What happens to records before they are evaluated: what is no measurement is left out, drift is taken out."""
+"""Records as a detector sees them, day by day: what is no measurement is left out, drift is taken out."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
-from skthermo._core.frames import MISSING_CODES
+from skthermo._core.frames import MISSING_CODES, midnights
+from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._drift import DriftFollower
-from skthermo.monitoring.sensors import Dispute, SensorWatch
+from skthermo.monitoring._sensors import SensorWatch
 from skthermo.preprocessing.checks import Plausible
 
 
 @dataclass(frozen=True)
-class CorrectionState:
+class DayState(SavesFrames):
     """States of the sensor watch and of the drift follower at the beginning of a day."""
 
+    day: pd.Timestamp
     sensors: Any = None
     drift: Any = None
 
@@ -29,49 +31,30 @@ class CorrectionState:
 class Corrected:
     """Records as the detector sees them, and what became of their values.
 
-    ``n_held`` counts the responses of a record that were set aside although the structure may have moved them, and
-    ``held`` names them: where there are some, ``is_held``, a record is not healthy. ``disputes`` say which thermometers
-    contradict each other.
+    ``notes`` has a row for each record: ``n_held`` responses that were set aside although the structure may have moved
+    them, ``held`` names them; ``n_left_out`` values, and ``note``. ``drift`` is the share of stiffness by day and group
+    that is taken out of the frequencies.
     """
 
     records: pd.DataFrame
-    n_held: Array
-    held: list[str]
-    notes: list[str]
-    n_left_out: NDArray[np.int64]
-    disputes: list[Dispute | None]
-
-    @property
-    def is_held(self) -> NDArray[np.bool_]:
-        """Which records have responses that were set aside."""
-        return self.n_held > 0
-
-    @classmethod
-    def joined(cls, parts: Sequence[Corrected]) -> Corrected:
-        return cls(
-            pd.concat([part.records for part in parts]),
-            np.concatenate([part.n_held for part in parts]),
-            [name for part in parts for name in part.held],
-            [note for part in parts for note in part.notes],
-            np.concatenate([part.n_left_out for part in parts]),
-            [one for part in parts for one in part.disputes],
-        )
+    notes: pd.DataFrame
+    drift: pd.DataFrame
+    states: tuple[DayState, ...]
 
 
 @dataclass(frozen=True)
 class Corrections:
     """Bounds of what can be measured, the sensor watch and the drift follower; the latter two may be None."""
 
-    temperatures: list[Any]
     targets: list[Any]
     reference: list[Any]
     units: dict[Any, str]
     plausible: Plausible
-    sensors: SensorWatch | None = None
-    drift: DriftFollower | None = None
+    sensors: Any = None
+    drift: Any = None
 
     @classmethod
-    def of(
+    def learned(
         cls,
         baseline: pd.DataFrame,
         targets: list[Any],
@@ -81,58 +64,65 @@ class Corrections:
         fem: Any = None,
         sensors: bool = True,
     ) -> Corrections:
-        """Learned from a raw baseline; drift is followed where there is a chain."""
+        """From a raw baseline; drift is followed where there is a chain."""
         plausible = Plausible.learned(baseline, targets)
         cleaned = baseline.mask(plausible.implausible(baseline.to_numpy()))
         T, F = cleaned.drop(columns=targets), cleaned[targets]
-        watch = SensorWatch.of(T, F, reference=reference, units=units) if sensors else None
+        watch = SensorWatch.fitted(T, F, reference=reference, units=units) if sensors else None
         follower = None if fem is None else DriftFollower.fitted(fem, T.drop(columns=reference), F)
-        return cls(list(T.columns), list(targets), list(reference), dict(units), plausible, watch, follower)
+        return cls(list(targets), list(reference), dict(units), plausible, watch, follower)
 
-    def start(self) -> CorrectionState:
-        return CorrectionState(*(None if one is None else one.start() for one in (self.sensors, self.drift)))
+    def start(self, day: pd.Timestamp) -> DayState:
+        """The state before the first record since the baseline."""
+        return DayState(day, *(None if one is None else one.start() for one in (self.sensors, self.drift)))
 
     def cleaned(self, raw: pd.DataFrame) -> pd.DataFrame:
         """Records without what no sensor measures."""
-        wrong = self.plausible.implausible(raw.to_numpy())
-        return raw.mask(wrong) if wrong.any() else raw
+        return raw.mask(self.plausible.implausible(raw.to_numpy()))
 
-    def advance(self, state: CorrectionState, raw: pd.DataFrame) -> CorrectionState:
-        """The states after one more complete day, which may have no records."""
-        if self.sensors is None and self.drift is None:
-            return state
-        day = self.cleaned(raw)
-        T, F = day[self.temperatures], day[self.targets]
-        sensors, drift = state.sensors, state.drift
-        if self.drift is not None:
-            T_seen, F_seen = self._masked(state, T, F)
-            drift = self.drift.advance(drift, T_seen, F_seen.where(F_seen > 0))
-        if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
-            seen = raw if day is raw else raw.mask(day.isna() & (raw.isin(MISSING_CODES) | np.isinf(raw)))
-            sensors = self.sensors.advance(sensors, seen[self.temperatures], seen[self.targets])
-        return CorrectionState(sensors, drift)
-
-    def _masked(self, state: CorrectionState, T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-        if self.sensors is None:
-            return T.drop(columns=self.reference), F
-        seen = self.sensors.masked(state.sensors, T, F)
-        return seen.T, seen.F
-
-    def corrected(self, state: CorrectionState, raw: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Corrected:
-        """Raw records of one day as the detector sees them.
+    def corrected(self, begin: DayState, raw: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Corrected:
+        """Raw records from a day on as the detector sees them, each day by what was known at its beginning.
 
         ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a sensor.
         """
+        days = midnights(raw.index)
+        bounds = [*np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[0] - 1)), len(raw)]
+        if self.sensors is None and self.drift is None:
+            bounds = [0, len(raw)]
+        state, states, parts = begin, [], []
+        for first, stop in pairwise(bounds):
+            day = raw.iloc[first:stop]
+            states.append(state := DayState(days[first], state.sensors, state.drift))
+            parts.append(self._seen(state, day, acknowledged))
+            if stop < len(raw):
+                state = self._after(state, day)
+        records, notes = (pd.concat(list(some)) for some in zip(*parts, strict=True))
+        drift = {} if self.drift is None else {one.day: self.drift.taken_out(one.drift) for one in states}
+        return Corrected(records, notes, pd.DataFrame(drift).T.add_prefix("drift "), tuple(states))
+
+    def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+        return records.drop(columns=self.targets), records[self.targets]
+
+    def _after(self, state: DayState, raw: pd.DataFrame) -> DayState:
+        """The state after one more complete day."""
+        T, F = self._split(self.cleaned(raw))
+        drift, sensors = state.drift, state.sensors
+        if self.drift is not None:
+            seen = None if self.sensors is None else self.sensors.masked(sensors, T, F)
+            inputs, responses = (T.drop(columns=self.reference), F) if seen is None else (seen.T, seen.F)
+            drift = self.drift.advance(drift, inputs, responses.where(responses > 0))
+        if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
+            is_missing = self.plausible.implausible(raw.to_numpy()) & (raw.isin(MISSING_CODES) | np.isinf(raw))
+            sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
+        return DayState(state.day, sensors, drift)
+
+    def _seen(
+        self, state: DayState, raw: pd.DataFrame, acknowledged: Sequence[int]
+    ) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Records of one day, and what became of their values."""
         wrong = self.plausible.implausible(raw.to_numpy())
-        day = raw.mask(wrong) if wrong.any() else raw
-        T, F = day[self.temperatures], day[self.targets]
-        held = np.zeros(F.shape, dtype=bool)
-        notes, names, n_left_out = [""] * len(raw), [""] * len(raw), wrong.sum(axis=1)
-        for row in np.flatnonzero(wrong.any(axis=1)):
-            columns = raw.columns[wrong[row]]
-            parts = [f"{name} is {f'{raw[name].iloc[row]:g} {self.units[name]}'.rstrip()}" for name in columns]
-            notes[row] = f"{', '.join(parts)}: taken as missing"
-        dispute = None if self.sensors is None else self.sensors.dispute(state.sensors, list(T.columns))
+        T, F = self._split(raw.mask(wrong))
+        held, notes, n_left_out = np.zeros(F.shape, dtype=bool), self._missing(raw, wrong), wrong.sum(axis=1)
         if self.sensors is None:
             T = T.drop(columns=self.reference)
         else:
@@ -141,15 +131,24 @@ class Corrections:
             notes = ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)]
         if self.drift is not None:
             F = self.drift.corrected(state.drift, F)
+        names = [""] * len(raw)
         for row in np.flatnonzero(held.any(axis=1)):
             names[row] = ", ".join(str(self.targets[k]) for k in np.flatnonzero(held[row]))
-        records = pd.concat([T, F], axis=1)[[name for name in raw.columns if name not in self.reference]]
-        return Corrected(records, held.sum(axis=1).astype(float), names, notes, n_left_out, [dispute] * len(raw))
+        table = {"n_held": held.sum(axis=1).astype(float), "held": names, "n_left_out": n_left_out, "note": notes}
+        records = T.join(F)[[name for name in raw.columns if name not in self.reference]]
+        return records, pd.DataFrame(table, raw.index).astype({"held": object, "note": object})
 
-    def faults(self, state: CorrectionState) -> pd.DataFrame:
+    def _missing(self, raw: pd.DataFrame, wrong: Array) -> list[str]:
+        """What is taken as missing of each record."""
+        notes = [""] * len(raw)
+        for row in np.flatnonzero(wrong.any(axis=1)):
+            columns = raw.columns[wrong[row]]
+            parts = [f"{name} is {f'{raw[name].iloc[row]:g} {self.units[name]}'.rstrip()}" for name in columns]
+            notes[row] = f"{', '.join(parts)}: taken as missing"
+        return notes
+
+    def faults(self, state: DayState) -> pd.DataFrame:
+        """Sensors that have failed."""
         if self.sensors is None:
             return pd.DataFrame({name: [] for name in ("column", "kind", "since", "detected", "until", "detail")})
         return self.sensors.faults(state.sensors)
-
-    def drifts(self, state: CorrectionState) -> pd.DataFrame | None:
-        return None if self.drift is None else self.drift.report(state.drift)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import warnings
 import zlib
 from importlib import import_module
 from pathlib import Path
@@ -12,15 +11,12 @@ from typing import Any
 
 import joblib
 import sklearn
-from sklearn.exceptions import InconsistentVersionWarning
 from sklearn.utils.validation import check_is_fitted
 
 import skthermo
 from skthermo._core.arrays import check_path
 from skthermo._core.estimators import import_optional
 from skthermo._core.files import write_when_complete
-from skthermo._core.warnings import warn_user
-from skthermo.exceptions import SkthermoWarning
 
 ENDINGS = (".joblib", ".skops")
 TRUSTED = ("skthermo", "sklearn")  # packages whose classes are read from skops' files
@@ -71,11 +67,6 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
     ImportError
         If the file ends with ``.skops``, and skops is not installed.
 
-    Warns
-    -----
-    UserWarning
-        If the monitor was fitted with another version of skthermo or scikit-learn, each time that it is read.
-
     See Also
     --------
     Monitor.save : Writes the file.
@@ -102,9 +93,12 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
     if file.suffix == ".skops":
         import_optional("skops.io", extra="drop-ins")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", InconsistentVersionWarning)  # one warning below stands for all
-            monitor = _from_skops(content) if file.suffix == ".skops" else _from_joblib(content)
+        monitor = _from_skops(content) if file.suffix == ".skops" else _from_joblib(content)
+    except (ImportError, AttributeError) as error:  # of classes that there were in 0.2
+        raise ValueError(
+            f"{file} was saved by another version of skthermo; expected a monitor that is fitted anew, as by skthermo "
+            "fit FOLDER --replace, which keeps settings, records and acknowledgements"
+        ) from error
     except Exception as error:  # damaged files raise errors of every type
         raise ValueError(
             f"{file} cannot be read: {type(error).__name__}: {error}; expected the whole file of a monitor, saved with "
@@ -112,13 +106,6 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
         ) from error
     if not all(hasattr(monitor, name) for name in ("update", "events_", "versions_")):
         raise ValueError(f"{file} holds {type(monitor).__name__!r}; expected a fitted Monitor")
-    if monitor.versions_ != versions():
-        warn_user(
-            f"{file} was fitted with {_listed(monitor.versions_)}, and this is {_listed(versions())}. Decisions may "
-            "differ from those of the fitted monitor. Refit it with these versions",
-            SkthermoWarning,
-            "other-versions",
-        )
     return monitor
 
 

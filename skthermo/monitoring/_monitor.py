@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
 from typing import Any
@@ -13,33 +13,49 @@ import numpy as np
 import pandas as pd
 from sklearn.base import clone
 
-from skthermo._core.arrays import check_flag, is_real
+from skthermo._core.arrays import Array, check_flag
 from skthermo._core.estimators import (
     Estimator,
     HasMethods,
     Interval,
     _fit_context,
     check_is_fitted,
-    held,
+    last_step,
     seed_parts,
     seeded,
 )
-from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, midnight
+from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, midnight, midnights, usual_step
 from skthermo._core.saved_frames import SavesFrames
-from skthermo._core.warnings import warn_user
+from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
-from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._columns import usable_baseline, without_what_cannot_be
 from skthermo.monitoring._corrections import Corrections
-from skthermo.monitoring._events import DAMAGE, Acknowledgement, Transition
+from skthermo.monitoring._evaluation import (
+    blind_findings,
+    causes,
+    departures,
+    group_effects,
+    index_of,
+    losses_of,
+    refuse_other_batches,
+    rounded,
+)
+from skthermo.monitoring._events import (
+    DAMAGE,
+    MEASUREMENT,
+    WATCH,
+    Events,
+    evaluations,
+    event_changes,
+    leading,
+    with_acknowledgements,
+)
 from skthermo.monitoring._files import versions, write_monitor
-from skthermo.monitoring._history import History
-from skthermo.monitoring._records import OF_TRAINING, Memory, RecordStore, read_records
+from skthermo.monitoring._records import OF_TRAINING, Intake, Lookback, read_records
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
-from skthermo.monitoring._threshold import FalseAlarmEstimate, SmallestChanges
-
-MOST_CAUSES = 3  # in a warning
+from skthermo.monitoring._threshold import EventLevels, SmallestChanges, lowered
+from skthermo.residuals.weather import BEYOND, TrainingRange
 
 
 class Monitor(SavesFrames, Estimator):
@@ -234,33 +250,56 @@ class Monitor(SavesFrames, Estimator):
         self.lookback = lookback
         self.random_state = random_state
 
-    detector_: Any = held("active_.detector")
-    lookback_: Memory = held("active_.memory")
-    false_alarm_estimate_: FalseAlarmEstimate = held("active_.estimate")
-    threshold_: float = held("active_.threshold")
-    clear_threshold_: float = held("active_.estimate.rule.release")
-    watch_threshold_: float | None = held("active_.watch_threshold")
-    smallest_changes_: SmallestChanges = held("active_.smallest")
-    trained_: pd.DataFrame = held("active_.trained", is_copied=True)
-    prior_: pd.DataFrame | None = held("active_.prior")
-    since_: pd.Timestamp | None = held("active_.since")
-    baseline_: pd.DataFrame = held("history_.store.baseline", is_copied=True)
-    records_: pd.DataFrame = held("history_.store.kept", is_copied=True)
-    last_: pd.Timestamp = held("history_.store.last")
-    evaluations_: pd.DataFrame = held("history_.evaluations", is_copied=True)
-    days_: pd.DataFrame = held("history_.days", is_copied=True)
-    counts_: dict[str, int] = held("history_.counts")
-    events_: pd.DataFrame = held("history_.event_table")
+    @property
+    def last_(self) -> pd.Timestamp:
+        """Stamp of the newest record."""
+        return (self.records_ if len(self.records_) else self.baseline_).index[-1]
 
     @property
-    def corrected_(self) -> pd.DataFrame:
-        """Records kept since the baseline as the detector sees them."""
-        return self.history_.corrected.loc[self.history_.store.kept.index]
+    def events_(self) -> pd.DataFrame:
+        """Events, counted from 1, with what the owner has said of them."""
+        return with_acknowledgements(self._events().table, self.acknowledgements_)
+
+    @property
+    def evaluations_(self) -> pd.DataFrame:
+        """The latest evaluation of each record."""
+        return evaluations(self.decisions_, self._events(), self.acknowledgements_)
+
+    @property
+    def days_(self) -> pd.DataFrame:
+        """A summary of each day with records."""
+        answers = self.evaluations_
+        table = pd.DataFrame(
+            {
+                "n_records": 1,
+                "n_evaluated": answers["state"] != "not evaluated",
+                "n_alarms": answers["state"] == "alarm",
+                "n_left_out": self.decisions_["n_left_out"],
+            }
+        ).astype(np.int64)
+        by_day = answers["index"].groupby(midnights(answers.index).rename("day"))
+        table = table.groupby(midnights(answers.index).rename("day")).sum()
+        return table.assign(index_median=by_day.median(), index_max=by_day.max()).join(self.drift_days_)
+
+    @property
+    def counts_(self) -> dict[str, int]:
+        """Numbers of records that came, and what became of them."""
+        n_outside = self.tallies_["n_too_late"] + len(self.ahead_)
+        n_unknown = int((self.evaluations_["state"] == "not evaluated").sum())
+        return (
+            {"n_records": len(self.decisions_) + n_outside}
+            | self.tallies_
+            | {
+                "n_ahead": len(self.ahead_),
+                "n_not_evaluated": n_unknown + n_outside,
+                "n_left_out": int(self.decisions_["n_left_out"].sum()),
+            }
+        )
 
     @property
     def faults_(self) -> pd.DataFrame:
         """Sensors that have failed, those of columns that are left out first."""
-        found = self.active_.corrections.faults(self.history_.corrections)
+        found = self.corrections_.faults(self.states_[-1])
         if not self.left_out_:
             return found
         first, last = self.baseline_.index[[0, -1]]
@@ -273,7 +312,8 @@ class Monitor(SavesFrames, Estimator):
     @property
     def drift_(self) -> pd.DataFrame | None:
         """Drift that was followed, by group."""
-        return self.active_.corrections.drifts(self.history_.corrections)
+        follower = self.corrections_.drift
+        return None if follower is None else follower.report(self.states_[-1].drift)
 
     def __sklearn_clone__(self) -> Monitor:
         return type(self)(
@@ -282,14 +322,14 @@ class Monitor(SavesFrames, Estimator):
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
-        if "active_" in state and self.active_.trained is self.history_.store.baseline:  # most often: saved once
-            state["active_"] = replace(self.active_, trained=None)
+        if "trained_" in state and self.trained_ is self.baseline_:  # most often: saved once
+            state["trained_"] = None
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         super().__setstate__(state)
-        if "active_" in state and self.active_.trained is None:
-            self.active_ = replace(self.active_, trained=self.history_.store.baseline)
+        if state.get("trained_", self) is None:
+            self.trained_ = self.baseline_
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: pd.DataFrame, y: None = None) -> Monitor:
@@ -322,21 +362,182 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing; if the detector does not see
             even large changes of a response.
         """
-        max_delay, retention = self._checked_times()
+        self._check_times()
         given = _read_baseline(X)
-        baseline, detector, columns, found = usable_baseline(self, given)
-        seed_parts(detector, seeded(self.random_state))
-        self.targets_, self.units_ = columns.targets, columns.units
-        self.columns_, self.left_out_, aside = list(given.columns), found.left_out, found.table
-        self.set_aside_ = aside[~aside["column"].isin(list(self.left_out_))].reset_index(drop=True)
-        corrections = self._corrections(baseline, columns.reference, self.fem)
-        trained = baseline if len(columns.inputs) == baseline.shape[1] else baseline[columns.inputs]
-        active = self._activated(detector.fit(trained[columns.seen]), trained, columns.seen, corrections)
-        active.check()
-        store = RecordStore.of(baseline, max_delay, retention)
-        self.active_, self.history_ = active, History.of(active, store)
+        with collected() as findings:
+            baseline, detector, columns, found = usable_baseline(self, given)
+            seed_parts(detector, seeded(self.random_state))
+            self.columns_, self.left_out_, aside = list(given.columns), found.left_out, found.table
+            self.targets_, self.units_, self.reference_ = columns.targets, columns.units, columns.reference
+            self.set_aside_ = aside[~aside["column"].isin(list(self.left_out_))].reset_index(drop=True)
+            self.baseline_, self.prior_, self.since_ = baseline, None, None
+            trained = baseline if not columns.reference else baseline[columns.inputs]
+            self.features_ = columns.seen(detector)
+            detector.fit(trained[self.features_])
+        findings += self._take_charge(detector, trained)
+        refuse_other_batches(detector, self.features_, trained, self.lookback_)
+        findings += blind_findings(detector, self.features_, trained, self.targets_, self.lookback_, self.threshold_)
+        self._begin_service(self.fem)
         self.versions_ = versions()
+        warn_each(findings)
         return self
+
+    def _begin_service(self, fem: Any) -> None:
+        """Forget all records since the baseline, if there are any."""
+        nothing = self.baseline_.iloc[:0]
+        self.records_ = self.ahead_ = nothing
+        self.corrected_ = nothing.drop(columns=self.reference_)
+        self.decisions_ = self._decisions(nothing.index)
+        self.drift_days_ = pd.DataFrame(index=nothing.index)
+        kinds = {"kind": object, "time": np.int64, "at": np.int64, "harmless": bool, "note": object}
+        self.acknowledgements_ = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
+        self.transitions_, self.restarts_ = (), ()
+        self.tallies_ = dict.fromkeys(("n_repeated", "n_late", "n_too_late"), 0)
+        self._begin_corrections(self.baseline_, fem)
+
+    def _begin_corrections(self, baseline: pd.DataFrame, fem: Any) -> None:
+        """Watch sensors and drift anew, from the newest day on."""
+        options = {"fem": fem, "sensors": self.sensors}
+        self.corrections_ = Corrections.learned(baseline, self.targets_, self.reference_, self.units_, **options)
+        self.began_ = midnight(self.last_)
+        self.states_ = (self.corrections_.start(self.began_),)
+
+    def _take_charge(self, detector: Any, trained: pd.DataFrame) -> list[Any]:
+        """Put a fitted detector in charge, with the levels of its events; what is doubtful about them."""
+        self.detector_, self.trained_ = detector, trained
+        self.lookback_ = Lookback.learned(detector)
+        if self.lookback is not None:
+            self.lookback_ = Lookback(0, check_duration(self.lookback, "lookback"))
+        index = pd.Series(last_step(detector).baseline_index_, trained.index)
+        levels = EventLevels.learned(index, self.false_alarms_per_year, self.persistence)
+        self.threshold_, self.clear_threshold_ = levels.threshold, levels.release
+        self.false_alarm_estimate_, self.baseline_peaks_ = levels.estimate, levels.peaks
+        self.watch_threshold_ = None
+        if self.watch_per_year is not None:
+            watch = EventLevels.learned(index, self.watch_per_year, self.persistence)
+            self.watch_threshold_ = min(watch.threshold, self.threshold_)
+        step = usual_step(trained.index)
+        within = self.lookback_.duration(step) + (2 * self.persistence - 1) * step
+        self.smallest_changes_ = SmallestChanges.measured(
+            self._index, trained, self.targets_, self.threshold_, within, losses_of(detector)
+        )
+        return list(levels.findings(self.smallest_changes_))
+
+    def _index(self, records: pd.DataFrame) -> Array:
+        """Damage indices of records in order of time, by the detector in charge."""
+        return index_of(self.detector_, self.features_, records)
+
+    def _with(self, detector: Any, trained: pd.DataFrame) -> Monitor:
+        """This monitor with another detector in charge, which was fitted on some records."""
+        other = copy.copy(self)
+        other._take_charge(detector, trained)
+        return other
+
+    def _events(self) -> Events:
+        return Events(self.decisions_, self.persistence, self.restarts_)
+
+    def _decisions(self, stamps: pd.DatetimeIndex, **columns: Any) -> pd.DataFrame:
+        """A row for each record: its index, the levels of events, and what becomes of it."""
+        watch = np.nan if self.watch_threshold_ is None else self.watch_threshold_
+        levels = {"threshold": self.threshold_, "release": self.clear_threshold_, "watch": watch}
+        levels["watch_release"] = min(watch, self.clear_threshold_)
+        texts = dict.fromkeys(("modes", "held", "reason"), "")
+        values = {"index": np.nan} | levels | {"n_held": 0.0, "is_blind": False, "n_left_out": 0} | texts | columns
+        kinds = {"is_blind": bool, "n_left_out": np.int64} | dict.fromkeys(texts, object)
+        return pd.DataFrame(values, stamps).astype({name: kinds.get(name, float) for name in values})
+
+    def _decide(self, first: pd.Timestamp) -> None:
+        """Evaluate the records from a stamp on anew, each by what was known at the beginning of its day."""
+        earlier = [one for one in self.states_ if one.day <= first]
+        begin = earlier[-1] if earlier else self.corrections_.start(min(self.began_, midnight(first)))
+        raw = self.records_[self.records_.index >= begin.day]
+        if not len(raw):
+            self.states_ = (begin,)
+            return
+        if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
+            self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
+        seen = self.corrections_.corrected(begin, raw, self._explained())
+        days = pd.DatetimeIndex([one.day for one in seen.states])
+        self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen.records])
+        self.drift_days_ = pd.concat([self.drift_days_[self.drift_days_.index < begin.day], seen.drift.reindex(days)])
+        states = [*(one for one in earlier if one.day < begin.day), *seen.states]
+        n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
+        self.states_ = tuple(states[max(n_old - 1, 0) :])
+        new = self._decided(first, seen.notes[seen.notes.index >= first])
+        self.decisions_ = pd.concat([self.decisions_[self.decisions_.index < first], new])
+        self._explain(first)
+
+    def _decided(self, first: pd.Timestamp, notes: pd.DataFrame) -> pd.DataFrame:
+        """Decisions on the records from a stamp on, but for what explains an event."""
+        n_before = self.corrected_.index.searchsorted(first)
+        records, place = self._with_memory(n_before)
+        new = records.iloc[place:]
+        temperatures = [name for name in new if name not in self.targets_]
+        index = rounded(self._index(records)[place:])
+        known = self.trained_[self.targets_].notna().any(axis=1).to_numpy()
+        weather = TrainingRange.spanned(self.trained_[temperatures], known)
+        is_outside = (np.nan_to_num(weather.excess(new[temperatures])) > BEYOND).any(axis=1)
+        fall, is_blind = max(3 * self.smallest_changes_.common, 0.05), np.zeros(len(new), dtype=bool)
+        if is_outside.any() and np.isfinite(self.smallest_changes_.common):
+            fallen = lowered(records, {name: fall * records[name] for name in self.targets_})
+            is_blind = is_outside & (self._index(fallen)[place:] <= self.threshold_) & (notes["n_held"] == 0)
+        remarks = {
+            "extrapolated: temperatures outside those of the baseline": is_outside,
+            f"even a fall of all responses by {100 * fall:.2g} % would stay undetected": is_blind,
+        }
+        said = [causes(new, self.targets_, temperatures, index), notes["note"]]
+        said += [np.where(rows, text, "") for text, rows in remarks.items()]
+        reason = ["; ".join(filter(None, parts)) for parts in zip(*said, strict=True)]
+        columns = {"index": index, "is_blind": np.asarray(is_blind), "reason": reason}
+        return self._decisions(new.index, **columns, **notes[["n_held", "held", "n_left_out"]])
+
+    def _with_memory(self, n_before: int) -> tuple[pd.DataFrame, int]:
+        """Records as the detector sees them, from those on that it looks back to, and the position of the first."""
+        n = len(self.baseline_)
+        times = np.concatenate([self.baseline_.index.asi8, self.corrected_.index.asi8])
+        start = self.lookback_.start(times, n + n_before)
+        memory = self.corrections_.cleaned(self.baseline_.iloc[start:])[list(self.corrected_.columns)]
+        recent = self.corrected_.iloc[max(start - n, 0) :]
+        return (pd.concat([memory, recent]) if len(memory) else recent), n + n_before - start
+
+    def _explain(self, first: pd.Timestamp) -> None:
+        """Name what drives the open events of the records from a stamp on."""
+        numbers = self._events().numbers
+        is_open = ((numbers[DAMAGE] > 0) | (numbers[WATCH] > 0)) & self.decisions_["index"].notna().to_numpy()
+        rows = np.flatnonzero(is_open & (self.decisions_.index >= first))
+        if not len(rows):
+            return
+        records, place = self._with_memory(int(rows[0]))
+        places = place + rows - rows[0]
+        records = records.iloc[: places[-1] + 1]
+        sizes = np.abs(departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places])
+        sizes = np.round(np.nan_to_num(sizes), 2)
+        effects = group_effects(self.detector_, records[self.features_]).iloc[places].add_prefix("effect ")
+        decisions = self.decisions_.copy()
+        modes = decisions["modes"].to_numpy(copy=True)
+        modes[rows] = [leading(dict(zip(map(str, self.targets_), size, strict=True))) for size in sizes]
+        decisions["modes"] = modes
+        for name in effects:
+            column = decisions[name].to_numpy(copy=True) if name in decisions else np.full(len(decisions), np.nan)
+            column[rows] = effects[name]
+            decisions[name] = column
+        self.decisions_ = decisions
+
+    def _explained(self) -> list[int]:
+        """Times (nanoseconds) at which what was set aside was said to be the fault of a sensor."""
+        said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT]
+        last = said.drop_duplicates("time", keep="last")
+        return last["at"][last["harmless"]].tolist()
+
+    def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
+        """Append what has changed since a former state to the transitions, after what was done."""
+        old, new = (events[~(events["end"] < first)] for events in (before.events_, self.events_))
+        found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
+        for one in [*done, *sorted(found, key=lambda change: change["time"])]:
+            plain = {"id": len(self.transitions_) + 1, "what": one["what"], "time": one["time"].isoformat()}
+            plain |= {"newest": self.last_.isoformat(), "kind": one["kind"], "event": one.get("event", 0)}
+            plain |= {"column": one.get("column", ""), "detail": one.get("detail", "")}
+            self.transitions_ = (*self.transitions_, plain)
 
     def update(self, new: pd.DataFrame, *, confirm: bool = False) -> pd.DataFrame:
         """Evaluate records that came since.
@@ -370,11 +571,33 @@ class Monitor(SavesFrames, Estimator):
             If new records are not evaluated: how many, and why.
         """
         check_is_fitted(self)
-        records = self._read(new)
-        intake = self.history_.store.sort_in(records, check_flag(confirm, "confirm"))
-        state, answers = self.history_.taken_in(self.active_, intake)
-        _warn_of_not_evaluated(answers)
-        self.history_ = state
+        max_delay = check_duration(self.max_delay, "max_delay")
+        intake = Intake.sorted_out(
+            *(self._read(new), self.baseline_, self.records_, self.ahead_, max_delay),
+            are_confirmed=check_flag(confirm, "confirm"),
+        )
+        after, fresh = copy.copy(self), intake.fresh.index
+        numbers = intake.n_repeated, int((fresh < self.last_).sum()), len(intake.too_late)
+        after.tallies_ = {name: self.tallies_[name] + n for name, n in zip(self.tallies_, numbers, strict=True)}
+        after.ahead_ = intake.ahead
+        answers = self.evaluations_.iloc[:0].assign(revised=False)
+        if len(fresh):
+            after.records_ = (
+                pd.concat([self.records_, intake.fresh]).sort_index() if len(self.records_) else intake.fresh
+            )
+            after._decide(fresh[0])
+            after._note(self, fresh[0])
+            answers = _news(self.evaluations_, after.evaluations_, fresh)
+        refused = pd.concat([intake.too_late, intake.early])
+        if len(refused):
+            rows = evaluations(
+                self._decisions(refused.index, reason=refused),
+                Events(self._decisions(refused.index), 1),
+                self.acknowledgements_,
+            )
+            answers = pd.concat([answers, rows.assign(revised=False)]).sort_index(kind="stable")
+        warn_each(_not_evaluated(answers))
+        vars(self).update(vars(after))
         return answers
 
     def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
@@ -430,10 +653,10 @@ class Monitor(SavesFrames, Estimator):
         none twice, also if it was stopped in between.
         """
         check_is_fitted(self)
-        found = self.history_.transitions
-        if isinstance(after, bool) or not isinstance(after, Integral) or not 0 <= after <= len(found):
-            raise ValueError(f"after is {after!r}; expected a number of a transition from 0 to {len(found)}")
-        return [one.as_dict(number, self.last_.tz) for number, one in enumerate(found, 1) if number > after]
+        n = len(self.transitions_)
+        if isinstance(after, bool) or not isinstance(after, Integral) or not 0 <= after <= n:
+            raise ValueError(f"after is {after!r}; expected a number of a transition from 0 to {n}")
+        return [dict(one) for one in self.transitions_[after:]]
 
     def years_watched(self, since: Any = None) -> float:
         """Time in which records were evaluated.
@@ -459,46 +682,6 @@ class Monitor(SavesFrames, Estimator):
         longest = max(1.0, float(np.median(steps))) if len(steps) else 1.0
         return float((1 + np.minimum(steps, longest).sum()) * (DAY / YEAR))
 
-    def event_p_values(self, since: Any = None, *, tail_shape: float | None = None) -> pd.Series:
-        """How probable so high a peak is for a healthy structure, by event.
-
-        Parameters
-        ----------
-        since : str or Timestamp, optional
-            Only events that are open, or have ended since then; by default all.
-        tail_shape : float, optional
-            Shape of the generalised Pareto tail of squared peaks, from 0 to less than 1, such as that of other bridges
-            (`~skthermo.fleet.Fleet.discoveries`); 0 is an exponential tail. By default the baseline decides whether
-            that is heavy enough.
-
-        Returns
-        -------
-        Series
-            By number of the event, for those of damage: the probability that a healthy structure has so high a peak in
-            the time watched since then.
-
-        Notes
-        -----
-        The p value comes from the highest peaks of the baseline, by which the detector in charge when the event
-        began was given its threshold (:ref:`how-events-are-tested`).
-        """
-        check_is_fitted(self)
-        if tail_shape is not None and not (is_real(tail_shape) and 0 <= tail_shape < 1):
-            raise ValueError(f"tail_shape is {tail_shape!r:.100}; expected a number from 0 to less than 1, or None")
-        events = self.events_[self.events_["kind"] == DAMAGE]
-        if since is not None:
-            begin = check_stamp(since, self.baseline_.index, "since")
-            events = events[events["end"].isna() | (events["end"] >= begin)]
-            since = min([begin, *events.loc[events["end"].isna(), "start"]])
-        n_years = self.years_watched(since)
-        p_values = [
-            [estimate for taken, estimate in self.history_.estimates if taken <= event["start"]][-1].p_value(
-                event["peak"], n_years, tail_shape
-            )
-            for _, event in events.iterrows()
-        ]
-        return pd.Series(p_values, events.index, dtype=float, name="p_value")
-
     def acknowledge(self, event: int, *, harmless: bool, note: str = "") -> None:
         """Record what the owner has found out about an event.
 
@@ -519,19 +702,22 @@ class Monitor(SavesFrames, Estimator):
             If there is no such event.
         """
         check_is_fitted(self)
-        events = self.history_.log.events
+        events = self.events_
         if isinstance(event, bool) or not isinstance(event, Integral) or not 1 <= event <= len(events):
             raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
         if not isinstance(note, str):
             raise ValueError(f"note is {note!r:.100}; expected text")
-        of, now = events[event - 1], self.last_.as_unit("ns").value
-        one = Acknowledgement(of.kind, of.peak_time, now, check_flag(harmless, "harmless"), note)
-        said = Transition("acknowledged", now, now, of.kind, int(event), detail=note)
-        self.history_ = replace(
-            self.history_,
-            acknowledgements=(*self.history_.acknowledgements, one),
-            transitions=(*self.history_.transitions, said),
-        )
+        one, after = events.loc[event], copy.copy(self)
+        after._say(one["kind"], one["peak_time"], check_flag(harmless, "harmless"), note)
+        done = {"what": "acknowledged", "time": self.last_, "kind": one["kind"], "event": int(event), "detail": note}
+        after._note(after, self.last_, done)
+        vars(self).update(vars(after))
+
+    def _say(self, kind: str, time: pd.Timestamp, harmless: bool, note: str) -> None:
+        """Note what the owner says of the event of a kind at a time, at the time of the newest record."""
+        row = {"kind": kind, "time": time.value, "at": self.last_.value, "harmless": harmless, "note": note}
+        said = pd.DataFrame([row]).astype(self.acknowledgements_.dtypes)
+        self.acknowledgements_ = pd.concat([self.acknowledgements_, said], ignore_index=True)
 
     def discard(self, start: Any, end: Any = None) -> int:
         """Take back records that should not have been taken in, such as those stamped by a wrong clock.
@@ -551,22 +737,33 @@ class Monitor(SavesFrames, Estimator):
         Raises
         ------
         ValueError
-            If there is no such record since the baseline, or the monitor no longer knows how things stood before them.
+            If there is no such record since the baseline.
 
         Notes
         -----
         The monitor is then as if these records had never come: those that stay are evaluated anew from there on by the
         detector in charge, and the newest record is the newest of them. Records that were refused as too late because
         of wrong stamps can come again. What was acknowledged stays, and `transitions` lists what changes.
-
-        How things stood before is known for the last days (``max_delay``), before the latest jump of the stamps, and,
-        while all records since the baseline are kept, for any time.
         """
         check_is_fitted(self)
         stamps = self.baseline_.index
         first, last = check_stamp(start, stamps, "start"), None if end is None else check_stamp(end, stamps, "end")
-        self.history_, number = self.history_.without(self.active_, first, last)
-        return number
+
+        def others(table: pd.DataFrame) -> pd.DataFrame:
+            return table[(table.index < first) | (False if last is None else table.index > last)]
+
+        after = copy.copy(self)
+        for name in ("records_", "ahead_", "corrected_", "decisions_"):
+            setattr(after, name, others(getattr(self, name)))
+        n_discarded = len(self.records_) - len(after.records_) + len(self.ahead_) - len(after.ahead_)
+        if not n_discarded:
+            until = "on" if last is None else f"to {last}"
+            raise ValueError(f"no record since the baseline is stamped {first} {until}; expected some to be discarded")
+        after._decide(min(first, midnight(after.last_)))
+        done = {"what": "discarded", "time": first, "kind": "", "detail": f"records: {n_discarded}"}
+        after._note(self, first, done)
+        vars(self).update(vars(after))
+        return n_discarded
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
         """Learn anew from the baseline and the records since, if the new detector is not significantly worse.
@@ -599,8 +796,8 @@ class Monitor(SavesFrames, Estimator):
         if records is not None:
             options = {"exclude": OF_TRAINING, "is_baseline": False}
             records, _ = without_what_cannot_be(self._read(records), self.targets_, self.units_, **options)
-            records = self.active_.corrections.cleaned(records)
-        retraining = retrained(self, records, self._activated, until=until, force=check_flag(force, "force"))
+            records = self.corrections_.cleaned(records)
+        retraining = retrained(self, records, until=until, force=check_flag(force, "force"))
         if retraining.accepted:
             self._take_over(retraining)
         return retraining
@@ -635,7 +832,7 @@ class Monitor(SavesFrames, Estimator):
         how roughly few days tell it. Call again as days come; `refit` goes on in the same way.
         """
         check_is_fitted(self)
-        retraining = begun_again(self, since, self._activated, until=until)
+        retraining = begun_again(self, since, until=until)
         if retraining.accepted:
             self._take_over(retraining)
         return retraining
@@ -644,8 +841,7 @@ class Monitor(SavesFrames, Estimator):
         """Records in the columns of `fit`, without those that are left out."""
         return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
-    def _checked_times(self) -> tuple[pd.Timedelta, pd.Timedelta]:
-        """``max_delay`` and ``retention``; an error for parameters that contradict each other."""
+    def _check_times(self) -> None:
         max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
         if retention < max_delay + 2 * DAY:
             raise ValueError(
@@ -657,47 +853,27 @@ class Monitor(SavesFrames, Estimator):
                 f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
                 "expected more watches than alarms a year, such as 12 and 1"
             )
-        return max_delay, retention
-
-    def _corrections(self, baseline: pd.DataFrame, reference: list[Any], fem: Any) -> Corrections:
-        options = {"fem": fem, "sensors": self.sensors}
-        return Corrections.of(baseline, self.targets_, reference, self.units_, **options)
-
-    def _activated(
-        self,
-        detector: Any,
-        trained: pd.DataFrame,
-        columns: list[Any] | None = None,
-        corrections: Corrections | None = None,
-    ) -> ActiveDetector:
-        """All by which a detector evaluates that was fitted on some records; by default as the one in charge."""
-        columns = self.active_.columns if columns is None else columns
-        corrections = self.active_.corrections if corrections is None else corrections
-        return ActiveDetector.of(self, detector, trained, columns, corrections)
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        trained, end, corrections, state = retraining.baseline, None, self.active_.corrections, self.history_
+        after, trained, today = copy.copy(self), retraining.baseline, midnight(self.last_)
+        after._take_charge(retraining.detector, trained)
+        after.prior_, after.since_ = retraining.prior, retraining.since
         if retraining.kind == "new baseline":
-            now = self.last_.as_unit("ns").value
-            end, note = now + 10**9, f"ended by the new baseline since {retraining.since}"
-            known = self.events_["acknowledged"]
-            ended = tuple(
-                Acknowledgement(one.kind, one.peak_time, now, True, note)
-                for one, is_known in zip(state.log.events, known, strict=True)
-                if one.end is None and not is_known
-            )
-            state = replace(state, acknowledgements=(*state.acknowledgements, *ended))
+            events = self.events_
+            for _, event in events[events["end"].isna() & ~events["acknowledged"]].iterrows():
+                after._say(
+                    event["kind"], event["peak_time"], True, f"ended by the new baseline since {retraining.since}"
+                )
+            after.restarts_ = (*self.restarts_, today.as_unit("ns").value)
+            raw = pd.concat([self.baseline_, self.records_])[self.reference_]
             T, F = trained.drop(columns=self.targets_), trained[self.targets_]
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now
-            raw = pd.concat([self.baseline_, self.records_]).reindex(trained.index)
-            whole = trained.join(raw[corrections.reference])[list(raw.columns)]
-            corrections = self._corrections(whole, corrections.reference, fem)
-        active = self._activated(retraining.detector, trained, corrections=corrections)
-        self.active_ = replace(active, prior=retraining.prior, since=retraining.since)
-        now = self.last_.as_unit("ns").value
-        taken_over = Transition("refit" if end is None else "rebaseline", now, now, retraining.kind)
-        self.history_ = state.handed_over(self.active_, end).changed_from(state, self.active_, taken_over)
+            after._begin_corrections(trained.join(raw)[list(self.baseline_.columns)], fem)
+        after._decide(today)
+        what = "rebaseline" if retraining.kind == "new baseline" else retraining.kind
+        after._note(self, today, {"what": what, "time": self.last_, "kind": retraining.kind})
+        vars(self).update(vars(after))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
@@ -742,17 +918,42 @@ def _read_baseline(X: pd.DataFrame) -> pd.DataFrame:
     return baseline
 
 
-def _warn_of_not_evaluated(answers: pd.DataFrame) -> None:
+def _news(before: pd.DataFrame, after: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
+    """Evaluations of new records, and of known ones whose evaluation has changed."""
+    answers = after[after.index >= fresh[0]]
+    is_new = answers.index.isin(fresh)
+    old = before.reindex(answers.index)
+    is_same = ((answers == old) | (answers.isna() & old.isna())).all(axis=1).to_numpy()
+    return answers.assign(revised=~is_new & ~is_same)[is_new | ~is_same]
+
+
+def _not_evaluated(answers: pd.DataFrame) -> Iterable[UnevaluatedRowsWarning]:
+    """The finding of new records that are not evaluated."""
     new = answers[~answers["revised"]]
     unknown = new[new["state"] == "not evaluated"]
-    if not len(unknown):
-        return
-    counts = unknown["reason"].value_counts()
-    causes = [f"{n} because {cause}" for cause, n in counts.iloc[:MOST_CAUSES].items()]
-    more = f"; and {counts.iloc[MOST_CAUSES:].sum()} for other reasons" if len(counts) > MOST_CAUSES else ""
-    warn_user(
-        f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: {'; '.join(causes)}"
-        f"{more}",
-        UnevaluatedRowsWarning,
-        "not-evaluated",
-    )
+    if len(unknown):
+        counts = unknown["reason"].value_counts()
+        reasons = [f"{n} because {cause}" for cause, n in counts.iloc[:3].items()]
+        more = f"; and {counts.iloc[3:].sum()} for other reasons" if len(counts) > 3 else ""
+        yield UnevaluatedRowsWarning(
+            f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: "
+            f"{'; '.join(reasons)}{more}",
+            "not-evaluated",
+        )
+
+
+def fault_changes(before: pd.DataFrame, after: pd.DataFrame, newest: pd.Timestamp) -> Iterable[dict[str, Any]]:
+    """Sensors that have failed, in another way than before perhaps, and those that are used again."""
+    for row in range(max(len(before), len(after))):
+        old, new = (table.iloc[row] if row < len(table) else None for table in (before, after))
+        was_open = old is not None and pd.isna(old["until"])
+        if new is None:
+            if was_open:
+                yield {"what": "put back", "time": newest, "kind": old["kind"], "column": str(old["column"])}
+            continue
+        about = {"kind": new["kind"], "column": str(new["column"])}
+        is_open, is_same = pd.isna(new["until"]), old is not None and old["kind"] == new["kind"]
+        if not is_same or (is_open and not was_open):
+            yield {"what": "fault", "time": new["since"], "detail": new["detail"]} | about
+        if not is_open and (was_open or not is_same):
+            yield {"what": "put back", "time": new["until"]} | about

@@ -1,9 +1,9 @@
-"""Records as they come: read, sorted into new, repeated and late ones, kept, and how far back a detector looks."""
+"""Records as they come: read, sorted into new, repeated, late and early ones, and how far back a detector looks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from datetime import timedelta
 from itertools import pairwise
 from typing import Any
@@ -15,21 +15,16 @@ from sklearn.base import BaseEstimator
 from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import as_floats, is_model, refuse_no_table
-from skthermo._core.frames import DAY_NS, YEAR, usual_step
+from skthermo._core.frames import DAY, YEAR, usual_step
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import duration_text
 from skthermo.detection import CompensatedDetector
 from skthermo.preprocessing import HampelFilter
 
-JUMP = pd.Timedelta("28D")  # shortest time between two records from which on a clock may be wrong
-TIMES_LONGEST, TIMES_USUAL = 2, 10  # the same in longest and usual steps of the baseline, if those are longer
 OF_TRAINING = frozenset({"no-rows", "missing-column", "constant"})  # gross errors that do no harm to a few records
-CONFIRMED = 10  # records after a jump that confirm each other
-Path = tuple[tuple[int, int], ...]
-"""Reaches of the steps on one way through a detector, the last step first: (rows, nanoseconds), one of them zero."""
 
 
-def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> pd.DataFrame:
+def read_records(X: Any, columns: list[Any] | None = None, zone: Any = None) -> pd.DataFrame:
     """Records in order of time as floats, in the columns and the time zone of the baseline."""
     if not isinstance(X, pd.DataFrame):
         raise ValueError(f"the records are of type {type(X).__name__}; expected a frame on a DatetimeIndex")
@@ -57,201 +52,157 @@ def read_records(X: Any, columns: pd.Index | None = None, zone: Any = None) -> p
             )
         X = X.loc[:, list(columns)]
     refuse_no_table(X, "the table of records")
-    values = as_floats(X)
     stamps = X.index.as_unit("ns")
     stamps.freq = None  # that of one batch is not that of its parts
-    frame = pd.DataFrame(values, stamps, X.columns)
+    frame = pd.DataFrame(as_floats(X), stamps, X.columns)
     return frame if X.index.is_monotonic_increasing else frame.sort_index(kind="stable")
 
 
 @dataclass(frozen=True)
 class Intake:
-    """What a batch brings: records to evaluate, those that came too late or are stamped too far ahead, and the store.
+    """What a batch brings: ``fresh`` records to evaluate, and others with the reasons why they are not evaluated.
 
-    ``reasons`` say why those of ``too_late`` and ``ahead`` are not evaluated.
+    ``ahead`` are all records that are set aside as stamped too far ahead, ``early`` those of this batch.
     """
 
-    store: RecordStore
     fresh: pd.DataFrame
-    too_late: pd.DataFrame
+    too_late: pd.Series
+    early: pd.Series
     ahead: pd.DataFrame
-    reasons: list[str]
     n_repeated: int
-    n_late: int
-
-
-@dataclass(frozen=True)
-class RecordStore(SavesFrames):
-    """Raw records of the baseline, those that came since for the time of ``retention``, and those set aside.
-
-    A record is set ``ahead`` if it is stamped more than a ``jump`` after the one before it, until it is of the
-    present by the clock of this computer, or others confirm it.
-    """
-
-    baseline: pd.DataFrame
-    kept: pd.DataFrame
-    ahead: pd.DataFrame
-    max_delay: pd.Timedelta
-    jump: pd.Timedelta
-    retention: pd.Timedelta
 
     @classmethod
-    def of(cls, baseline: pd.DataFrame, max_delay: pd.Timedelta, retention: pd.Timedelta) -> RecordStore:
-        """With no record since the baseline; a jump is one that no outage of the baseline explains."""
-        longest = pd.Timedelta(np.diff(baseline.index.asi8).max(initial=0), "ns")
-        jump = max(JUMP, TIMES_LONGEST * longest, TIMES_USUAL * usual_step(baseline.index))
-        nothing = baseline.iloc[:0]
-        return cls(baseline, nothing, nothing, max_delay, jump, retention)
+    def sorted_out(
+        cls,
+        batch: pd.DataFrame,
+        baseline: pd.DataFrame,
+        known: pd.DataFrame,
+        ahead: pd.DataFrame,
+        max_delay: pd.Timedelta,
+        *,
+        are_confirmed: bool = False,
+    ) -> Intake:
+        """Compare a batch with the baseline, the records known since and those set aside.
 
-    @property
-    def last(self) -> pd.Timestamp:
-        return (self.kept if len(self.kept) else self.baseline).index[-1]
-
-    def sort_in(self, batch: pd.DataFrame, are_confirmed: bool = False) -> Intake:
-        """Distinguish new records of a batch from known ones; another value at a known stamp is an error."""
+        A record is set aside if it is stamped farther after the one before it than any outage of the baseline explains,
+        until it is of the present by the clock of this computer, or others confirm it.
+        """
         n_given, again = len(batch), batch.index.duplicated()
         if again.any():
-            self._check_same(batch[again], batch[~again])
+            same_rows(batch[again], batch[~again])
             batch = batch[~again]
-        known = np.zeros(len(batch), dtype=bool)
-        for table in (self.kept, self.baseline, self.ahead):
-            known |= self._check_same(batch, table)
-        batch = batch[~known]
-        is_too_late = (batch.index <= self.baseline.index[-1]) | (batch.index < self.last - self.max_delay)
-        too_late, timely = batch[is_too_late], batch[~is_too_late]
-        timely = pd.concat([timely, self.ahead]).sort_index() if len(self.ahead) else timely
-        n_taken = len(timely) if are_confirmed else self._n_in_time(timely.index)
-        fresh, ahead = timely.iloc[:n_taken], timely.iloc[n_taken:]
-        set_aside = ahead[ahead.index.isin(batch.index)]
-        end, late = self.baseline.index[-1], f"more than {duration_text(self.max_delay)} after newer records"
-        early = f"before the end of the baseline ({end})"
-        reasons = np.where(too_late.index <= end, early, f"came too late, {late}").tolist()
-        newest = max(self.last, fresh.index[-1]) if len(fresh) else self.last
-        reasons += [
-            f"stamped more than {duration_text(self.jump)} after the newest record ({newest}): set aside"
-        ] * len(set_aside)
-        n_late = int((fresh.index < self.last).sum())
-        kept = pd.concat([self.kept, fresh]) if len(self.kept) and len(fresh) else fresh if len(fresh) else self.kept
-        kept = kept if kept.index.is_monotonic_increasing else kept.sort_index()
-        store = replace(self, kept=kept, ahead=ahead)
-        return Intake(store, fresh, too_late, set_aside, reasons, n_given - len(batch), n_late)
+        is_new = ~np.any([same_rows(batch, table) for table in (known, baseline, ahead)], axis=0)
+        batch, n_repeated = batch[is_new], n_given - int(is_new.sum())
+        end, last = baseline.index[-1], (known if len(known) else baseline).index[-1]
+        is_late = (batch.index <= end) | (batch.index < last - max_delay)
+        late = f"came too late, more than {duration_text(max_delay)} after newer records"
+        stamps = batch.index[is_late]
+        too_late = pd.Series(
+            np.where(stamps <= end, f"before the end of the baseline ({end})", late), stamps, dtype=object
+        )
+        timely = pd.concat([batch[~is_late], ahead]).sort_index() if len(ahead) else batch[~is_late]
+        jump = longest_step(baseline)
+        n_taken = len(timely) if are_confirmed else _n_in_time(timely.index, last, jump)
+        fresh, ahead = timely[:n_taken], timely[n_taken:]
+        newest = max(last, fresh.index[-1]) if len(fresh) else last
+        said = f"stamped more than {duration_text(jump)} after the newest record ({newest}): set aside"
+        early = pd.Series(said, ahead.index[ahead.index.isin(batch.index)], dtype=object)
+        return cls(fresh, too_late, early, ahead, n_repeated)
 
-    def jumps(self, stamps: pd.DatetimeIndex) -> bool:
-        """Whether new records, in order of time, are farther apart than a clock that works would have them."""
-        times = np.append(self.last.as_unit("ns").value, stamps.asi8)
-        return bool((np.diff(times) > self.jump.value).any())
 
-    def trimmed(self) -> RecordStore:
-        """The store without records that are too old to be kept."""
-        first = self.kept.index.searchsorted(self.last - self.retention)
-        return replace(self, kept=self.kept.iloc[first:]) if first else self
+def longest_step(baseline: pd.DataFrame) -> pd.Timedelta:
+    """The time between two records from which on a clock may be wrong."""
+    longest = pd.Timedelta(np.diff(baseline.index.asi8).max(initial=0), "ns")
+    return max(pd.Timedelta("28D"), 2 * longest, 10 * usual_step(baseline.index))
 
-    def _n_in_time(self, stamps: pd.DatetimeIndex) -> int:
-        """How many records, in order of time, are not too far ahead.
 
-        After a jump, those up to the next one are taken in if they reach the present, or if they are enough to confirm
-        each other and are not in the future: a logger may have been silent for months. Where earlier records were in
-        the future already, as in a simulation, the clock says nothing, and only a year or more is a jump.
-        """
-        times, last = stamps.asi8, self.last.as_unit("ns").value
-        now = pd.Timestamp.now("UTC").as_unit("ns").value + DAY_NS  # stamps without a time zone are local
-        is_live = last <= now
-        jump = self.jump.value if is_live else max(self.jump.value, YEAR.value)
-        before = np.maximum.accumulate(np.append(last, times[:-1]))
-        for start, stop in pairwise([*np.flatnonzero(times - before > jump), len(times)]):
-            newest = times[stop - 1]
-            is_present = is_live and now - jump <= newest <= now
-            if (is_live and newest > now) or (not is_present and stop - start < CONFIRMED):
-                return int(start)
-        return len(times)
+def _n_in_time(stamps: pd.DatetimeIndex, last: pd.Timestamp, jump: pd.Timedelta) -> int:
+    """How many new records, in order of time, are not too far ahead of the last one.
 
-    def _check_same(self, batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:
-        """Which rows of a batch stand in a table; an error if some have other values there."""
-        if not len(batch) or not len(table) or batch.index[-1] < table.index[0] or batch.index[0] > table.index[-1]:
-            return np.zeros(len(batch), dtype=bool)
-        wanted, stamps = batch.index.asi8, table.index.asi8
-        place = np.minimum(np.searchsorted(stamps, wanted), len(stamps) - 1)
-        known = stamps[place] == wanted
-        new, old = batch.to_numpy()[known], table.to_numpy()[place[known]]
-        differs = ~((new == old) | (np.isnan(new) & np.isnan(old)))
-        if differs.any():
-            row, column = np.argwhere(differs)[0]
-            raise ValueError(
-                f"{differs.any(axis=1).sum()} of {known.sum()} repeated records have other values than before, the "
-                f"first {batch.index[known][row]}: {batch.columns[column]!r} is {new[row, column]:.10g}, and was "
-                f"{old[row, column]:.10g}; expected each stamp once, or with the same values"
-            )
+    After a jump, those up to the next one are taken in if they reach the present, or if they are ten or more, which
+    confirm each other, and not in the future: a logger may have been silent for months. Where earlier records were in
+    the future already, as in a simulation, the clock says nothing, and only a year or more is a jump.
+    """
+    now = pd.Timestamp.now("UTC").tz_convert(None if last.tz is None else last.tz)
+    now += DAY  # stamps without a time zone are local
+    is_live = last <= now
+    jump = jump if is_live else max(jump, YEAR)
+    before = np.maximum.accumulate(np.append(last.as_unit("ns").value, stamps.asi8[:-1]))
+    for start, stop in pairwise([*np.flatnonzero(stamps.asi8 - before > jump.value), len(stamps)]):
+        newest = stamps[stop - 1]
+        is_present = is_live and now - jump <= newest <= now
+        if (is_live and newest > now) or (not is_present and stop - start < 10):
+            return int(start)
+    return len(stamps)
+
+
+def same_rows(batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:
+    """Which rows of a batch stand in a table; an error if some have other values there."""
+    known = batch.index.isin(table.index)
+    if not known.any():
         return known
+    new, old = batch.to_numpy()[known], table.to_numpy()[table.index.get_indexer(batch.index[known])]
+    differs = ~((new == old) | (np.isnan(new) & np.isnan(old)))
+    if differs.any():
+        row, column = np.argwhere(differs)[0]
+        raise ValueError(
+            f"{differs.any(axis=1).sum()} of {known.sum()} repeated records have other values than before, the "
+            f"first {batch.index[known][row]}: {batch.columns[column]!r} is {new[row, column]:.10g}, and was "
+            f"{old[row, column]:.10g}; expected each stamp once, or with the same values"
+        )
+    return known
 
 
 @dataclass(frozen=True)
-class Memory:
-    """Which earlier records the evaluation of a record needs, on all ways from its records to its damage index."""
+class Lookback(SavesFrames):
+    """How far before a record a detector looks: so many records, and from there on a time."""
 
-    paths: tuple[Path, ...]
-
-    @classmethod
-    def of(cls, detector: Any) -> Memory:
-        """That of a fitted detector by ``lookback_`` of its parts: those in a row add up, of several ways all count."""
-        return cls(tuple(sorted(_paths(detector, set()))))
+    rows: int
+    time: pd.Timedelta
 
     @classmethod
-    def of_time(cls, duration: pd.Timedelta) -> Memory:
-        return cls((((0, duration.value),),))
+    def learned(cls, detector: Any) -> Lookback:
+        """From ``lookback_`` of a fitted detector's parts: those in a row add up, else the largest counts."""
+        rows, nanoseconds = _reach(detector)
+        return cls(rows, pd.Timedelta(nanoseconds, "ns"))
 
     def start(self, times: NDArray[np.int64], place: int, time: int | None = None) -> int:
         """Position of the earliest record that is needed for the one at a position, or at a time before it."""
-        earliest = place
-        for path in self.paths:
-            at, moment = place, time
-            for rows, duration in path:
-                if rows:
-                    at = max(at - rows, 0)
-                else:
-                    at = int(np.searchsorted(times[:at], (times[at] if moment is None else moment) - duration))
-                moment = None
-            earliest = min(earliest, at)
-        return earliest
+        first = max(place - self.rows, 0)
+        moment = times[first] if time is None or first < place else time
+        earliest = int(np.searchsorted(times[:place], moment - self.time.value))
+        return max(min(first, earliest) - self.rows * bool(self.time), 0)
 
     def duration(self, step: pd.Timedelta) -> pd.Timedelta:
-        """The longest of all ways in time, of records that are so far apart."""
-        return max(
-            sum((n * step + pd.Timedelta(time, "ns") for n, time in path), pd.Timedelta(0)) for path in self.paths
-        )
+        """The reach as a time, of records that are so far apart."""
+        return self.rows * step + self.time
 
     def __str__(self) -> str:
-        """The reaches in words, such as "30 h" or "24 records and 30 h"."""
-        rows, time = (max(sum(reach[part] for reach in path) for path in self.paths) for part in (0, 1))
-        words = [f"{rows} records"] if rows else []
-        words += [f"{time / 3.6e12:.3g} h"] if time else []
+        """In words, such as "30 h" or "24 records and 30 h"."""
+        words = [f"{self.rows} records"] if self.rows else []
+        words += [f"{self.time / pd.Timedelta('1h'):.3g} h"] if self.time else []
         return " and ".join(words) or "nothing"
 
 
-def _paths(part: Any, seen: set[int]) -> set[Path]:
-    """Ways through a fitted part, each with the reaches on it."""
-    if id(part) in seen:
-        return {()}
-    if isinstance(part, CompensatedDetector):
-        before = _paths(part.compensator_, seen)
-        return {way + more for way in _paths(part.means_, seen) for more in before}
-    if isinstance(part, Pipeline):
-        ways: set[Path] = {()}
-        for _, step in reversed(part.steps):
-            ways = {way + more for way in ways for more in _paths(step, seen)}
-        return ways
-    seen = seen | {id(part)}
+def _reach(part: Any, above: tuple[Any, ...] = ()) -> tuple[int, int]:
+    """Records and nanoseconds that a fitted part looks back."""
+    if any(part is one for one in above):
+        return 0, 0
     if isinstance(part, HampelFilter):
         raise ValueError(
             f"the detector holds {part!r:.100}, which compares records with later ones; expected steps that look back "
             "only: filter the baseline before fit"
         )
-    if hasattr(part, "lookback_"):
-        lookback = part.lookback_
-        is_time = isinstance(lookback, np.timedelta64 | timedelta)
-        reach = (0, pd.Timedelta(lookback).as_unit("ns").value) if is_time else (int(lookback), 0)
-        return {(reach,)} if any(reach) else {()}
-    found = set().union(*(_paths(inner, seen) for inner in _inner(part)))
-    return found or {()}
+    if hasattr(part, "lookback_") and not isinstance(part, CompensatedDetector):
+        is_time = isinstance(part.lookback_, np.timedelta64 | timedelta)
+        return (0, pd.Timedelta(part.lookback_).as_unit("ns").value) if is_time else (int(part.lookback_), 0)
+    above = (*above, part)
+    if isinstance(part, Pipeline | CompensatedDetector):
+        steps = (part.compensator_, part.means_) if isinstance(part, CompensatedDetector) else dict(part.steps).values()
+        inner = [_reach(step, above) for step in steps]
+        return sum(rows for rows, _ in inner), sum(time for _, time in inner)
+    inner = [_reach(one, above) for one in _inner(part)]
+    return max((rows for rows, _ in inner), default=0), max((time for _, time in inner), default=0)
 
 
 def _inner(part: Any) -> Iterator[Any]:

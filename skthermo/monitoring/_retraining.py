@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,12 +12,12 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 
 from skthermo._core.arrays import Array
-from skthermo._core.frames import DAY, YEAR, check_stamp, correlation_time, usual_step
+from skthermo._core.estimators import last_step
+from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correlation_time, usual_step
 from skthermo._core.text import capital, counted
 from skthermo._core.warnings import without_warnings
-from skthermo.monitoring._active import ActiveDetector
 from skthermo.monitoring._events import WATCH
-from skthermo.monitoring._records import Memory
+from skthermo.monitoring._records import Lookback
 from skthermo.monitoring._shift import ShiftsTried, WeatherFree, block_mean
 from skthermo.monitoring._threshold import WEEK, blocks_of, crossing, levels, lowered, whole_weeks
 from skthermo.residuals.weather import BEYOND, TrainingRange
@@ -25,8 +25,6 @@ from skthermo.residuals.weather import BEYOND, TrainingRange
 MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
 FEWEST_WEEKS = 3  # of new records, from which a comparison has standard errors
 
-Activated = Callable[[BaseEstimator, pd.DataFrame], ActiveDetector]
-"""A detector that was fitted on some records, with the threshold of its monitor."""
 MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
 STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
 CLEAR = 3.0  # standard errors from which a difference is one
@@ -130,23 +128,21 @@ class Retraining:
         return "\n".join(lines)
 
 
-def retrained(
-    monitor: Any, records: pd.DataFrame | None, activated: Activated, *, until: Any = None, force: bool = False
-) -> Retraining:
+def retrained(monitor: Any, records: pd.DataFrame | None, *, until: Any = None, force: bool = False) -> Retraining:
     """A detector that has learned from the baseline and what came since, compared with the one in charge."""
     kept, margin = _until(_kept(monitor, records), until), margin_of(monitor.lookback_, monitor.trained_)
     harvest = Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
     refused = _too_few(harvest.records)
     if refused:
         return _none("refit", refused, harvest.excluded)
-    old, targets = monitor.active_, list(monitor.targets_)
+    old, targets = monitor, list(monitor.targets_)
     prior, since = monitor.prior_, monitor.since_
-    baseline = pd.concat([old.trained, harvest.records])
+    baseline = pd.concat([old.trained_, harvest.records])
     if prior is not None:
         own = baseline[baseline.index >= since]
         _, moved = _at_new_level(monitor, prior, own)
         baseline, prior = pd.concat([moved, own]), prior if len(moved) else None
-    new = _candidate(monitor, baseline, activated)
+    new = _candidate(monitor, baseline)
     free = WeatherFree.of(monitor.detector_, baseline, targets)
     changes = _changes(free, baseline, monitor, harvest.records.index[0])
     spread = free.residuals.std() * free.scale
@@ -157,25 +153,25 @@ def retrained(
     ]
     notes, shift = changes.notes(), changes.table((baseline.index[-1] - baseline.index[0]) / YEAR)
     accepted = force or not reasons
-    learned = {"baseline": baseline, "prior": prior, "since": since, "detector": new.detector, "shift": shift}
+    learned = {"baseline": baseline, "prior": prior, "since": since, "detector": new.detector_, "shift": shift}
     return Retraining("refit", accepted, tuple(reasons), tuple(notes), table, harvest.excluded, **learned)
 
 
-def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = None) -> Retraining:
+def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
     since = check_stamp(since, monitor.trained_.index, "since")
-    old, targets, prior = monitor.active_, list(monitor.targets_), monitor.prior_
+    old, targets, prior = monitor, list(monitor.targets_), monitor.prior_
     first = since if monitor.since_ is None else max(since, monitor.since_)
     if monitor.since_ is None or since > monitor.since_:  # what is now the baseline is that before the intervention
-        prior = old.trained
+        prior = old.trained_
     if prior is None:
         raise ValueError(f"the baseline since {monitor.since_} needs no older records any more; expected refit")
     prior = prior[prior.index < since]
     if not len(prior):
-        raise ValueError(f"since is {since}, but the baseline begins at {old.trained.index[0]}; expected a later time")
+        raise ValueError(f"since is {since}, but the baseline begins at {old.trained_.index[0]}; expected a later time")
     events = monitor.events_
     damage = events[events["acknowledged"] & ~events["harmless"] & (events["start"] >= since)]
-    trained, kept = old.trained[old.trained.index >= first], monitor.corrected_
+    trained, kept = old.trained_[old.trained_.index >= first], monitor.corrected_
     known = pd.concat([trained, kept[~kept.index.isin(trained.index)]]).sort_index()
     harvest = Harvest.of(_until(known[known.index >= since], until), damage, monitor.faults_, are_put_back=True)
     own = harvest.records
@@ -184,9 +180,9 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
         return _none("new baseline", f"fewer than two records of {', '.join(missing)} since {since}", harvest.excluded)
     level, moved = _at_new_level(monitor, prior, own)
     baseline = pd.concat([moved, own])
-    new = _candidate(monitor, baseline, activated)
+    new = _candidate(monitor, baseline)
     spread = level.old.residuals.std() * level.old.scale
-    found = [smallest_changes(one, one.trained, targets, spread)[:, -1] for one in (old, new)]
+    found = [smallest_changes(one, one.trained_, targets, spread)[:, -1] for one in (old, new)]
     table = level.table.assign(old=found[0], new=found[1])
     notes = [
         f"{counted(level.span.days, 'day')} and {counted(len(own), 'record')} since {since:%Y-%m-%d %H:%M}; "
@@ -194,14 +190,16 @@ def begun_again(monitor: Any, since: Any, activated: Activated, *, until: Any = 
     ]
     ratio = float(np.exp(np.nanmean(np.log(found[1] / found[0])))) if np.isfinite(found).any() else np.nan
     notes.append(f"the smallest detected change is {ratio:.2f} times that with the baseline before")
-    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since, "detector": new.detector}
+    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since, "detector": new.detector_}
     return Retraining("new baseline", True, (), tuple(notes), table, harvest.excluded, **learned)
 
 
 def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
     """Given records, or those that the monitor keeps as its detector saw them, that are not in the baseline."""
     if records is None:
-        records = monitor.corrected_
+        records = monitor.corrected_[
+            monitor.corrected_.index >= monitor.last_ - check_duration(monitor.retention, "retention")
+        ]
     records = records[list(monitor.trained_.columns)].sort_index()
     known = records.index.isin(monitor.trained_.index)
     return records[~known if monitor.since_ is None else ~known & (records.index >= monitor.since_)]
@@ -226,9 +224,9 @@ def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
     return Retraining(kind, False, (reason,), (), pd.DataFrame(), excluded)
 
 
-def _candidate(monitor: Any, baseline: pd.DataFrame, activated: Activated) -> ActiveDetector:
+def _candidate(monitor: Any, baseline: pd.DataFrame) -> Any:
     with without_warnings():
-        return activated(clone(monitor.detector_).fit(baseline[list(monitor.detector_.feature_names_in_)]), baseline)
+        return monitor._with(clone(monitor.detector_).fit(baseline[monitor.features_]), baseline)
 
 
 def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> ShiftsTried:
@@ -304,7 +302,7 @@ def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, An
         yield event.start - margin, event.end, f"event {number} ({event.kind}), {state}{still}"
 
 
-def margin_of(memory: Memory, records: pd.DataFrame) -> pd.Timedelta:
+def margin_of(memory: Lookback, records: pd.DataFrame) -> pd.Timedelta:
     """How long before an event's first alarm records do not train: a week, or as long as the detector looks back."""
     return max(MARGIN, memory.duration(usual_step(records.index)))
 
@@ -384,8 +382,8 @@ def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
 
 
 def comparison(
-    old: ActiveDetector,
-    new: ActiveDetector,
+    old: Any,
+    new: Any,
     overlap: pd.DataFrame,
     targets: list[Any],
     spread: pd.Series,
@@ -399,10 +397,11 @@ def comparison(
     responses, weather taken out, in their units.
     """
     blocks = blocks_of(overlap.index)
-    rates = [old.ratio(overlap), new.own_ratio(overlap.index)]
-    persistence = old.estimate.rule.persistence
+    own = pd.Series(last_step(new.detector_).baseline_index_, new.trained_.index)
+    rates = [_ratio(old, overlap), (own / new.threshold_).reindex(overlap.index).to_numpy()]
+    persistence = old.persistence
     rows = {
-        FALSE: _compared(*(_above(levels(one, persistence)[0]) for one in rates), blocks),
+        FALSE: _compared(*(_above(levels(one, persistence)) for one in rates), blocks),
         "median index over threshold": _medians(*rates),
         **dict(_rows_of_changes(*(smallest_changes(one, overlap, targets, spread) for one in (old, new)), targets)),
         "records in unknown weather": _unknown(old, new, overlap, targets),
@@ -420,6 +419,10 @@ def worse_measures(table: pd.DataFrame) -> list[str]:
     return [name for name in table.index[table["worse"]] if not (name == SMALLEST and has_fewer_false)]
 
 
+def _ratio(monitor: Any, records: pd.DataFrame) -> Array:
+    return monitor._index(records) / monitor.threshold_
+
+
 def _above(ratio: Array) -> Array:
     return np.where(np.isnan(ratio), np.nan, (ratio > 1).astype(float))
 
@@ -435,18 +438,18 @@ def _medians(old: Array, new: Array) -> list[Any]:
     return [*medians, medians[1] - medians[0], np.nan, False]
 
 
-def smallest_changes(active: ActiveDetector, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
+def smallest_changes(active: Any, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
     """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
 
     For each week and, last, for all records, (n_modes, n_weeks + 1); at most some number of whole weeks are taken.
     """
     records = whole_weeks(records, MOST_PROBED)
     blocks = blocks_of(records.index)
-    found, start = np.full((len(targets), blocks.max() + 2), np.nan), active.ratio(records)
+    found, start = np.full((len(targets), blocks.max() + 2), np.nan), _ratio(active, records)
     for mode, target in enumerate(targets):
         fallen = (lowered(records, {target: step * spread[target]}) for step in STEPS[1:])
         steps = np.array(STEPS) * (spread[target] / (records[target].mean() if records[target].min() > 0 else 1.0))
-        ratios = [active.ratio(one) for one in fallen]
+        ratios = [_ratio(active, one) for one in fallen]
         curve = np.array([start, *ratios])
         found[mode, -1] = _crossing(steps, curve)
         for block in range(blocks.max() + 1):
@@ -475,22 +478,20 @@ def _crossing(steps: Array, curve: Array) -> float:
     return crossing(steps, np.median(curve, axis=1)) if curve.size else np.nan
 
 
-def _unknown(old: ActiveDetector, new: ActiveDetector, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:
+def _unknown(old: Any, new: Any, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:
     """Shares of records outside the weather of each baseline."""
     weather = [name for name in overlap.columns if name not in targets]
     if not weather:
         return [0.0, 0.0, 0.0, np.nan, False]
     shares = []
     for active in (old, new):
-        known = TrainingRange.spanned(active.trained[weather], np.ones(len(active.trained), dtype=bool))
+        known = TrainingRange.spanned(active.trained_[weather], np.ones(len(active.trained_), dtype=bool))
         shares.append(float((np.nan_to_num(known.excess(overlap[weather])) > BEYOND).any(axis=1).mean()))
     return [*shares, shares[1] - shares[0], np.nan, shares[1] > shares[0]]
 
 
-def _found(
-    old: ActiveDetector, new: ActiveDetector, events: dict[Any, pd.DataFrame]
-) -> Iterator[tuple[str, list[Any]]]:
+def _found(old: Any, new: Any, events: dict[Any, pd.DataFrame]) -> Iterator[tuple[str, list[Any]]]:
     """Peaks of past events over the threshold: what was found has to be found again."""
     for number, records in events.items():
-        peaks = [float(np.nanmax(active.ratio(records), initial=0.0)) for active in (old, new)]
+        peaks = [float(np.nanmax(_ratio(active, records), initial=0.0)) for active in (old, new)]
         yield f"event {number}, peak over threshold", [*peaks, peaks[1] - peaks[0], np.nan, peaks[1] <= 1 < peaks[0]]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, as_floats, median, robust_deviation
 from skthermo._core.frames import DAY, DAY_NS, YEAR, as_index, columns_by_sensor, frame_like
-from skthermo.preprocessing.checks import equal_runs
+from skthermo.preprocessing.checks import Plausible, equal_runs
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.gaussian import Gaussian
 
@@ -302,6 +302,7 @@ class SensorWatch:
     modes: list[Hashable]
     units: list[str]
     zone: str
+    weather: Plausible
     runs: Counts
     least: float
     span: int
@@ -343,6 +344,7 @@ class SensorWatch:
             list(F.columns),
             texts,
             "" if stamps.tz is None else str(stamps.tz),
+            Plausible.of_weather(temperatures),
             runs,
             least,
             40 + int(np.ceil(runs.max(initial=0) / per_day)),
@@ -380,17 +382,19 @@ class SensorWatch:
         """
         n_sensors, own = len(self.sensors), [columns[0] for columns in self.columns]
         temperatures, responses = as_floats(T).copy(), state.in_place(as_floats(F), n_sensors)
-        rest, expected = self.expected.residuals(temperatures[:, own], responses)
-        far, given = self.expected.implausible(responses, rest), np.hstack([temperatures[:, own], responses])
+        given = np.hstack([temperatures[:, own], responses])
+        is_far, _, expected = self._evaluated(given)
+        far = is_far[:, n_sensors:]
         out = np.isin(np.arange(given.shape[1]), list(state.left_out()))
-        removed = (np.hstack([np.zeros((len(far), n_sensors), dtype=bool), far]) | out) & ~np.isnan(given)
+        removed = (is_far | out) & ~np.isnan(given)
         held, moments = far.copy(), T.index.as_unit("ns").asi8
         for column, fault in state.left_out().items():
             if column >= n_sensors and fault.kind in ("stuck", "implausible"):
                 said = [time for time in acknowledged if time >= fault.since]
                 held[:, column - n_sensors] = moments <= min(said) if said else True
-        notes = self._notes(state, responses, far & ~out[n_sensors:], expected)
+        notes = self._notes(state, given, is_far & ~out, expected)
         for sensor, columns in enumerate(self.columns):
+            temperatures[removed[:, sensor], columns[0]] = np.nan
             if out[sensor]:
                 temperatures[:, columns] = np.nan
         if self.is_reference.any():
@@ -421,13 +425,21 @@ class SensorWatch:
             return state
         return self._with_departures(self._without_ended(state))
 
+    def _evaluated(self, values: Array) -> tuple[Mask, Array, Array]:
+        """Which values are implausible, responses minus the expected ones, and the expected ones."""
+        n_sensors = len(self.sensors)
+        temperatures, responses = values[:, :n_sensors], values[:, n_sensors:]
+        impossible = self.weather.implausible(temperatures)
+        rest, expected = self.expected.residuals(np.where(impossible, np.nan, temperatures), responses)
+        return np.hstack([impossible, self.expected.implausible(responses, rest)]), rest, expected
+
     def _with_exchanges(self, state: WatchState) -> WatchState:
         """Modes that are exchanged from now on, or no longer."""
         n_sensors, recent = len(self.sensors), state.days > state.days[-1] - 5
         recent &= state.stamps >= max((one.detected for one in state.faults if one.kind == "swapped"), default=0)
         values = state.values[recent]
-        rest, expected = self.expected.residuals(
-            values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)
+        _, rest, expected = self._evaluated(
+            np.hstack([values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)])
         )
         for first, second, day in self.expected.exchanged(rest, expected, state.days[recent]):
             pair, since = {n_sensors + first, n_sensors + second}, self._midnight(day)
@@ -445,12 +457,9 @@ class SensorWatch:
         told = ~np.isnan(state.values).all(axis=1)  # records without any value tell nothing of a single column
         values, stamps, today = state.values[told], state.stamps[told], self._midnight(state.days[-1])
         values = np.hstack([values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)])
-        far = self.expected.implausible(
-            values[:, n_sensors:], self.expected.residuals(values[:, :n_sensors], values[:, n_sensors:])[0]
-        )
+        far = self._evaluated(values)[0]
         for column, series in enumerate(values.T):
-            is_far = far[:, column - n_sensors] if column >= n_sensors else np.zeros(len(series), dtype=bool)
-            kind, since, size = self._run(series, is_far, self.runs[:, column])
+            kind, since, size = self._run(series, far[:, column], self.runs[:, column])
             fault = out.get(column)
             known = fault.kind if fault is not None and fault.kind in ("dead", "stuck", "implausible") else None
             if known == kind:
@@ -478,6 +487,7 @@ class SensorWatch:
     def _departures(self, state: WatchState, trusted: Mask) -> tuple[Counts, Array]:
         """Days, and departures of all thermometers from what the trusted ones predict, without values of other faults."""
         temperatures = state.values[:, : len(self.sensors)].copy()
+        temperatures[self.weather.implausible(temperatures)] = np.nan
         for fault in state.faults:
             if fault.column < len(self.sensors) and (fault.until is not None or fault.kind not in ("offset", "drift")):
                 until = np.inf if fault.until is None else fault.until
@@ -499,13 +509,13 @@ class SensorWatch:
         """The thermometer that departs from the others, if without it, and without no other one, none does."""
         trusted = self._trusted(state)
         days, rest = self._departures(state, trusted)
-        far = self._far(rest, trusted)
+        far = self._excess(rest, trusted)
         if not (far > 1).any():
             return state
         resolved = []
         for sensor in np.flatnonzero((far > 1) & ~self.is_reference):
             others = trusted & (np.arange(len(trusted)) != sensor)
-            if not (self._far(self._departures(state, others)[1], others) > 1).any():
+            if not (self._excess(self._departures(state, others)[1], others) > 1).any():
                 resolved.append(int(sensor))
         if len(resolved) != 1 or 2 * (1 + len(state.lasting("offset", "drift"))) > len(self.sensors):
             return state
@@ -515,14 +525,14 @@ class SensorWatch:
         kind = "drift" if rate else "offset"
         return state.opened(Fault(kind, resolved[0], self._midnight(since), today, size=size, rate=rate))
 
-    def _far(self, rest: Array, trusted: Mask) -> Array:
+    def _excess(self, rest: Array, trusted: Mask) -> Array:
         """The largest median departure of each trusted thermometer over its limit."""
         return np.where(trusted, np.nan_to_num(np.abs(windows(rest)) / self.thermometers.limits).max(axis=0), 0.0)
 
     def _trusted(self, state: WatchState) -> Mask:
         return ~np.isin(np.arange(len(self.sensors)), list(state.left_out()))
 
-    def _notes(self, state: WatchState, responses: Array, far: Mask, expected: Array) -> list[str]:
+    def _notes(self, state: WatchState, given: Array, far: Mask, expected: Array) -> list[str]:
         """What was left out of each record, and why."""
         names, n_sensors = [str(name) for name in (*self.sensors, *self.modes)], len(self.sensors)
         lasting = [
@@ -531,11 +541,16 @@ class SensorWatch:
             else f"{names[fault.column]} is left out ({fault.kind} since {as_index([fault.since], self.zone)[0]:%Y-%m-%d})"
             for fault in (*state.left_out().values(), *state.lasting("swapped"))
         ]
-        notes = ["; ".join(lasting)] * len(responses)
+        notes = ["; ".join(lasting)] * len(given)
         for row in np.flatnonzero(far.any(axis=1)):
             parts = [
-                f"{names[n_sensors + k]} is {quantity(responses[row, k], self.units[n_sensors + k])}, expected about "
-                f"{quantity(expected[row, k], self.units[n_sensors + k])}: implausible, left out"
+                f"{names[k]} is {quantity(given[row, k], self.units[k])}"
+                + (
+                    f", expected about {quantity(expected[row, k - n_sensors], self.units[k])}"
+                    if k >= n_sensors
+                    else ""
+                )
+                + ": implausible, left out"
                 for k in np.flatnonzero(far[row])
             ]
             notes[row] = "; ".join([*parts, *lasting])

@@ -11,12 +11,8 @@ import pandas as pd
 
 from skthermo._core.frames import DAY, as_moment, check_duration, usual_step
 from skthermo._core.text import counted, counted_number, duration_text, plain, probability_text
-from skthermo.monitoring._events import WATCH
+from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH
 
-LATE = 2 * DAY  # beyond the usual step, after which a record is missed
-AHEAD = DAY  # after now, beyond which the stamp of the newest record is wrong
-MOST_EVENTS = 5  # in a summary, the latest ones
-MOST_FAULTS = 3  # of the baseline, in a summary
 FAULT = ("column", "kind", "since", "detail")
 
 
@@ -58,7 +54,7 @@ class RecordTimes:
     @property
     def is_ahead(self) -> bool:
         """Whether the newest record is of a time to come, by more than a day."""
-        return self.age is not None and self.age < -AHEAD
+        return self.age is not None and self.age < -DAY
 
     def __str__(self) -> str:
         if self.counts is None:
@@ -189,7 +185,7 @@ class MonitorStatus:
         if last is None:
             return replace(self, now=as_moment(now, None))
         now = as_moment(now, last.tz)
-        limit = (records.step or DAY) + LATE if max_age is None else check_duration(max_age, "max_age")
+        limit = (records.step or DAY) + 2 * DAY if max_age is None else check_duration(max_age, "max_age")
         records = replace(records, age=now - last, max_age=limit)
         status = replace(self, now=now, records=records)
         if records.newest is None:
@@ -223,16 +219,26 @@ class MonitorStatus:
         return {name: plain(value) for name, value in flat.items() if name not in ("records", "levels")}
 
 
+def state_of(events: pd.DataFrame, evaluations: pd.DataFrame) -> str:
+    """How the structure is by its open events, else by the newest record."""
+    is_open = events["end"].isna()
+    kinds = set(events["kind"][is_open & ~(events["harmless"] & (events["kind"] == MEASUREMENT))])
+    if kinds & {DAMAGE, MEASUREMENT}:
+        return "alarm"
+    newest = evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
+    return "watch" if WATCH in kinds else "not evaluated" if newest == "alarm" else newest
+
+
 def status_of(monitor: Any) -> MonitorStatus:
     """The status of a fitted monitor by its records alone, whatever the time is."""
-    evaluations, baseline = monitor.evaluations_, monitor.baseline_.index
-    known = evaluations[evaluations["state"] != "not evaluated"]
+    evaluations, events, baseline = monitor.evaluations_, monitor.events_, monitor.baseline_.index
+    known, faults = evaluations[evaluations["state"] != "not evaluated"], monitor.faults_
     return MonitorStatus(
-        state=monitor.history_.state,
+        state=state_of(events, evaluations),
         reason=str(evaluations["reason"].iloc[-1]) if len(evaluations) else "",
         records=RecordTimes(
             baseline_end=baseline[-1],
-            newest=monitor.last_ if len(monitor.days_) else None,
+            newest=monitor.last_ if len(evaluations) else None,
             evaluated=known.index[-1] if len(known) else None,
             step=usual_step(baseline.append(evaluations.index)) or DAY,
             counts=dict(monitor.counts_),
@@ -241,43 +247,35 @@ def status_of(monitor: Any) -> MonitorStatus:
         levels=AlarmLevels(
             threshold=float(monitor.threshold_),
             clear_threshold=float(monitor.clear_threshold_),
-            watch_threshold=_number(monitor.watch_threshold_),
+            watch_threshold=monitor.watch_threshold_,
             false_alarms_per_year=float(monitor.false_alarms_per_year),
-            watch_per_year=_number(monitor.watch_per_year),
+            watch_per_year=None if monitor.watch_per_year is None else float(monitor.watch_per_year),
             smallest_change=monitor.smallest_changes_.as_dict(),
         ),
-        events=tuple(_open_events(monitor.events_)),
-        faults=tuple(_lasting_faults(monitor.faults_)),
+        events=tuple(
+            {
+                "event": int(number),
+                "kind": event["kind"],
+                "since": event["start"],
+                "peak": float(event["peak"]),
+                "modes": [mode for mode in event["modes"].split(", ") if mode],
+                "groups": [group for group in event["groups"].split(", ") if group],
+                "acknowledged": bool(event["acknowledged"]),
+            }
+            for number, event in events[events["end"].isna()].iterrows()
+        ),
+        faults=tuple(
+            {name: fault[name] if name == "since" else str(fault[name]) for name in FAULT}
+            for _, fault in faults[faults["until"].isna()].iterrows()
+        ),
         transition=len(monitor.transitions()),
     )
 
 
-def _number(value: Any) -> float | None:
-    return None if value is None else float(value)
-
-
-def _open_events(events: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    for number, event in events[events["end"].isna()].iterrows():
-        yield {
-            "event": int(number),
-            "kind": event["kind"],
-            "since": event["start"],
-            "peak": float(event["peak"]),
-            "modes": [mode for mode in event["modes"].split(", ") if mode],
-            "groups": [group for group in event["groups"].split(", ") if group],
-            "acknowledged": bool(event["acknowledged"]),
-        }
-
-
-def _lasting_faults(faults: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    for _, fault in faults[faults["until"].isna()].iterrows():
-        yield {name: fault[name] if name == "since" else str(fault[name]) for name in FAULT}
-
-
 def summary_lines(monitor: Any) -> Iterator[str]:
     """State, records, events, sensors and drift of a fitted monitor."""
-    evaluations, events, status = monitor.evaluations_, monitor.events_, status_of(monitor)
-    newest = [f"newest record {monitor.last_}", status.reason] if len(evaluations) else []
+    events, status = monitor.events_, status_of(monitor)
+    newest = [f"newest record {monitor.last_}", status.reason] if status.records.newest is not None else []
     yield f"state: {status.state} ({'; '.join(filter(None, newest)) or 'no record since the baseline'})"
     yield f"records: {status.records}"
     yield (
@@ -287,53 +285,46 @@ def summary_lines(monitor: Any) -> Iterator[str]:
     yield f"expected: {monitor.false_alarm_estimate_}"
     is_watch = events["kind"] == WATCH
     if monitor.watch_threshold_ is not None:
-        yield f"watch: {'; '.join(_of_watch(monitor, events[is_watch]))}"
+        since = [
+            f"event {n} is open since {one}" for n, one in events["start"][is_watch & events["end"].isna()].items()
+        ]
+        expected = f"{counted_number(monitor.watch_per_year, 'false one')} a year expected"
+        parts = [f"opens above {monitor.watch_threshold_:.4g}", expected, f"{is_watch.sum()} so far", *since]
+        yield f"watch: {'; '.join(parts)}"
     yield f"smallest change: {monitor.smallest_changes_} in weather of the baseline"
     yield from _of_events(events[~is_watch])
     aside = monitor.set_aside_
     if len(aside):
-        values, details = counted(int(aside["n_rows"].sum()), "value"), "; ".join(aside["detail"].head(MOST_FAULTS))
+        values, details = counted(int(aside["n_rows"].sum()), "value"), "; ".join(aside["detail"].head(3))
         yield f"baseline: {values} set aside, as no measurement can be so: {details}"
-    faults = monitor.faults_
-    for _, fault in faults[faults["until"].isna()].iterrows():
+    for fault in status.faults:
         yield f"sensor: {fault['column']} {fault['kind']} since {fault['since']}"
     if monitor.drift_ is not None:
-        yield from _of_drift(monitor.drift_, monitor.history_.corrections.drift.n_left_out)
+        yield from _of_drift(monitor.drift_)
 
 
-def _of_watch(monitor: Any, events: pd.DataFrame) -> Iterator[str]:
-    yield f"opens above {monitor.watch_threshold_:.4g}"
-    yield f"{counted_number(monitor.watch_per_year, 'false one')} a year expected"
-    yield f"{len(events)} so far"
-    for number, event in events[events["end"].isna()].iterrows():
-        yield f"event {number} is open since {event['start']}"
-
-
-def _of_events(events: pd.DataFrame) -> Iterator[str]:
+def _of_events(events: pd.DataFrame, most: int = 5) -> Iterator[str]:
     """A line for each of the latest events, and one for those that nobody has acknowledged."""
     if not len(events):
         yield "events: none"
         return
-    n_earlier = max(len(events) - MOST_EVENTS, 0)
-    for number, event in events.iloc[n_earlier:].iterrows():
+    for number, event in events.iloc[-most:].iterrows():
         until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
         said = f", acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
         note = f" ({event['note']})" if event["note"] else ""
         peak = f"peak {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode named'}"
         peak += f", explained by a loss of stiffness of {event['groups']}" if event["groups"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}"
-    if n_earlier:
-        yield f"events: {n_earlier} earlier ones are in events_"
+    if len(events) > most:
+        yield f"events: {len(events) - most} earlier ones are in events_"
     waiting = events.index[events["end"].notna() & ~events["acknowledged"]]
     if len(waiting):
         yield f"ended, not acknowledged: event{'s' if len(waiting) > 1 else ''} {', '.join(map(str, waiting))}"
 
 
-def _of_drift(drift: pd.DataFrame, n_left_out: int) -> Iterator[str]:
+def _of_drift(drift: pd.DataFrame) -> Iterator[str]:
     found = "significant" if drift["significant"].any() else "not significant"
     yield f"drift: {found} (p value {probability_text(drift['p_value'].iloc[0])})"
     for group, one in drift[drift["significant"]].iterrows():
         beyond = "; beyond the limit" if one["beyond_limit"] else ""
         yield f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year{beyond}"
-    if n_left_out:
-        yield f"drift: {counted(n_left_out, 'day')} left out, on which responses changed abruptly"

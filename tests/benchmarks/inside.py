@@ -13,6 +13,7 @@ PLACES = {
     "monitoring._events": ["find_events"],
     "monitoring._records": ["Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
+    "monitoring._sensors": ["SensorWatch"],
     "monitoring._threshold": ["estimate_false_alarms"],
     "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }

@@ -2,9 +2,7 @@
 
 import copy
 import json
-import re
 import sys
-import warnings
 import zipfile
 import zlib
 
@@ -167,9 +165,9 @@ def test_a_file_of_skops_runs_nothing_of_others(monitor, tmp_path, module, name)
 def test_a_baseline_that_has_trained_the_detector_is_saved_once(monitor, path):
     monitor.save(path)
     loaded = load_monitor(path)
-    assert loaded.active_.trained is loaded.history_.store.baseline
+    assert loaded.trained_ is loaded.baseline_
     pd.testing.assert_frame_equal(loaded.trained_, monitor.trained_)
-    assert monitor.active_.trained is monitor.history_.store.baseline
+    assert monitor.trained_ is monitor.baseline_
 
 
 def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_path):
@@ -180,25 +178,6 @@ def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_
     assert not list(tmp_path.iterdir())
     monitor.save(tmp_path / "bridge.joblib")
     assert_same_history(load_monitor(tmp_path / "bridge.joblib"), monitor)
-
-
-@pytest.mark.parametrize(("program", "ending"), [("skthermo", "joblib"), ("scikit-learn", "skops")])
-def test_other_versions_are_reported_each_time(monitor, path, program):
-    fitted = dict(monitor.versions_)
-    monitor.versions_ = fitted | {program: "0.0.1"}
-    monitor.save(path)
-    expected = (
-        rf"fitted with .*{program} 0\.0\.1.*, and this is .*{program} {re.escape(fitted[program])}.*other-versions"
-    )
-    for _ in range(2):
-        with pytest.warns(UserWarning, match=expected):
-            loaded = load_monitor(path)
-        loaded.save(path)
-    loaded.versions_ = fitted
-    loaded.save(path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        load_monitor(path)
 
 
 def test_paths_are_checked(monitor, tmp_path):

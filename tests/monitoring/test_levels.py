@@ -2,7 +2,6 @@
 
 import copy
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -101,8 +100,7 @@ def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(t
     assert "watch: opens above" in monitor.summary()
     with pytest.raises(ValueError, match="watch_per_year"):
         fitted_monitor(records, watch_per_year=1)
-    with pytest.warns(UserWarning, match="watch_per_year is 5000"):
-        many = fitted_monitor(records, watch_per_year=5000)
+    many = fitted_monitor(records, watch_per_year=5000)
     assert many.watch_threshold_ <= monitor.watch_threshold_
 
 
@@ -110,7 +108,8 @@ def assert_as_if_never_come(monitor, other):
     for name in ("evaluations_", "events_", "days_", "faults_", "records_", "corrected_"):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(other, name), check_exact=True, check_freq=False)
     assert (monitor.status(monitor.last_).state, monitor.last_) == (other.status(other.last_).state, other.last_)
-    assert monitor.counts_["n_records"] == other.counts_["n_records"]
+    n_taken = [one.counts_["n_records"] - one.counts_["n_too_late"] for one in (monitor, other)]
+    assert n_taken[0] == n_taken[1]  # true records that came meanwhile were refused
 
 
 @pytest.mark.parametrize("ahead", [pytest.param("3653D", marks=pytest.mark.nightly), "5D"])
@@ -131,7 +130,6 @@ def test_discarded_records_are_as_if_they_had_never_come(truss_monitor, records,
     for start, stop in ((30, 36), (36, 60)):
         monitor.update(new[start:stop])
     other, _ = served(truss_monitor, new)
-    monitor.history_ = replace(monitor.history_, n_too_late=0)  # true records that came meanwhile were refused
     assert_as_if_never_come(monitor, other)
     assert len(monitor.transitions()) >= n_known
     events, _ = replayed(monitor.transitions())

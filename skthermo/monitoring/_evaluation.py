@@ -1,0 +1,162 @@
+"""What a fitted detector says of records: damage indices, the modes and groups that drive them, why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.sparse.csgraph import connected_components
+from sklearn.pipeline import Pipeline
+
+from skthermo._core.arrays import Array, as_floats
+from skthermo._core.estimators import BaseSearchCV
+from skthermo._core.warnings import collected
+from skthermo.detection import CompensatedDetector, DirectionalDetector, TemperatureCompensator
+from skthermo.exceptions import ResultWarning
+from skthermo.monitoring._records import Lookback
+from skthermo.monitoring._threshold import lowered
+
+
+def index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
+    """Damage indices of records; what the detector would warn of is said of each record."""
+    with collected(drop_others=True):
+        return -np.asarray(detector.score_samples(records[columns]), dtype=float)
+
+
+def rounded(index: Array) -> Array:
+    """Indices with six decimals, and above 10 with seven digits: their last bits depend on how many there are."""
+    scale = 10.0 ** (6 - np.floor(np.log10(np.clip(np.abs(index), 1.0, 1e300))))
+    return np.round(index * scale) / scale
+
+
+def parts_of(detector: Any) -> list[Any]:
+    """The steps of a fitted pipeline or search, the detector last."""
+    if isinstance(detector, BaseSearchCV):
+        return parts_of(detector.best_estimator_)
+    if isinstance(detector, Pipeline):
+        return [part for _, step in detector.steps for part in parts_of(step)]
+    return [] if detector is None or detector == "passthrough" else [detector]
+
+
+def departures(detector: Any, records: pd.DataFrame, targets: list[Any], trained: pd.DataFrame) -> Array:
+    """Residuals of records in standard deviations, or responses where the detector has no compensator."""
+    *steps, last = parts_of(detector)
+    places = [n for n, step in enumerate(steps) if isinstance(step, TemperatureCompensator)]
+    with collected(drop_others=True):
+        if isinstance(last, CompensatedDetector):
+            compensator, scale, rest = last.compensator_, last.scale_, last.residuals(_through(steps, records))
+        elif places:
+            compensator, before = steps[places[0]], steps[: places[0]]
+            scale, rest = compensator.scale_, compensator.transform(_through(before, records))
+        else:
+            deviation = trained[targets].std(ddof=0).replace(0.0, 1.0)
+            return ((records[targets] - trained[targets].mean()) / deviation).to_numpy()
+    sizes = as_floats(rest) / np.where(scale > 0, scale, 1.0)
+    names = list(compensator.get_feature_names_out())
+    if not set(names) <= set(targets):  # a step before has made arrays of the records
+        return sizes[:, np.argsort(compensator.targets_)]
+    return pd.DataFrame(sizes, columns=names).reindex(columns=targets).to_numpy()
+
+
+def _through(steps: list[Any], records: pd.DataFrame) -> Any:
+    table: Any = records
+    for step in steps:
+        table = step.transform(table)
+    return table
+
+
+def directions_of(detector: Any) -> DirectionalDetector | None:
+    """The fitted detector that has directions of damage groups, if there is one."""
+    last = parts_of(detector)[-1]
+    one = last.detectors_[0] if isinstance(last, CompensatedDetector) else last
+    return one if isinstance(one, DirectionalDetector) and not isinstance(one.directions, str) else None
+
+
+def losses_of(detector: Any) -> pd.DataFrame | None:
+    """Loss of each damage group that moves a record by one standard deviation, and the relative changes by it."""
+    directional = directions_of(detector)
+    if directional is None:
+        return None
+    seen = directional.sensitivities_[directional.sensitivities_ > 0]
+    return directional.directions_.loc[seen.index].div(seen, axis=0).assign(loss=1 / seen)
+
+
+def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
+    """Effects of losses of the damage groups in standard deviations, NaN where they explain less than half of a record.
+
+    Groups that cannot be distinguished are one, such as "top or bottom"; no columns without such directions.
+    """
+    directional = directions_of(detector)
+    if directional is None:
+        return pd.DataFrame(index=records.index)
+    *steps, last = parts_of(detector)
+    with collected(drop_others=True):
+        table = _through(steps, records)
+        effects, shares = last.severities(table) * directional.sensitivities_, last.explained(table)
+    names = directional.directions_.index
+    alike = pd.DataFrame(np.eye(len(names)), names, names)
+    for one, other in directional.indistinguishable_:
+        alike.loc[one, other] = 1.0
+    together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
+    joined = {name: " or ".join(names[together == together[name]]) for name in names}
+    effects = effects.T.groupby(joined).sum().T.round(2).set_axis(records.index)
+    is_explained = np.round(shares, 4)[:, np.newaxis] >= 0.5
+    return effects.where((effects > 0) & is_explained)
+
+
+def causes(records: pd.DataFrame, targets: list[Any], temperatures: list[Any], index: Array) -> list[str]:
+    """Why records have no damage index, or whose index they have; "" for the others."""
+    without = {"mode": records[targets].isna().all(axis=1).to_numpy()}
+    without["temperature"] = records[temperatures].isna().all(axis=1).to_numpy() if temperatures else without["mode"]
+    what = np.select(list(without.values()), [f"no {name} has a value" for name in without], "")
+    unknown = np.where(what == "", "too few values in its window, its lags or among its modes", what)
+    others = np.where(what == "", "", np.char.add(what, ": others of its window are evaluated"))
+    return np.where(np.isnan(index), unknown, others).tolist()
+
+
+def refuse_other_batches(detector: Any, columns: list[Any], trained: pd.DataFrame, lookback: Lookback) -> None:
+    """Refuse a detector that evaluates a record otherwise among all than with the records it looks back to."""
+    times = trained.index.asi8
+    rows = np.linspace(len(times) // 2, min(len(times) // 2 + 100, len(times) - 1), 5).astype(np.intp)
+    first = max(lookback.start(times, int(rows[0])) - 100, 0)
+    whole = index_of(detector, columns, trained.iloc[first : rows[-1] + 100])[rows - first]
+    parts = (trained.iloc[lookback.start(times, int(row)) : row + 1] for row in rows)
+    alone = np.array([index_of(detector, columns, part)[-1] for part in parts])
+    same = np.isclose(whole, alone, rtol=1e-6, atol=1e-9, equal_nan=True)
+    if not same.all():
+        row = int(np.argmin(same))
+        raise ValueError(
+            f"the damage index of {trained.index[rows[row]]} is {whole[row]:.6g} among all records and "
+            f"{alone[row]:.6g} with the records of {lookback} before it. The detector uses later records, or "
+            "earlier ones; expected steps that look back only, and lookback='48h' if that is how far"
+        )
+
+
+def blind_findings(
+    detector: Any, columns: list[Any], trained: pd.DataFrame, targets: list[Any], lookback: Lookback, threshold: float
+) -> Iterator[ResultWarning]:
+    """The finding of responses whose large fall raises no alarm; an error where a larger one ends it."""
+    number = trained[targets].notna().sum(axis=1).to_numpy()
+    row = int(number[len(number) // 2 :].argmax()) + len(number) // 2
+    part, blind = trained.iloc[lookback.start(trained.index.asi8, row) : row + 1], []
+    for target, deviation in trained[targets].std(ddof=0).replace(0.0, 1.0).items():
+        sizes = (5, 20, 80)  # standard deviations by which it is lowered
+        changed = (lowered(part, {target: size * deviation}) for size in sizes)
+        seen = [index_of(detector, columns, records)[-1] > threshold for records in changed]
+        for smaller, larger, *found in zip(sizes[:-1], sizes[1:], seen[:-1], seen[1:], strict=True):
+            if found == [True, False]:
+                raise ValueError(
+                    f"the detector is in alarm where {target} falls by {smaller} standard deviations of the baseline, "
+                    f"and not where it falls by {larger}. One of its steps drops or fills large changes; expected an "
+                    "alarm for larger changes, too. Filter the baseline before fit"
+                )
+        blind += [] if seen[-1] else [str(target)]
+    if blind:
+        yield ResultWarning(
+            f"a fall by {sizes[-1]} standard deviations of the baseline stays at or below the threshold "
+            f"{threshold:.3g} for {', '.join(blind)}. The detector does not see damage there. Use another detector, or "
+            "allow more false alarms a year",
+            "blind-detector",
+        )
