@@ -49,11 +49,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.chain": {"surrogate.inverse"},
     "fleet": {"fleet.prior"},
     "fleet.prior": set(),
-    "monitoring": {
-        "monitoring.sensors",
-        "preprocessing.checks",
-    },  # the monitor joins them
-    "monitoring.sensors": {"preprocessing.checks"},
+    "monitoring": {"preprocessing.checks"},
     "reporting": {"reporting.fleet", "reporting.service"},
     "reporting.fleet": {"reporting.service"},
     "reporting.service": set(),

@@ -69,9 +69,8 @@ class WatchState:
     def opened(self, fault: Fault) -> WatchState:
         return replace(self, faults=(*self.faults, fault))
 
-    def ended(self, fault: Fault, until: int) -> WatchState:
-        faults = tuple(replace(one, until=until) if one is fault else one for one in self.faults)
-        return replace(self, faults=faults)
+    def changed(self, fault: Fault, **values: Any) -> WatchState:
+        return replace(self, faults=tuple(replace(one, **values) if one is fault else one for one in self.faults))
 
     def in_place(self, responses: Array, n_sensors: int) -> Array:
         """Responses with exchanged ones back in their columns."""
@@ -101,12 +100,14 @@ class Watched:
 class Thermometers:
     """Daily means of thermometers, each predicted by the others.
 
-    ``usual`` are coefficients of the season, ``together`` is the distribution of anomalies beside it, and ``limits``,
-    (n_windows, n_thermometers), are medians of departures that are beyond chance, of the `windows`.
+    ``usual`` are coefficients of the season, ``together`` is the distribution of anomalies beside it, ``known`` has the
+    lowest and highest ones, and ``limits``, (n_windows, n_thermometers), are medians of departures that are beyond
+    chance, of the `windows`.
     """
 
     usual: Array
     together: Gaussian
+    known: Array
     limits: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     @classmethod
@@ -139,15 +140,23 @@ class Thermometers:
         anomalies = means - season(days) @ usual
         found = Gaussian.fitted(anomalies[~np.isnan(anomalies).all(axis=1)])
         own = np.diag(1e-6 * np.diag(found.covariance) + 0.05**2)  # thermometers are not better than that
-        return cls(usual, Gaussian(found.mean, found.covariance + own))
+        known = np.array([np.fmin.reduce(anomalies), np.fmax.reduce(anomalies)])
+        return cls(usual, Gaussian(found.mean, found.covariance + own), known)
 
     def departures(self, days: Counts, means: Array, trusted: Mask | None = None) -> Array:
-        """Daily means less what the other trusted thermometers predict; NaN where either has no value."""
+        """Daily means less what the other trusted thermometers predict; NaN where either has no value.
+
+        In weather that the baseline does not have, only what goes beyond the prediction's own change by it counts.
+        """
         anomalies, found = means - season(days) @ self.usual, np.full(means.shape, np.nan)
         for sensor in range(means.shape[1]):
             others = anomalies if trusted is None else np.where(trusted, anomalies, np.nan)
             others = np.where(np.arange(means.shape[1]) == sensor, np.nan, others)
-            found[:, sensor] = anomalies[:, sensor] - self.together.completed(others)[0][:, sensor]
+            expected, within = (
+                self.together.completed(one)[0][:, sensor] for one in (others, np.clip(others, *self.known))
+            )
+            rest, beyond = anomalies[:, sensor] - expected, np.abs(expected - within) / 2
+            found[:, sensor] = np.sign(rest) * np.maximum(np.abs(rest) - beyond, 0.0)
         return found
 
 
@@ -175,7 +184,7 @@ def median_of_most(rows: Array, n_days: int) -> Array:
 def start_of_change(rest: Array) -> tuple[int, float, float]:
     """Place of the day from which departures have an offset or drift, its size on the last day, and rate in a day.
 
-    The one of least squares; the rate of an offset is 0.
+    The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
     """
     known = np.flatnonzero(~np.isnan(rest))
     at, values = known.astype(float), rest[known]
@@ -183,7 +192,7 @@ def start_of_change(rest: Array) -> tuple[int, float, float]:
     shapes = np.vstack([since >= 0, np.maximum(since[: max(len(at) - 6, 0)] + 1.0, 0.0)])
     shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
     gains = shapes @ values
-    best = int(np.argmax(np.abs(gains)))
+    best = int(np.argmax(np.abs(gains) * np.where(np.arange(len(shapes)) < len(at), 1.0, 0.95)))
     first, is_drift = int(known[best % len(at)]), best >= len(at)
     size = float(gains[best] * shapes[best, -1])
     return first, size, size / (at[-1] - first + 1) if is_drift else 0.0
@@ -445,7 +454,7 @@ class SensorWatch:
             pair, since = {n_sensors + first, n_sensors + second}, self._midnight(day)
             known = [one for one in state.lasting("swapped") if pair == {one.column, one.other}]
             if known:
-                state = state.ended(known[0], since)
+                state = state.changed(known[0], until=since)
             else:
                 today = self._midnight(state.days[-1])
                 state = state.opened(Fault("swapped", n_sensors + first, since, today, n_sensors + second))
@@ -465,7 +474,7 @@ class SensorWatch:
             if known == kind:
                 continue
             if fault is not None and (known or kind):
-                state = state.ended(fault, today)
+                state = state.changed(fault, until=today)
             if kind:
                 state = state.opened(Fault(kind, column, int(stamps[since]), today, size=size))
         return state
@@ -485,7 +494,7 @@ class SensorWatch:
         return ("stuck" if n_equal >= limits[1] else None), known[-n_equal], float(series[last])
 
     def _departures(self, state: WatchState, trusted: Mask) -> tuple[Counts, Array]:
-        """Days, and departures of all thermometers from what the trusted ones predict, without values of other faults."""
+        """Days, and departures of thermometers from what the trusted ones predict, without values of other faults."""
         temperatures = state.values[:, : len(self.sensors)].copy()
         temperatures[self.weather.implausible(temperatures)] = np.nan
         for fault in state.faults:
@@ -496,14 +505,25 @@ class SensorWatch:
         return days, self.thermometers.departures(days, means, trusted)
 
     def _without_ended(self, state: WatchState, n_days: int = 4) -> WatchState:
-        """Thermometers that have come back to less than half of their departure for some days are used again."""
+        """Thermometers that have come back to less than half of their departure for some days are used again.
+
+        In its first month, an offset that goes on may turn out to be a drift.
+        """
         days, rest = self._departures(state, self._trusted(state))
         for fault in state.lasting("offset", "drift"):
             own = rest[:, fault.column]
             known = np.flatnonzero(~np.isnan(own) & (days * DAY_NS > fault.detected - DAY_NS))[-n_days:]
             if len(known) == n_days and (np.abs(own[known]) < abs(fault.size) / 2).all():
-                state = state.ended(fault, self._midnight(days[known[0]]))
+                state = state.changed(fault, until=self._midnight(days[known[0]]))
+            elif (days[-1] - 30) * DAY_NS < fault.detected:
+                state = state.changed(fault, **self._described(days, own))
         return state
+
+    def _described(self, days: Counts, own: Array) -> dict[str, Any]:
+        """What the departures of a thermometer that is at fault look like."""
+        first, size, rate = start_of_change(own[-40:])
+        kind = "drift" if rate else "offset"
+        return {"kind": kind, "since": self._midnight(days[-40:][first]), "size": size, "rate": rate}
 
     def _with_departures(self, state: WatchState) -> WatchState:
         """The thermometer that departs from the others, if without it, and without no other one, none does."""
@@ -513,17 +533,14 @@ class SensorWatch:
         if not (far > 1).any():
             return state
         resolved = []
-        for sensor in np.flatnonzero((far > 1) & ~self.is_reference):
+        for sensor in np.flatnonzero((far > far.max() / 2) & ~self.is_reference):
             others = trusted & (np.arange(len(trusted)) != sensor)
             if not (self._excess(self._departures(state, others)[1], others) > 1).any():
                 resolved.append(int(sensor))
         if len(resolved) != 1 or 2 * (1 + len(state.lasting("offset", "drift"))) > len(self.sensors):
             return state
-        own = rest[:, resolved[0]]
-        first, size, rate = start_of_change(own[-30:])
-        since, today = days[-30:][first], self._midnight(state.days[-1])
-        kind = "drift" if rate else "offset"
-        return state.opened(Fault(kind, resolved[0], self._midnight(since), today, size=size, rate=rate))
+        found = self._described(days, rest[:, resolved[0]])
+        return state.opened(Fault(column=resolved[0], detected=self._midnight(state.days[-1]), **found))
 
     def _excess(self, rest: Array, trusted: Mask) -> Array:
         """The largest median departure of each trusted thermometer over its limit."""
@@ -538,8 +555,9 @@ class SensorWatch:
         lasting = [
             f"{names[fault.column]} and {names[fault.other]} are exchanged and were put back in place"
             if fault.kind == "swapped"
-            else f"{names[fault.column]} is left out ({fault.kind} since {as_index([fault.since], self.zone)[0]:%Y-%m-%d})"
+            else f"{names[fault.column]} is left out ({fault.kind} since {since:%Y-%m-%d})"
             for fault in (*state.left_out().values(), *state.lasting("swapped"))
+            for since in as_index([fault.since], self.zone)
         ]
         notes = ["; ".join(lasting)] * len(given)
         for row in np.flatnonzero(far.any(axis=1)):
