@@ -29,10 +29,10 @@ def read_slopes(fem: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | 
     return list(members), np.column_stack(slopes)
 
 
-def daily_means(T: pd.DataFrame, F: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Means of temperatures and of ln f over each calendar day from the first record to the last, NaN without any."""
-    days, calendar = midnights(F.index), midnights_between(F.index.min(), F.index.max())
-    return T.groupby(days).mean().reindex(calendar), np.log(F).groupby(days).mean().reindex(calendar)
+def daily_means(T: pd.DataFrame, y: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Means of two tables over each calendar day from the first record to the last, NaN without any."""
+    days, calendar = midnights(y.index), midnights_between(y.index.min(), y.index.max())
+    return T.groupby(days).mean().reindex(calendar), y.groupby(days).mean().reindex(calendar)
 
 
 @dataclass(frozen=True)
@@ -45,19 +45,20 @@ class DailyWeather:
 
     usual: Gaussian
     axes: Array
-    half_lives: tuple[float, ...] = (5.0, 30.0)
+    half_lives: tuple[float, ...]
 
     @classmethod
-    def fitted(cls, T: Array, most: int = 3, share: float = 0.02) -> DailyWeather:
+    def fitted(
+        cls, T: Array, most: int = 3, share: float = 0.02, half_lives: tuple[float, ...] = (5.0, 30.0)
+    ) -> DailyWeather:
         """Axes with more than a share of the largest one's variance, ``most`` of them or fewer."""
         usual = Gaussian.fitted(T[~np.isnan(T).all(axis=1)])
         scale = np.sqrt(np.maximum(np.diag(usual.covariance), 1e-6))
         sizes, axes = np.linalg.eigh(usual.covariance / np.outer(scale, scale))
         kept = np.flatnonzero(sizes > share * sizes[-1])[-most:][::-1]
         own = np.diag(1e-9 * scale**2)  # so that a thermometer may repeat another one
-        return cls(
-            replace(usual, covariance=usual.covariance + own), axes[:, kept] / scale[:, None] / np.sqrt(sizes[kept])
-        )
+        usual = replace(usual, covariance=usual.covariance + own)
+        return cls(usual, axes[:, kept] / scale[:, np.newaxis] / np.sqrt(sizes[kept]), half_lives)
 
     def coordinates(self, T: Array) -> Array:
         return (self.usual.completed(T)[0] - self.usual.mean) @ self.axes
@@ -125,7 +126,7 @@ class DailyNoise:
     covariance: Array
 
     @classmethod
-    def fitted(cls, residuals: Array, n_columns: int, lags: int = 10) -> DailyNoise:
+    def fitted(cls, residuals: Array, n_columns: int, lags: int = 10, *, lasts_for_months: bool = True) -> DailyNoise:
         """From residuals by day, NaN where a mode is missing, of a regression on so many columns.
 
         Additions that last for some days show in their products; those that last for months, such as moisture, in
@@ -139,7 +140,9 @@ class DailyNoise:
         for mode, column in enumerate(residuals.T):
             added[known[:, mode], mode] = whitened(np.zeros((len(column), 0)), column, correlation)[1]
         total = lasting_covariance(added, min(lags, len(added) // 5))
-        larger = np.sqrt(np.fmax(slow_squares(added) / np.maximum(np.diag(total), 1e-300), 1.0))
+        larger = np.ones(len(total))
+        if lasts_for_months:
+            larger = np.sqrt(np.fmax(slow_squares(added) / np.maximum(np.diag(total), 1e-300), 1.0))
         lost = n_days.max() / max(n_days.max() - n_columns, 1)
         covariance = lost * total * np.outer(larger, larger) / np.sqrt(np.outer(n_days, n_days)).clip(1)
         return cls(correlation, covariance + 1e-16 * np.eye(len(covariance)))
@@ -316,13 +319,14 @@ class Explanation:
         return mean, np.hypot(spread, 0.03 * mean)
 
 
-def regressed(X: Array, y: Array, n_times: int) -> tuple[NormalEquations, DailyNoise]:
+def regressed(X: Array, y: Array, n_times: int, **noise_options: bool) -> tuple[NormalEquations, DailyNoise]:
     """Normal equations of the modes on columns of which the last are of time, and the noise beside them."""
     size, noise = X.shape[1], DailyNoise(1e-6, np.diag(np.nanvar(y, axis=0)))
     prior = prior_deviations(size - n_times, n_times)
     for _ in range(2):  # the first time as if days were independent
         equations = NormalEquations.summed(X, y, noise.correlation)
-        noise = DailyNoise.fitted(y - X @ equations.solved(noise.deviations, prior)[0].T, size)
+        rest = y - X @ equations.solved(noise.deviations, prior)[0].T
+        noise = DailyNoise.fitted(rest, size, **noise_options)
     return NormalEquations.summed(X, y, noise.correlation), noise
 
 
@@ -388,7 +392,7 @@ class DriftFollower:
                 f"their names among the temperatures {list(T.columns)} and the frequencies {list(F.columns)}"
             )
         names, slopes = read_slopes(fem, groups)
-        daily_T, daily_F = daily_means(T[inputs], F[list(fem.mode_names_)])
+        daily_T, daily_F = daily_means(T[inputs], np.log(F[list(fem.mode_names_)]))
         weather, y = DailyWeather.fitted(daily_T.to_numpy()), daily_F.to_numpy()
         columns, earlier = weather.of_days(daily_T.to_numpy())
         years = len(y) * (DAY / YEAR)

@@ -100,7 +100,7 @@ def track_parameters(
     step = _step_of(freq)
     T, F = _checked(fem, T, F)
     names, slopes = read_slopes(fem, groups)
-    daily_T, daily_F = daily_means(T, F)
+    daily_T, daily_F = daily_means(T, np.log(F))
     days, y = daily_F.index, daily_F.to_numpy()
     years = np.arange(len(days)) * (DAY / YEAR)
     line = bending_line(years, np.arange(1, int(years[-1])))
