@@ -181,21 +181,21 @@ def median_of_most(rows: Array, n_days: int) -> Array:
     return np.where(known > n_days / 2, median(rows) if len(rows) else np.nan, np.nan)
 
 
-def start_of_change(rest: Array) -> tuple[int, float, float]:
-    """Place of the day from which departures have an offset or drift, its size on the last day, and rate in a day.
+def start_of_change(days: Counts, rest: Array) -> tuple[int, float, float]:
+    """Day from which departures have an offset or drift, its size on the last day, and rate in a day.
 
-    The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
+    The one of least squares, a drift where it explains clearly more; that may have begun two months before the first of
+    these days. The rate of an offset is 0.
     """
-    known = np.flatnonzero(~np.isnan(rest))
-    at, values = known.astype(float), rest[known]
-    since = at - at[:, np.newaxis]
-    shapes = np.vstack([since >= 0, np.maximum(since[: max(len(at) - 6, 0)] + 1.0, 0.0)])
+    known = ~np.isnan(rest)
+    at, values = days[known].astype(float), rest[known]
+    slow = np.r_[at[0] - np.arange(60.0, 0.0, -10.0), at[: max(len(at) - 6, 0)]]
+    shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
     shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
-    gains = shapes @ values
-    best = int(np.argmax(np.abs(gains) * np.where(np.arange(len(shapes)) < len(at), 1.0, 0.95)))
-    first, is_drift = int(known[best % len(at)]), best >= len(at)
-    size = float(gains[best] * shapes[best, -1])
-    return first, size, size / (at[-1] - first + 1) if is_drift else 0.0
+    gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
+    best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
+    first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
+    return first, size, size / (at[-1] - first + 1) if is_drift[best] else 0.0
 
 
 @dataclass(frozen=True)
@@ -521,9 +521,9 @@ class SensorWatch:
 
     def _described(self, days: Counts, own: Array) -> dict[str, Any]:
         """What the departures of a thermometer that is at fault look like."""
-        first, size, rate = start_of_change(own[-40:])
+        first, size, rate = start_of_change(days[-40:], own[-40:])
         kind = "drift" if rate else "offset"
-        return {"kind": kind, "since": self._midnight(days[-40:][first]), "size": size, "rate": rate}
+        return {"kind": kind, "since": self._midnight(first), "size": size, "rate": rate}
 
     def _with_departures(self, state: WatchState) -> WatchState:
         """The thermometer that departs from the others, if without it, and without no other one, none does."""
