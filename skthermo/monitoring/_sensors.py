@@ -52,11 +52,16 @@ class Fault:
 
 @dataclass(frozen=True)
 class WatchState:
-    """Records of the last weeks, with their days, and all faults in the order in which they were detected."""
+    """Records of the last days, and all faults in the order in which they were detected.
+
+    ``means`` are daily means of the thermometers over the last months, of ``days_of_means``.
+    """
 
     stamps: Counts
     days: Counts
     values: Array
+    days_of_means: Counts
+    means: Array
     faults: tuple[Fault, ...] = ()
 
     def lasting(self, *kinds: str) -> list[Fault]:
@@ -184,18 +189,17 @@ def median_of_most(rows: Array, n_days: int) -> Array:
 def start_of_change(days: Counts, rest: Array) -> tuple[int, float, float]:
     """Day from which departures have an offset or drift, its size on the last day, and rate in a day.
 
-    The one of least squares, a drift where it explains clearly more; that may have begun two months before the first of
-    these days. The rate of an offset is 0.
+    The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
     """
     known = ~np.isnan(rest)
     at, values = days[known].astype(float), rest[known]
-    slow = np.r_[at[0] - np.arange(60.0, 0.0, -10.0), at[: max(len(at) - 6, 0)]]
+    slow = at[: max(len(at) - 6, 0)]
     shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
     shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
     gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
     best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
     first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
-    return first, size, size / (at[-1] - first + 1) if is_drift[best] else 0.0
+    return first, size, float(size / (at[-1] - first + 1)) if is_drift[best] else 0.0
 
 
 @dataclass(frozen=True)
@@ -356,16 +360,15 @@ class SensorWatch:
             Plausible.of_weather(temperatures),
             runs,
             least,
-            40 + int(np.ceil(runs.max(initial=0) / per_day)),
+            5 + int(np.ceil(runs.max(initial=0) / per_day)),
             thermometers,
             filler,
             Responses.fitted(temperatures, responses, days, texts[n_sensors:]),
         )
 
     def start(self) -> WatchState:
-        return WatchState(
-            np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, len(self.sensors) + len(self.modes)))
-        )
+        none, n_sensors = np.empty(0, np.int64), len(self.sensors)
+        return WatchState(none, none, np.empty((0, n_sensors + len(self.modes))), none, np.empty((0, n_sensors)))
 
     def faults(self, state: WatchState) -> pd.DataFrame:
         """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``.
@@ -421,12 +424,16 @@ class SensorWatch:
             return state
         days, stamps = local_days(T_day.index), T_day.index.as_unit("ns").asi8
         own = np.hstack([as_floats(T_day)[:, [columns[0] for columns in self.columns]], as_floats(F_day)])
-        kept = state.days > days[-1] - self.span
+        kept, known = state.days > days[-1] - self.span, state.days_of_means > days[-1] - 120
+        temperatures = own[:, : len(self.sensors)]
+        means = daily_means(days, np.where(self.weather.implausible(temperatures), np.nan, temperatures), self.least)[1]
         state = replace(
             state,
             stamps=np.r_[state.stamps[kept], stamps],
             days=np.r_[state.days[kept], days],
             values=np.vstack([state.values[kept], own]),
+            days_of_means=np.append(state.days_of_means[known], days[-1]),
+            means=np.vstack([state.means[known], means[-1:]]),
         )
         state = self._with_exchanges(state)
         state = self._with_runs(state)
@@ -495,19 +502,18 @@ class SensorWatch:
 
     def _departures(self, state: WatchState, trusted: Mask) -> tuple[Counts, Array]:
         """Days, and departures of thermometers from what the trusted ones predict, without values of other faults."""
-        temperatures = state.values[:, : len(self.sensors)].copy()
-        temperatures[self.weather.implausible(temperatures)] = np.nan
+        means = state.means.copy()
         for fault in state.faults:
             if fault.column < len(self.sensors) and (fault.until is not None or fault.kind not in ("offset", "drift")):
-                until = np.inf if fault.until is None else fault.until
-                temperatures[(state.stamps >= fault.since) & (state.stamps < until), fault.column] = np.nan
-        days, means = daily_means(state.days, temperatures, self.least)
-        return days, self.thermometers.departures(days, means, trusted)
+                is_later = state.days_of_means >= self._day(fault.since)
+                is_over = False if fault.until is None else state.days_of_means >= self._day(fault.until)
+                means[is_later & ~np.asarray(is_over), fault.column] = np.nan
+        return state.days_of_means, self.thermometers.departures(state.days_of_means, means, trusted)
 
     def _without_ended(self, state: WatchState, n_days: int = 4) -> WatchState:
         """Thermometers that have come back to less than half of their departure for some days are used again.
 
-        In its first month, an offset that goes on may turn out to be a drift.
+        In its first two months, an offset that goes on may turn out to be a drift.
         """
         days, rest = self._departures(state, self._trusted(state))
         for fault in state.lasting("offset", "drift"):
@@ -515,13 +521,13 @@ class SensorWatch:
             known = np.flatnonzero(~np.isnan(own) & (days * DAY_NS > fault.detected - DAY_NS))[-n_days:]
             if len(known) == n_days and (np.abs(own[known]) < abs(fault.size) / 2).all():
                 state = state.changed(fault, until=self._midnight(days[known[0]]))
-            elif (days[-1] - 30) * DAY_NS < fault.detected:
+            elif (days[-1] - 60) * DAY_NS < fault.detected:
                 state = state.changed(fault, **self._described(days, own))
         return state
 
     def _described(self, days: Counts, own: Array) -> dict[str, Any]:
         """What the departures of a thermometer that is at fault look like."""
-        first, size, rate = start_of_change(days[-40:], own[-40:])
+        first, size, rate = start_of_change(days, own)
         kind = "drift" if rate else "offset"
         return {"kind": kind, "since": self._midnight(first), "size": size, "rate": rate}
 
@@ -573,6 +579,9 @@ class SensorWatch:
             ]
             notes[row] = "; ".join([*parts, *lasting])
         return notes
+
+    def _day(self, moment: int) -> int:
+        return int(local_days(as_index([moment], self.zone))[0])
 
     def _midnight(self, day: int) -> int:
         stamp = pd.Timestamp(int(day) * DAY_NS)
