@@ -56,13 +56,6 @@ def shared_folder(tmp_path_factory):
 
 
 @pytest.fixture
-def in_process(request, monkeypatch):
-    """Files are read in this process, as in a frozen program, which saves half a second for each."""
-    if getattr(request, "param", True):
-        monkeypatch.setattr(sys, "frozen", True, raising=False)
-
-
-@pytest.fixture
 def chains_fitted_once(monkeypatch):
     """A chain that was fitted to the same records before becomes a copy of what it learned then."""
     import joblib
@@ -82,26 +75,6 @@ def chains_fitted_once(monkeypatch):
         return fem
 
     monkeypatch.setattr(DataInformedFEM, "fit", once)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _the_memory_of_records_is_found_once():
-    """Most chains of the tests learn from few records; each check of them would look for their memory again."""
-    import joblib
-
-    from skthermo.preprocessing.checks import _check_records
-
-    found, find = {}, _check_records.find_memory
-
-    def once(*records):
-        key = joblib.hash(records)
-        if key not in found:
-            found[key] = find(*records)
-        return copy.deepcopy(found[key])
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(_check_records, "find_memory", once)
-        yield
 
 
 @pytest.fixture(autouse=True)

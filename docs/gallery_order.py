@@ -17,7 +17,7 @@ GROUPS = {
     "In service and fleets": {
         "plot_in_service": "Two years with failed thermometers, slow loss of stiffness and sudden damage",
         "plot_new_baseline": "A retrofit, and a monitor that starts anew from three days of records",
-        "plot_fleet": "A prior from sixteen bridges for four with 30 days of records",
+        "plot_fleet": "Four bridges with 30 days of records learn from sixteen others",
     },
     "Models and updating": {
         "plot_model_updating": "What measured modes determine, and parameters with their uncertainty",

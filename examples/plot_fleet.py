@@ -3,9 +3,9 @@ A new bridge learns from a fleet
 ================================
 
 A monitoring system was switched on in June. What its bridge does in frost, nobody has measured yet; what other bridges
-do in frost, the owner knows. Sixteen trusses and girders with a year of records each are fitted, a prior is learned
-from them, and four new bridges with 30 days of June predict their next year, with the fleet and without. The fleet is
-synthetic, so that the truth is known: every bridge has its own span, material, climate and thermometers, and an FE
+do in frost, the owner knows. Sixteen trusses and girders with a year of records each are fitted, and four new bridges
+with 30 days of June predict their next year, alone and with the mappers of the other bridges of their kind. The fleet
+is synthetic, so that the truth is known: every bridge has its own span, material, climate and thermometers, and an FE
 model that is a little wrong.
 
 Run it with ``python examples/plot_fleet.py``; the figures go to the folder ``figures``. It needs
@@ -21,11 +21,11 @@ from page_recipes import command_line, save_figures
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_fleet
-from skthermo.fleet import FleetPrior, fit_fleet
 from skthermo.metrics import mape
+from skthermo.monitoring import fit_fleet
 from skthermo.plotting import PredictionDisplay
 from skthermo.preprocessing import SensorMeans
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, FleetMapper, TemperatureMapper
 
 options = command_line().parse_args()
 
@@ -55,25 +55,16 @@ fleet = fit_fleet(
 )
 print(fleet.summary())
 
-# %%
-# What they have in common
-# ------------------------
-# The deck of a girder and that of a truss share a name and little else, so that each kind has its own families. Each
-# family is pooled only if the other bridges predict a bridge's records better than it does alone.
-
-families = {
-    name: {part: f"{bridge.kind} {part}" for part in bridge.model.parameter_names} for name, bridge in campaign.items()
-}
-prior = FleetPrior(families={name: families[name] for name in known}).fit(fleet)
-print(prior.summary())
+mappers = {kind: [] for kind in ("truss", "girder")}
+for name, chain in fleet.chains.items():
+    mappers[campaign[name].kind].append(chain.mapper_[-1])
 
 # %%
 # Four new bridges
 # ----------------
 # Mean error in percent of the frequencies of 2026, without their noise: learned from 30 days of June 2025 alone, from
 # these days and the fleet, and from an own full year. One of the four has a thermal law of its own, as one bridge in
-# twenty of this fleet has, and the fleet misleads it. The last column is the probability that a bridge follows the
-# fleet: what 30 days of June tell of that.
+# twenty of this fleet has.
 
 chains, errors = {}, {}
 for name in new:
@@ -81,46 +72,40 @@ for name in new:
     june, year = load_records(name, 30, "2025-06-01"), load_records(name)
     chains[name] = {
         "30 days alone": make_chain(name).fit(*june),
-        "30 days and the fleet": make_chain(name, prior.mapper(families=families[name])).fit(*june),
+        "30 days and the fleet": make_chain(name, FleetMapper(mappers[campaign[name].kind])).fit(*june),
         "own full year": make_chain(name).fit(*year),
     }
     errors[f"{name} ({campaign[name].kind})"] = {
         label: mape(later.clean_frequencies, chain.predict(later.temperatures)).mean()
         for label, chain in chains[name].items()
-    }
-    follows = chains[name]["30 days and the fleet"].mapper_[-1].pooling_probability_
-    errors[f"{name} ({campaign[name].kind})"] |= {
-        "atypical": campaign[name].is_atypical,
-        "follows": max(follows.values()),
-    }
+    } | {"atypical": campaign[name].is_atypical}
 print(pd.DataFrame.from_dict(errors, orient="index").round(2).to_string())
 
 # %%
 # What the fleet adds
 # -------------------
-# Change of two stiffnesses of a new girder with temperature, from their values at the mean temperature of June. Bands
-# are two standard deviations on either side: of a new bridge of the fleet, before it has records of its own, and of
-# this girder after 30 days. Outside the temperatures of its own records (grey), predictions rely on the fleet prior.
+# Change of two stiffnesses of a new girder with temperature, from their values at the mean temperature of June. The
+# band is two standard deviations on either side. Outside the temperatures of its own records (grey), predictions rely
+# on the other girders.
 
 girder = next(name for name in new if campaign[name].kind == "girder")
 mapper = chains[girder]["30 days and the fleet"].mapper_[-1]
 june = np.ravel(load_records(girder, 30, "2025-06-01")[0])
-temperatures = np.linspace(-15, 35, 101)
+steady = np.linspace(-15, 35, 101)
+weather = pd.DataFrame({role: np.append(steady, june.mean()) for role in mapper.feature_names_in_})
 
 
 def draw_effects(ax, part):
-    """Change of a stiffness with temperature: of single bridges, of the fleet and of the new girder."""
-    family = families[girder][part]
-    of_fleet = prior.effects(temperatures, family, reference=june.mean())
-    singles = 100 * np.expm1(of_fleet.drop(columns=["mean", "standard_deviation"]))
-    lines = ax.plot(temperatures, singles, color="0.6", linewidth=0.7)
-    lines[0].set_label("single bridges")
-    of_girder = prior.effects(temperatures, family, mapper=mapper, reference=june.mean())
-    for label, effect, colour in (("fleet", of_fleet, "tab:blue"), ("new girder", of_girder, "tab:orange")):
-        low, mean, high = (100 * np.expm1(effect["mean"] + k * effect["standard_deviation"]) for k in (-2, 0, 2))
-        ax.fill_between(temperatures, low, high, color=colour, alpha=0.25, linewidth=0)
-        ax.plot(temperatures, mean, color=colour, label=f"{label}, ± 2 standard deviations")
-    ax.axvspan(june.min(), june.max(), color="0.9", zorder=0, label="the girder's own records")
+    """Change of a stiffness with temperature: of the other girders and of the new one."""
+    for number, other in enumerate(mappers["girder"]):
+        theta = other.predict(weather)[part].to_numpy()
+        label = "other girders" if number == 0 else None
+        ax.plot(steady, 100 * (theta[:-1] / theta[-1] - 1), color="0.6", linewidth=0.7, label=label)
+    theta, std = (table[part].to_numpy() for table in mapper.predict(weather, return_std=True))
+    low, mean, high = (100 * ((theta + k * std)[:-1] / theta[-1] - 1) for k in (-2, 0, 2))
+    ax.fill_between(steady, low, high, color="tab:orange", alpha=0.25, linewidth=0)
+    ax.plot(steady, mean, color="tab:orange", label="new girder, ± 2 standard deviations")
+    ax.axvspan(june.min(), june.max(), color="0.9", zorder=0, label="its own records")
     change = f"change of {part} stiffness\nfrom its value at {june.mean():.0f} °C (%)"
     ax.set(xlabel="steady temperature (°C)", ylabel=change)
     ax.legend(fontsize="small", frameon=False)

@@ -18,7 +18,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor, load_monitor, track_parameters
-from skthermo.plotting import MonitorDisplay, PredictionDisplay
+from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 from skthermo.preprocessing import HingeFeatures
 from skthermo.reporting import owner_report
 from skthermo.surrogate import DataInformedFEM
@@ -92,7 +92,7 @@ print(again.counts_)
 print(monitor.summary())
 print(monitor.events_[["kind", "start", "end", "peak", "modes"]].to_string())
 print(monitor.faults_[["column", "kind", "since", "detected", "until"]].to_string())
-MonitorDisplay.from_estimator(monitor)
+DamageIndexDisplay.from_estimator(monitor)
 
 # %%
 # The page for the owner says it in sentences (:func:`~skthermo.reporting.owner_report`).

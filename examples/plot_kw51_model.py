@@ -16,7 +16,7 @@ from textwrap import fill
 from page_recipes import command_line, save_figures
 
 from skthermo.datasets import kw51_structure, make_kw51
-from skthermo.plotting import ModeShapesDisplay, StructureDisplay
+from skthermo.plotting import StructureDisplay
 
 options = command_line().parse_args()
 
@@ -68,7 +68,7 @@ def kind(structure, shape):
     return KINDS[max(squares, key=squares.get)]
 
 
-display = ModeShapesDisplay.from_structure(structure, model, groups=SKELETON, amplitude=0.05, linewidth=1.2)
+display = StructureDisplay.from_structure(structure, model=model, groups=SKELETON, amplitude=0.05, linewidth=1.2)
 for ax, shape in zip(display.axes_, display.shapes.T, strict=True):
     ax.title.set_text(f"{ax.get_title()}: {kind(structure, shape)}")
 

@@ -26,7 +26,7 @@ import pandas as pd
 from frame_recipes import frame
 from page_recipes import command_line, save_figures
 
-from skthermo.plotting import ModeShapesDisplay
+from skthermo.plotting import StructureDisplay
 from skthermo.updating import ModelUpdater, identifiability, sensitivity
 
 parser = command_line()
@@ -47,7 +47,7 @@ N_MODES = 9
 structure = frame()
 model = structure.assemble(list(TRUTH), n_modes=N_MODES)
 print(model)
-ModeShapesDisplay.from_structure(structure, model, modes=range(4))
+StructureDisplay.from_structure(structure, model=model, modes=range(4))
 
 # %%
 # Which parameters move which modes?

@@ -19,7 +19,7 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_kw51_campaign
 from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
-from skthermo.plotting import MonitorDisplay
+from skthermo.plotting import DamageIndexDisplay
 from skthermo.preprocessing import HingeFeatures
 
 options = command_line().parse_args()
@@ -68,6 +68,6 @@ print(monitor.refit().summary())
 answers = monitor.update(after[after.index >= month])
 print(answers["state"].value_counts().to_string())
 print(monitor.summary())
-MonitorDisplay.from_estimator(monitor)
+DamageIndexDisplay.from_estimator(monitor)
 
 save_figures(options.figures)

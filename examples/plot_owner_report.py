@@ -15,7 +15,7 @@ from page_recipes import command_line, save_figures
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
-from skthermo.plotting import IdentifiedDamageDisplay, PODCurveDisplay
+from skthermo.plotting import DetectorsDisplay, PODCurveDisplay
 from skthermo.reporting import owner_report
 from skthermo.studies import DetectabilityStudy, identify_damage, sweep
 from skthermo.surrogate import DataInformedFEM
@@ -58,7 +58,8 @@ PODCurveDisplay.from_predictions(study.pod_curve("bottom"), label="damage of the
 later = make_truss_campaign(damage={"bottom": 0.25}, random_state=1)
 identified = identify_damage(fem, later.temperatures[:60], later.frequencies[:60], GROUPS, random_state=0)
 print(identified.summary())
-IdentifiedDamageDisplay.from_predictions(identified)
+DetectorsDisplay.from_predictions(identified.table)
+DetectorsDisplay.from_predictions(identified.shifts)
 
 # %%
 # The page for the owner

@@ -27,7 +27,7 @@ from z24_damage_recipes import FROST, changes, identify, in_parameters
 from z24_detector_recipes import DAMAGED, agreement, choose, compare, detectors, side_by_side
 from z24_recipes import GREY, PAVEMENT, REGIMES, Records, alarm_table, compensated, plot_kinds, read_arguments
 
-from skthermo.plotting import DetectorsDisplay, IdentifiedDamageDisplay
+from skthermo.plotting import DetectorsDisplay
 
 bridge, folder = read_arguments()
 warnings.filterwarnings("ignore", ".*outside-training-weather")
@@ -162,12 +162,12 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 # alone 6 %, and beside something else 17 %. The truth, a pier that was lowered, is not a loss of stiffness of one
 # group.
 
-IdentifiedDamageDisplay.from_predictions(found)
+DetectorsDisplay.from_predictions(found.table)
 
 # %%
 # .. image:: /images/z24_damage.png
-#    :alt: Explanations with their probabilities, 39 % for three groups and 17 % for the soil and something else; mean
-#          severities of five groups with credible intervals of 90 %, that of the soil the largest; shifts of four modes
+#    :alt: Probabilities of five groups; their mean severities with credible intervals of 90 %, that of the soil the
+#          largest
 #
 # Simulated rates beside measured ones
 # ------------------------------------

@@ -51,7 +51,6 @@ bridge, folder = read_arguments()
 for expected in (
     "outside-training-weather",  # the last table counts them
     "few-baseline-records",  # one winter of raw frequencies
-    "sudden-change",  # the frost of January, by a straight line
     "sensor-disagrees",  # after the frost, for baselines that end before it
     "weather-of-one-fold",  # forward in time
 ):

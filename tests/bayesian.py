@@ -1,16 +1,13 @@
-"""A small regressor that knows how uncertain it is, as those that learn from a fleet do."""
+"""A small regressor that knows how uncertain it is."""
 
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from skthermo.residuals.weather import TrainingRange
-
 MEAN, WIDTH = np.array([1.0, -0.02, 0.01, 0.0]), np.array([0.03, 0.01, 0.01, 0.01])
-"""Of the coefficients of a fleet's bridges."""
+"""Of the coefficients of many bridges."""
 
 NOISE = 0.003
-EVERYWHERE = (-40.0, 60.0)
 
 
 def basis(X, knots=(5.0, 15.0)):
@@ -22,11 +19,10 @@ def basis(X, knots=(5.0, 15.0)):
 class Logs(RegressorMixin, BaseEstimator):
     """ln y = basis(X) beta + noise with beta ~ N(mean, diag(width^2)): posterior mean, and no word of the rest."""
 
-    def __init__(self, mean=0.0, width=1.0, noise=0.01, reach=None, share=1.0):
+    def __init__(self, mean=0.0, width=1.0, noise=0.01, share=1.0):
         self.mean = mean
         self.width = width
         self.noise = noise
-        self.reach = reach
         self.share = share
 
     def fit(self, X, y, sample_weight=None):
@@ -37,7 +33,6 @@ class Logs(RegressorMixin, BaseEstimator):
         prior = np.diag(np.broadcast_to(np.asarray(self.width, dtype=float) ** -2.0, (B.shape[1],)))
         self.covariance_ = np.linalg.inv(B.T @ B / self.noise**2 + prior)
         self.coef_ = start + self.covariance_ @ B.T @ (logs - B @ start) / self.noise**2
-        self.own_ = TrainingRange.spanned(X, np.ones(len(B), dtype=bool))
         return self
 
     def predict(self, X):
@@ -46,30 +41,16 @@ class Logs(RegressorMixin, BaseEstimator):
 
 
 class BayesianLogs(Logs):
-    """The same with a share of its covariance, and with the weather of a fleet: within ``reach``."""
+    """The same with a share of its covariance."""
 
     def predict(self, X, return_std=False):
         values = super().predict(X)
         if not return_std:
             return values
-        covariances = self.predict_covariance(X)
-        deviations = np.sqrt(np.einsum("ijj->ij", covariances))
-        return values, deviations[:, 0] if self.is_single_ else deviations
-
-    def predict_covariance(self, X):
         B = basis(X)
         variances = self.share * np.einsum("ij,jk,ik->i", B, self.covariance_, B)
-        values = np.exp(B @ self.coef_)
-        return (variances[:, np.newaxis] * values**2)[:, :, np.newaxis] * np.eye(values.shape[1])
-
-    @property
-    def reach_(self):
-        own = self.own_
-        lowest, highest = (own.lowest, own.highest) if self.reach is None else self.reach
-        return TrainingRange(np.minimum(own.lowest, lowest), np.maximum(own.highest, highest), own.names)
-
-    def from_fleet(self, X):
-        return (self.own_.excess(X) > 0).any(axis=1) & (self.reach_.excess(X) == 0).all(axis=1)
+        deviations = np.sqrt(variances)[:, np.newaxis] * np.exp(B @ self.coef_)
+        return values, deviations[:, 0] if self.is_single_ else deviations
 
 
 def weather(days, seed=0, start="2025-01-01"):

@@ -30,7 +30,6 @@ MAY_IMPORT = {
 }
 MAY_IMPORT["studies"] = {*MAY_IMPORT}
 MAY_IMPORT["monitoring"] = {*MAY_IMPORT}
-MAY_IMPORT["fleet"] = {*MAY_IMPORT} - {"datasets", "updating"}
 MAY_IMPORT["plotting"] = {*MAY_IMPORT}  # displays name the results that they draw
 MAY_IMPORT["reporting"] = {*MAY_IMPORT}
 MAY_IMPORT["commands"] = {*MAY_IMPORT}  # on top of all
@@ -47,8 +46,6 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "commands": {"preprocessing.loggers"},
     "surrogate.inverse": {"fem.affine"},  # polynomials of ln f
     "surrogate.chain": {"surrogate.inverse"},
-    "fleet": {"fleet.prior"},
-    "fleet.prior": set(),
     "monitoring": {"preprocessing.checks"},
     "reporting": {"reporting.fleet", "reporting.service"},
     "reporting.fleet": {"reporting.service"},
@@ -199,8 +196,8 @@ def test_import_loads_nothing_optional_or_slow_and_fem_neither_pandas_nor_scikit
     assert loaded.stdout.split() == ["[]", "[]"]
 
 
-def test_a_job_with_a_monitor_loads_no_chain_no_study_and_no_fleet():
-    unwanted = ("scipy.io", *(f"skthermo.{room}" for room in ("surrogate", "studies", "fleet", "updating", "datasets")))
+def test_a_job_with_a_monitor_loads_no_chain_and_no_study():
+    unwanted = ("scipy.io", *(f"skthermo.{room}" for room in ("surrogate", "studies", "updating", "datasets")))
     code = "import sys, skthermo.commands.main, skthermo.reporting; "
     code += f"print([m for m in {unwanted} if m in sys.modules])"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

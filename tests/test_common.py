@@ -30,7 +30,6 @@ from skthermo.detection import (
     OutlierDetector,
     TemperatureCompensator,
 )
-from skthermo.fleet import FleetMapper, FleetPrior
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import (
     BiasAligner,
@@ -43,7 +42,7 @@ from skthermo.preprocessing import (
     SensorMeans,
 )
 from skthermo.studies import DetectabilityStudy, sweep
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, FleetMapper, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "scikit_learn.rst"
@@ -52,10 +51,9 @@ pytestmark = [  # scikit-learn checks detectors on 20 to 50 rows
     pytest.mark.filterwarnings(f"ignore:.*{cause}")
     for cause in (
         "few-baseline-records",
-        "fahrenheit",
+        "unit-of-temperatures",
         "implausible-values",  # of normal values about 100, those above, as temperatures
         "no-thermal-effect",
-        "sudden-change",
         "windows.*not-evaluated",
     )
 ]
@@ -80,16 +78,10 @@ KNOTS_AND_FOLDS = {
     "check_sample_weight_equivalence_on_dense_data": "the default regressor places its knots at quantiles of the rows, "
     "whatever their weights, and RidgeCV leaves out one row at a time: of a row that is repeated the copies stay"
 }
-PRECISIONS_OF_POSITIVE_NUMBERS = {
-    "check_sample_weight_equivalence_on_dense_data": "weights are relative precisions of rows, from which the noise is "
-    "learned, too: a row that is repeated is another one",
-    "check_regressor_multioutput": "logarithms are learned, and the targets of this check are negative",
-}
 EXPECTED_FAILURES = {  # by estimator; docs/reference/scikit_learn.rst lists them
     ExponentialMeans: ROWS_ARE_ORDERED,
     LagFeatures: ROWS_ARE_ORDERED,
     TemperatureMapper: KNOTS_AND_FOLDS,
-    FleetMapper: PRECISIONS_OF_POSITIVE_NUMBERS,
     TemperatureCompensator: OUT_OF_FOLD,
     MahalanobisDetector: RATE_OF_NEW_RECORDS,
     DirectionalDetector: RATE_OF_NEW_RECORDS,
@@ -116,7 +108,7 @@ def expected_failures(estimator):
 
 
 ESTIMATORS = [
-    ExponentialMeans([3]),
+    ExponentialMeans(half_lives=[3]),
     LagFeatures(),
     HampelFilter(),
     HingeFeatures(),
@@ -218,7 +210,6 @@ BOUND = [  # estimators and what they learn from
     (ModeTracker((NOMINAL, SHAPES)), ()),
 ]
 STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, random_state=0, uncertainty="noise")
-PRIOR = FleetPrior()  # learns from bridges
 MONITOR = Monitor(MahalanobisDetector(), targets=["f1", "f2"])  # takes frames on a DatetimeIndex only
 YEAR = pd.DataFrame(
     np.random.default_rng(0).normal([10, 4, 9], 0.1, (400, 3)),
@@ -279,13 +270,13 @@ def test_every_estimator_is_listed():
     public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
     classes = {thing for thing in public if isinstance(thing, type) and not inspect.isabstract(thing)}
     estimators = {thing for thing in classes if issubclass(thing, BaseEstimator)}
-    listed = [*ESTIMATORS, *TRANSFORMERS_AND_DETECTORS, *(one for one, _ in BOUND), STUDY, MONITOR, PRIOR]
+    listed = [*ESTIMATORS, *TRANSFORMERS_AND_DETECTORS, *(one for one, _ in BOUND), STUDY, MONITOR]
     assert estimators == {type(estimator) for estimator in listed} - {InHundredths}
 
 
 @pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
 def test_what_studies_monitors_and_priors_keep_has_a_trailing_underscore():
-    for estimator, fit in [(STUDY, run(STUDY)), (MONITOR, fitted(MONITOR, YEAR)), (PRIOR, fitted(PRIOR, [(T, F)]))]:
+    for estimator, fit in [(STUDY, run(STUDY)), (MONITOR, fitted(MONITOR, YEAR))]:
         check_names_of_state(estimator, fit)
 
 
@@ -309,7 +300,7 @@ NEED_NO_FIT = re.compile(r"_|fit|set_|get_params|get_metadata_routing|run$|findi
 
 
 def test_every_method_says_that_the_estimator_is_not_fitted():
-    estimators = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY, MONITOR, PRIOR]
+    estimators = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY, MONITOR]
     wrong = []
     for kind in {type(estimator): estimator for estimator in estimators}.values():
         for name in dir(type(kind)):

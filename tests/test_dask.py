@@ -15,9 +15,8 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, sample
-from skthermo.fleet import fit_fleet
 from skthermo.metrics import frequency_scorer
-from skthermo.monitoring import Monitor
+from skthermo.monitoring import Monitor, fit_fleet
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from tests.fem.frames import FRAME
 

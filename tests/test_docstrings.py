@@ -108,7 +108,7 @@ def test_every_public_callable_is_typed():
     wrong = []
     for_type_checkers = vars(skthermo.fem) | {"pd": pd, "Axes": object}  # matplotlib is optional
     for_type_checkers["Samples"] = object  # of skthermo.fem.sample
-    for_type_checkers |= vars(skthermo.fleet) | vars(skthermo.monitoring) | vars(skthermo.studies)
+    for_type_checkers |= vars(skthermo.monitoring) | vars(skthermo.studies)
     for name, function, _ in CALLABLES:
         if name in PROTOCOLS:
             continue  # its members are properties and methods, which are checked on the classes that follow it

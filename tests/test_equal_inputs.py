@@ -32,7 +32,6 @@ from skthermo.detection import (
     OutlierDetector,
     TemperatureCompensator,
 )
-from skthermo.fleet import FleetMapper, FleetPrior
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import (
     BiasAligner,
@@ -45,7 +44,7 @@ from skthermo.preprocessing import (
     SensorMeans,
 )
 from skthermo.studies import DetectabilityStudy, sweep
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, FleetMapper, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -99,10 +98,6 @@ def parameters(updater, X):
     return {"theta": fitted.theta_, "covariance": fitted.covariance_}
 
 
-def mapped(prior, X, y):
-    return {"predict": prior.fit([(X, y)]).mapper().fit(X, y).predict(X)}
-
-
 def tracked(tracker, X):
     modes = tracker.fit().transform({"frequencies": X, "shapes": np.tile(SHAPES.T, (len(X), 1, 1))})
     return {"frequencies": modes.frequencies, "mac": modes.mac}
@@ -130,7 +125,7 @@ BY_POSITION = TemperatureCompensator(Ridge(), targets=[3])
 STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, uncertainty="noise", random_state=0)
 CASES = {
     "lags": Case(LagFeatures(3), (BOTH,), TRANSFORMED),
-    "means": Case(ExponentialMeans([3]), (BOTH,), TRANSFORMED),
+    "means": Case(ExponentialMeans(half_lives=[3]), (BOTH,), TRANSFORMED),
     "outliers": Case(HampelFilter(), (BOTH,), TRANSFORMED),
     "hinges": Case(HingeFeatures(), (T,), TRANSFORMED),
     "sensors": Case(SensorMeans(), (T,), TRANSFORMED),
@@ -142,7 +137,6 @@ CASES = {
     "posterior inverse": Case(PosteriorInverse(TRUSS), (GAPPED,), TRANSFORMED),
     "mapper": Case(TemperatureMapper(), (T, F / F.mean()), after_fit("predict")),
     "fleet mapper": Case(FleetMapper(), (T, F / F.mean()), after_fit("predict")),
-    "fleet prior": Case(FleetPrior(), (T[:30], F[:30]), mapped, is_slow=True),
     "updater": Case(ModelUpdater(TRUSS), (MEASURED,), parameters),
     "chain": Case(CHAIN, (T, ONE_GAP), after_fit("predict", "predict_parameters"), is_slow=True),
     "study": Case(STUDY, (T[:40],), rates),

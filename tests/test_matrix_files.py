@@ -7,7 +7,7 @@ import pytest
 import scipy.io
 import scipy.sparse
 
-from skthermo._core.matrix_files import read_named_matrices
+from skthermo.fem.external._files import read_named_matrices
 
 N = 6
 RNG = np.random.default_rng(0)
@@ -34,7 +34,7 @@ def test_matrix_market_is_mirrored_as_scipy_does(tmp_path):
         np.testing.assert_allclose(dense, written[name], rtol=1e-14, err_msg=name)
 
 
-def test_matrix_market_needs_no_line_end_and_may_hold_comments(tmp_path, in_process):
+def test_matrix_market_needs_no_line_end_and_may_hold_comments(tmp_path):
     text = "%%MatrixMarket matrix array real general\n% one\n\n2 2\n1\n% two\n2\n\n3\n4"
     (tmp_path / "A.mtx").write_text(text)
     np.testing.assert_array_equal(read_all(tmp_path)["A"], [[1.0, 3.0], [2.0, 4.0]])
@@ -48,12 +48,11 @@ def npz_of(header, content=b""):
 HEADER = "{'descr': '<f8', 'fortran_order': False, 'shape': (%s)}"
 
 
-def test_npz_members_that_do_not_hold_what_they_state_are_refused(tmp_path, in_process):
+def test_npz_members_that_do_not_hold_what_they_state_are_refused(tmp_path):
     for member, message in [
         (npz_of(HEADER % "100,"), "variable 'K': EOF|variable 'K': cannot reshape"),
         (npz_of(HEADER % "1,", b"1234"), "variable 'K': "),
-        (npz_of(HEADER % "1,", bytes(16)), "variable 'K': more values than its shape says"),
-        (b"text", "variable 'K': "),
+        (npz_of(HEADER % "100000, 100000"), "variable 'K': "),
     ]:
         with zipfile.ZipFile(tmp_path / "model.npz", "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("K.npy", member)
@@ -61,27 +60,15 @@ def test_npz_members_that_do_not_hold_what_they_state_are_refused(tmp_path, in_p
             read_all(tmp_path / "model.npz")
 
 
-@pytest.mark.parametrize(
-    "member",
-    [npz_of(HEADER % "100000, 100000"), pytest.param(bytes(4 * 10**8), marks=pytest.mark.nightly)],
-    ids=["shape", "bytes"],
-)
-def test_npz_members_that_need_too_much_memory_are_refused(tmp_path, member):
-    with zipfile.ZipFile(tmp_path / "model.npz", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("K.npy", member)
-    with pytest.raises(ValueError, match=r"model\.npz: .*more than 256 MB of memory"):
-        read_all(tmp_path / "model.npz")
-
-
 def test_in_a_folder_the_damaged_file_is_named(tmp_path):
     scipy.sparse.save_npz(tmp_path / "E_1.npz", scipy.sparse.eye_array(2, format="csr"))
     huge = scipy.sparse.coo_array(([1.0], ([0], [0])), shape=(10**9, 10**9))
     scipy.sparse.save_npz(tmp_path / "E_2.npz", huge)
-    with pytest.raises(ValueError, match=r"E_2\.npz: .*more than 256 MB of memory"):
+    with pytest.raises(ValueError, match=r"E_2\.npz: .*1,000,000,000 rows for 1 entries; expected at most"):
         read_all(tmp_path)
 
 
-def test_entries_outside_a_sparse_npz_are_refused(tmp_path, in_process):
+def test_entries_outside_a_sparse_npz_are_refused(tmp_path):
     for form in ("csr", "csc", "bsr", "coo"):
         matrix = scipy.sparse.random_array((4, 4), density=0.5, format=form, random_state=0)
         if form == "coo":
@@ -91,3 +78,12 @@ def test_entries_outside_a_sparse_npz_are_refused(tmp_path, in_process):
         scipy.sparse.save_npz(tmp_path / "E_2.npz", matrix)
         with pytest.raises(ValueError, match=r"E_2\.npz: not readable as \.npz"):
             read_all(tmp_path)
+
+
+def test_a_changed_byte_in_a_zip_file_is_refused(tmp_path):
+    np.savez(tmp_path / "model.npz", K=np.eye(4), M=np.eye(4))
+    content = bytearray((tmp_path / "model.npz").read_bytes())
+    content[content.index(np.float64(1.0).tobytes()) + 7] ^= 1
+    (tmp_path / "model.npz").write_bytes(content)
+    with pytest.raises(ValueError, match=r"model\.npz: not readable as \.npz \(member 'K\.npy' is damaged"):
+        read_all(tmp_path / "model.npz")

@@ -23,7 +23,6 @@ PACKAGE = Path(skthermo.__file__).parent
 WARNS = "_core/warnings.py"  # finds the user's line, and collects the warnings of parts
 ALLOWED = {
     WARNS: {"the caller's frames", "filters of warnings"},  # one function finds the user's line
-    "_core/matrix_child.py": {"filters of warnings"},  # of a process of its own
 }
 AT_MOST = {"constants": 180, "constructors called of": 0, "names in two files": 0, "tests with private imports": 15}
 

@@ -149,8 +149,11 @@ def median(values: Array) -> Array:
     missing = np.isnan(values)
     if len(values) and not missing.any():
         return np.median(values, axis=0)
-    known = (column[~gaps] for column, gaps in zip(values.T, missing.T, strict=True))
-    return np.array([np.median(column) if len(column) else np.nan for column in known])
+    found = np.full(values.shape[1], np.nan)
+    for place, column in enumerate(values.T):
+        known = column[~missing[:, place]]
+        found[place] = np.median(known) if len(known) else np.nan
+    return found
 
 
 def means_of_known(values: Array, axis: int = 0) -> Array:

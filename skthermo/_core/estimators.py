@@ -231,6 +231,14 @@ def last_step(estimator: Any) -> Any:
     return estimator
 
 
+def with_means(estimator: Any, X: Any, y: Any) -> Any:
+    """An estimator whose last step, a mapper that chooses means of earlier inputs, has them in a step before it."""
+    last = last_step(estimator)
+    if not hasattr(last, "behind_means") or isinstance(estimator, BaseSearchCV):
+        return estimator
+    return last.behind_means(X, y, estimator.steps[:-1] if isinstance(estimator, Pipeline) else ())
+
+
 def held(path: str, *, is_copied: bool = False) -> Any:
     """A property that a part of an object holds, such as "active_.threshold"; the object's class says what it is."""
     get = attrgetter(path)
@@ -385,69 +393,9 @@ def predict_with_std(regressor: Any, X: Any) -> tuple[Array, Array | None]:
     return as_columns(means), as_columns(deviations)
 
 
-def offers(estimator: Any, name: str) -> bool:
-    """Whether a fitted estimator, or the end of a pipeline or search, offers a method or an attribute. Clones for each
-    output offer what all of them do, and a chain with a mapper what that mapper offers."""
-    last = last_step(estimator)
-    if isinstance(last, MultiOutputRegressor):
-        return all(offers(part, name) for part in last.estimators_)
-    if hasattr(last, "mapper_") and name != "predict_covariance":
-        return offers(last.mapper_, name)
-    return hasattr(last, name)
-
-
 def inputs_of_last_step(estimator: Any, X: Any) -> Any:
     """What the last step of a fitted pipeline, or of a search over pipelines, is given, such as lagged temperatures."""
     estimator = getattr(estimator, "best_estimator_", estimator)
     if not isinstance(estimator, Pipeline):
         return X
     return inputs_of_last_step(estimator.steps[-1][1], estimator[:-1].transform(X) if len(estimator) > 1 else X)
-
-
-def predicted_covariance(estimator: Any, X: Any) -> Array:
-    """What a fitted estimator that offers ``predict_covariance`` says, (n_samples, n_outputs, n_outputs); that of
-    clones for each output is diagonal."""
-    last, inputs = last_step(estimator), inputs_of_last_step(estimator, X)
-    if isinstance(last, MultiOutputRegressor):
-        variances = np.array([predicted_covariance(part, inputs)[:, 0, 0] for part in last.estimators_]).T
-        return variances[:, :, np.newaxis] * np.eye(variances.shape[1])
-    covariances = np.asarray(last.predict_covariance(inputs), dtype=float)
-    if covariances.ndim != 3 or len(covariances) != len(inputs) or covariances.shape[1] != covariances.shape[2]:
-        raise ValueError(
-            f"predict_covariance of {last!r:.200} gave the shape {covariances.shape} for {len(inputs)} rows; expected "
-            "(n_samples, n_outputs, n_outputs)"
-        )
-    return covariances
-
-
-def reach_of(estimator: Any, X: Any) -> tuple[Any, Any] | None:
-    """The weather that an estimator with ``reach_`` was fitted in, and X as the inputs that it is of; else None."""
-    if not offers(estimator, "reach_"):
-        return None
-    last, inputs = last_step(estimator), inputs_of_last_step(estimator, X)
-    if isinstance(last, MultiOutputRegressor):
-        return reach_of(last.estimators_[0], inputs)
-    return reach_of(last.mapper_, inputs) if hasattr(last, "mapper_") else (last.reach_, inputs)
-
-
-def rows_from_fleet(estimator: Any, X: Any) -> NDArray[np.bool_]:
-    """Rows in weather that only the fleet of an estimator has seen; none where it offers no ``from_fleet``."""
-    if not offers(estimator, "from_fleet"):
-        return np.zeros(X.shape[0], dtype=bool)
-    last, inputs = last_step(estimator), inputs_of_last_step(estimator, X)
-    if isinstance(last, MultiOutputRegressor):
-        return np.any([rows_from_fleet(part, inputs) for part in last.estimators_], axis=0)
-    if hasattr(last, "mapper_"):
-        return rows_from_fleet(last.mapper_, inputs)
-    return np.asarray(last.from_fleet(inputs), dtype=bool)
-
-
-def warn_of_fleet(rows: NDArray[np.bool_], consequence: str) -> None:
-    """Count the rows in weather that the fleet has seen, and the records of this structure have not."""
-    if rows.any():
-        warn_user(
-            f"{rows.sum()} of {len(rows)} rows are in weather outside the training records, and are predicted from the "
-            f"fleet. {consequence}. Fit again when there are such records",
-            WeatherWarning,
-            "rows-from-fleet",
-        )

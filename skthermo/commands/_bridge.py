@@ -225,6 +225,11 @@ def fit(bridge: Bridge, done: Done) -> None:
         monitor = settings.monitor(settings.fem(T, F)).fit(baseline)
         if bridge.monitor_file.exists():
             old = bridge.monitor_file
+            try:
+                kept = f"{counted(monitor.keep_acknowledgements(old), 'acknowledgement')} of the former monitor kept"
+            except ValueError as error:
+                kept = f"no acknowledgement of the former monitor kept: {error}"
+            done.lines.append(kept)
             old.replace(old.with_name(f"{old.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{old.suffix}"))
         monitor.save(bridge.monitor_file)
         fitted = datetime.now(UTC).isoformat(timespec="seconds")

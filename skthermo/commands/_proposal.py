@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from sklearn.pipeline import Pipeline
 
 import skthermo
 from skthermo._core.files import write_when_complete
@@ -30,9 +31,10 @@ from skthermo.commands._settings import (
     read_settings,
     settings_of,
 )
-from skthermo.preprocessing import MemoryFindings, RecordFindings, check_records, find_memory
+from skthermo.preprocessing import ExponentialMeans, RecordFindings, check_records
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, PARQUET, CsvFormat, FileLook, read_file
 from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
+from skthermo.surrogate import TemperatureMapper
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
 REGRESSION = "sklearn.linear_model.Ridge"
@@ -88,7 +90,7 @@ class Proposal:
     n_waiting: int
     units: Mapping[str, str]
     findings: RecordFindings
-    memory: MemoryFindings
+    means: ExponentialMeans | None
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Proposal:
@@ -112,8 +114,10 @@ class Proposal:
         )
         T, F = baseline[roles["temperatures"]], baseline[roles["responses"]]
         unit = next(iter(read.units.values())) if len(set(read.units.values())) == 1 else ""
-        found = check_records(T, F, unit=unit), find_memory(T, F)
-        return cls(looks, form, records, baseline, len(read.waiting), read.units, *found)
+        chosen = TemperatureMapper().behind_means(T, F)
+        means = chosen[0] if isinstance(chosen, Pipeline) else None
+        findings = check_records(T, F, unit=unit)
+        return cls(looks, form, records, baseline, len(read.waiting), read.units, findings, means)
 
     @property
     def step(self) -> pd.Timedelta:
@@ -136,7 +140,13 @@ class Proposal:
             "values missing"
         )
         yield f"temperatures: {', '.join(self.records.temperatures)}; responses: {', '.join(self.records.responses)}"
-        yield self.memory.summary()
+        if self.means is None:
+            yield "means of earlier temperatures do not lower the error of the responses in periods held out"
+        else:
+            yield (
+                "the responses depend on earlier temperatures: their means with half-lives of "
+                f"{' and '.join(self.means.half_lives)} lower the error in periods held out"
+            )
 
     @cached_property
     def detectors(self) -> list[Candidate]:
@@ -165,10 +175,9 @@ class Proposal:
     @property
     def features(self) -> list[tuple[str, dict[str, Any]]]:
         """Classes and settings of what is made of temperatures: means that explain responses, and hinges."""
-        means = self.memory.features
-        if means is None:
+        if self.means is None:
             return [("HingeFeatures", {})]
-        chosen = {"time_constants": list(means.time_constants), "sensors": list(means.sensors)}
+        chosen = {"half_lives": list(self.means.half_lives), "sensors": list(self.means.sensors)}
         return [("ExponentialMeans", chosen), ("HingeFeatures", {})]
 
     @property

@@ -305,7 +305,7 @@ def _as_fleet(
     code: int,
 ) -> int:
     """Say which alarms are significant among those of several bridges, and write their page; the exit code."""
-    from skthermo.fleet import Fleet  # a job of one bridge needs none
+    from skthermo.monitoring import Fleet  # a job of one bridge needs none
 
     loaded = {one.name: bridge.load for bridge, one in zip(bridges, done, strict=True) if one.state is not None}
     if len(loaded) + sum(one.state is None for one in done) < len(done):

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, check_path
-from skthermo._core.matrix_files import read_matlab
+from skthermo._core.matlab import read_matlab
 from skthermo._core.warnings import warn_each
 from skthermo.datasets._results import KW51Monitoring
 from skthermo.exceptions import RecordsWarning, SkthermoWarning

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import check_path, positive_integer
-from skthermo._core.matrix_files import read_matlab
+from skthermo._core.matlab import read_matlab
 from skthermo.datasets._results import Z24Monitoring
 from skthermo.fem import AffineModel, Beam, Spring, Structure
 

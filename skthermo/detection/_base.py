@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
-from skthermo._core.arrays import Array
+from skthermo._core.arrays import NORMAL, Array, spread_evenly
 from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._core.frames import row_times
 from skthermo._core.warnings import warn_each
@@ -261,6 +261,20 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         warn_each(self.findings_)
         return self
 
+    def _interleaved_folds(self, F: Array, times: Array) -> NDArray[np.intp]:
+        """The fold of each row: blocks of time dealt in turn to five folds, or up to twenty folds of few rows.
+
+        There are fifty blocks, so that each fold has all seasons; of residuals, which have none, as many as they are
+        worth pairs of independent rows, but at least five, so that a block is a stranger to its neighbours.
+        """
+        n_rows, order = len(times), np.argsort(times, kind="stable")
+        residuals = F.T[(self.report_["read_as"] == "residual").to_numpy()][:, order]
+        numbers = [independent_records(values) for values in residuals]
+        n_blocks = np.clip(np.median(numbers) / 2, 5, 50) if numbers else 50
+        ranks = np.empty(n_rows, dtype=np.intp)
+        ranks[order] = np.arange(n_rows)
+        return ranks // max(int(n_rows / n_blocks), 1) % (5 if n_rows > 100 else min(n_rows, 20))
+
     def _relative(self, X: ArrayLike) -> Array:
         """Rows of X as `fit` read them: frequencies divided by their level, residuals as they are."""
         check_is_fitted(self)
@@ -298,26 +312,11 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
 
 def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:
     """A baseline as detectors learn it, and how each column was read; what was set aside is added to the findings."""
-    infinite, F = np.isinf(F), np.where(np.isinf(F), np.nan, F)
-    empty = np.isnan(F).all(axis=0)
-    if empty.any():
-        raise ValueError(f"column {list(names)[empty.argmax()]!r} has no value in {len(F)} rows; expected some in each")
-    constant = np.fmin.reduce(F) == np.fmax.reduce(F)
-    if constant.any():
-        raise ValueError(f"column {list(names)[constant.argmax()]!r} has a single value; expected values that vary")
-    middle = np.nanmedian(F, axis=0)
-    scatter = 1.4826 * np.nanmedian(np.abs(F - middle), axis=0)  # the standard deviation of normal values
-    is_frequency = (middle > 0) & (scatter < middle / 3)
-    farthest = np.where(is_frequency, middle / 2, np.where(scatter > 0, 100 * scatter, np.inf))
-    far = (np.abs(F - middle) > farthest) | infinite
-    F = np.where(far, np.nan, F)
-    is_frequency &= (np.fmin.reduce(F) > 0) & (np.nanstd(F, axis=0) < np.nanmean(F, axis=0) / 3)
-    level = np.where(is_frequency, np.nanmean(F, axis=0), 1.0)
-    table = pd.DataFrame(
-        {"read_as": np.where(is_frequency, "frequency", "residual"), "level": level, "n_set_aside": far.sum(axis=0)},
-        index=pd.Index(names),
-    )
+    read = [read_column(values, name) for values, name in zip(F.T, names, strict=True)]
+    table = pd.DataFrame([row for row, _ in read], index=pd.Index(names))
+    far = np.column_stack([rows for _, rows in read])
     if far.any():
+        F = np.where(far, np.nan, F)
         findings.append(
             RecordsWarning(
                 f"values of {', '.join(map(repr, table.index[far.any(axis=0)]))} are far from all others there. They "
@@ -325,7 +324,29 @@ def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple
                 "set-aside",
             )
         )
-    return F / level, table
+    return F / table["level"].to_numpy(), table
+
+
+def read_column(values: Array, name: Any) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """As what a column was read, and which of its values are far from all others."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        raise ValueError(f"column {name!r} has no value in {len(values)} rows; expected some in each")
+    if known.min() == known.max():
+        raise ValueError(f"column {name!r} has a single value; expected values that vary")
+    some = spread_evenly(known, 10_000)  # which tell enough
+    middle = np.median(some)
+    scatter = NORMAL * np.median(np.abs(some - middle))
+    is_frequency = middle > 0 and scatter < middle / 3
+    farthest = middle / 2 if is_frequency else 100 * scatter or np.inf
+    far = np.abs(values - middle) > farthest
+    far |= np.isinf(values)
+    if far.any():
+        known = known[np.abs(known - middle) <= farthest]
+    mean = known.mean()
+    is_frequency = is_frequency and known.min() > 0 and known.std() < mean / 3
+    kind, level = ("frequency", mean) if is_frequency else ("residual", 1.0)
+    return {"read_as": kind, "level": level, "n_set_aside": int(far.sum())}, far
 
 
 def conformal_threshold(index: Array, contamination: float) -> float:
@@ -333,21 +354,15 @@ def conformal_threshold(index: Array, contamination: float) -> float:
 
     Each index comes from a detector that has not learned its record; NaN is left out.
     """
-    ordered = np.sort(index[~np.isnan(index)])
-    rank = int(np.ceil((len(ordered) + 1) * (1 - contamination) - 1e-9))
-    threshold = float(ordered[min(rank, len(ordered)) - 1]) if len(ordered) else np.inf
+    known = index[~np.isnan(index)]
+    rank = min(int(np.ceil((len(known) + 1) * (1 - contamination) - 1e-9)), len(known)) - 1
+    threshold = float(np.partition(known, rank)[rank]) if len(known) else np.inf
     if threshold == np.inf:
         raise ValueError(
-            f"{len(ordered)} baseline rows are too few for their number of modes: without a fifth of them, the others "
+            f"{len(known)} baseline rows are too few for their number of modes: without a fifth of them, the others "
             "do not determine the covariance; expected more rows"
         )
     return threshold
-
-
-def interleaved_folds(times: Array) -> NDArray[np.intp]:
-    """The fold of each row: fifty blocks of time dealt in turn to five folds, or up to twenty folds of few rows."""
-    n_rows, ranks = len(times), np.argsort(np.argsort(times, kind="stable"))
-    return ranks // max(n_rows // 50, 1) % (5 if n_rows > 100 else min(n_rows, 20))
 
 
 def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> tuple[float, list[SkthermoWarning]]:

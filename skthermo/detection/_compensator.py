@@ -21,6 +21,7 @@ from skthermo._core.estimators import (
     _fit_context,
     check_is_fitted,
     validate_data,
+    with_means,
 )
 from skthermo._core.frames import column_names, frame_like, marker_findings, positions_of
 from skthermo._core.warnings import collected, warn_each
@@ -30,11 +31,11 @@ from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRows
 from skthermo.preprocessing import set_aside
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.gaussian import Gaussian
+from skthermo.residuals.sensors import SensorRegression, filled_text
 from skthermo.residuals.weather import (
     BEYOND,
-    SensorRegression,
+    Extrapolation,
     TrainingRange,
-    filled_text,
     misplaced_columns,
     unpredicted_text,
     unseen_weather,
@@ -82,6 +83,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Regression of each of the other columns on the others: ``sensors_.fill(T)`` and ``sensors_.departures(T)``.
     training_range_ : object
         Lowest and highest values of the other columns.
+    extrapolation_ : object
+        Variance of residuals outside these values, ``extrapolation_.variances(T)``, in terms of the one inside.
     targets_ : ndarray of int
         Positions of the targets.
     findings_ : list of SkthermoWarning
@@ -100,7 +103,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
 
     Residuals of records whose prediction is less certain than usual in the baseline are divided by sqrt(1 + e / s),
     with the excess e of its variance and the variance s of the baseline's residuals. A prediction is uncertain where
-    temperatures were filled, and where the estimator's ``predict`` takes ``return_std`` and says so.
+    temperatures were filled, and where the estimator's ``predict`` takes ``return_std`` and says so. Outside the
+    baseline's weather, by d times the range of a column, residuals are divided by the root of 1 + g ln(1 + d^2)
+    besides: the coldest and the warmest fifth of the baseline, each predicted from the other records, tell a growth g
+    for either end.
 
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design: it predicts each row of the baseline by a clone
     fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than those of new
@@ -343,7 +349,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         predicted, doubts = self._regress(inputs, F, folds)
         residuals = self._difference(Y, predicted)
         self.scale_, self.usual_deviation_ = robust_deviation(residuals), median(self._deviations(predicted))
-        residuals = self._shrunk(residuals, self._with_fills(T, inputs, predicted))
+        self.extrapolation_ = self._learn_extrapolation(as_floats(inputs), inputs, F)
+        residuals = self._shrunk(residuals, inputs, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
         text = unpredicted_text(unknown, as_floats(inputs))
@@ -357,6 +364,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Targets that are far from a first regression do not train the second one.
         """
         estimator, Y = self._default_part("estimator") if self.estimator is None else self.estimator, as_floats(F)
+        estimator = with_means(estimator, T, F)
         for _ in range(2):
             with collected() as found:
                 self.regression_ = RowsRegression.fitted(estimator, T, F)
@@ -368,6 +376,20 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             F = frame_like(F, np.where(far, np.nan, Y))
         self.estimator_ = self.regression_.estimator
         return predicted, found
+
+    def _learn_extrapolation(self, weather: Array, inputs: Any, F: Any) -> Extrapolation:
+        """How residuals scatter where the regression extrapolates, in the coldest and the warmest fifth of records."""
+        estimator, scale = self._default_part("estimator") if self.estimator is None else self.estimator, self.scale_
+
+        def residuals_of(others: Rows, fifth: Rows) -> Array:
+            try:
+                with collected():
+                    predicted = self.regression_.out_of_fold(estimator, inputs, F, [(others, fifth)])[:, fifth]
+            except ValueError:  # the others are too few for a regression
+                return np.full((len(fifth), F.shape[1]), np.nan)
+            return self._difference(as_floats(F)[fifth], predicted) / np.where(scale > 0, scale, np.nan)
+
+        return Extrapolation.learned(self.training_range_, weather, residuals_of)
 
     def inputs(self, X: ArrayLike) -> tuple[Any, list[SkthermoWarning]]:
         """The columns beside the targets, gaps filled from the other sensors.
@@ -414,7 +436,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             *self.sensors_.doubts(T),
             *as_findings(UnevaluatedRowsWarning, unpredicted_text(unknown, as_floats(inputs)), "not-predicted"),
         ]
-        residuals = self._shrunk(self._difference(as_floats(F), predicted), predicted)
+        residuals = self._shrunk(self._difference(as_floats(F), predicted), inputs, predicted)
         return frame_like(F, residuals), inputs, findings
 
     def _difference(self, Y: Array, predicted: Array) -> Array:
@@ -438,11 +460,12 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Standard deviations of predictions, relative for relative residuals."""
         return np.where(self.relative_, predicted[1] / np.abs(predicted[0]), predicted[1])
 
-    def _shrunk(self, residuals: Array, predicted: Array) -> Array:
+    def _shrunk(self, residuals: Array, inputs: Any, predicted: Array) -> Array:
         """Residuals that count less where the regression is less certain than it usually was in the baseline."""
         excess = np.maximum(self._deviations(predicted) ** 2 - self.usual_deviation_**2, 0.0)
         variance = np.where(self.scale_ > 0, self.scale_, 1.0) ** 2
-        return residuals / np.sqrt(1 + np.nan_to_num(excess) / variance)
+        outside = self.extrapolation_.variances(inputs)[:, np.newaxis]
+        return residuals / np.sqrt(outside + np.nan_to_num(excess) / variance)
 
     def _filled(self, T: Any) -> tuple[Any, list[SkthermoWarning]]:
         """Inputs whose gaps the other sensors fill, and a finding that names these."""

@@ -13,9 +13,7 @@ from sklearn.base import BaseEstimator, clone
 
 from skthermo._core.arrays import Array, as_floats, check_probability, patterns, real_array
 from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
-from skthermo.detection._base import interleaved_folds
-from skthermo.detection._mahalanobis import MahalanobisDetector
-from skthermo.preprocessing.folds import Rows, out_of_fold
+from skthermo.detection._mahalanobis import MahalanobisDetector, normal_of
 from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.gaussian import Gaussian, precisions
 
@@ -150,19 +148,13 @@ class DirectionalDetector(MahalanobisDetector):
         white = self._white_effects()
         self.sensitivities_ = pd.Series(np.linalg.norm(white, axis=0), self.directions_.index)
         self.indistinguishable_ = alike(white, self.directions_.index)
-        indices = self._both(self.covariance_, F)
-        if self.threshold == "conformal":
-
-            def learn(train: Rows) -> Callable[[Rows], Array]:
-                learned = self._fitted(F[train])
-                return lambda test: self._both(learned, F[test])
-
-            indices = out_of_fold(learn, interleaved_folds(times))
+        is_conformal = self.threshold == "conformal"
+        indices = self._by_others(self._both, F, times) if is_conformal else self._both(normal_of(self.covariance_), F)
         self.omnibus_scale_ = self._scale_of_omnibus(*indices.T)
         return self._joined(*indices.T)
 
     def _index(self, F: Array) -> Array:
-        return self._joined(*self._both(self.covariance_, F).T)
+        return self._joined(*self._both(normal_of(self.covariance_), F).T)
 
     def _joined(self, omnibus: Array, cone: Array) -> Array:
         if self.omnibus in (0, 1):
@@ -176,15 +168,13 @@ class DirectionalDetector(MahalanobisDetector):
         rates = (1 - self.omnibus) * self.contamination, self.omnibus * self.contamination
         return rare_level(cone, rates[0]) / rare_level(omnibus, rates[1])
 
-    def _both(self, learned: BaseEstimator | None, F: Array) -> Array:
+    def _both(self, normal: Gaussian, F: Array) -> Array:
         """Mahalanobis distance and length in the cone of each row, as if no mode were missing, (n_rows, 2)."""
-        if learned is None:
-            return np.full((len(F), 2), np.inf)
-        lengths = project(learned, self.directions_.to_numpy(), F)[1]
+        lengths = project(normal, self.directions_.to_numpy(), F)[1]
         present = ~np.isnan(F)
         lengths[~present.any(axis=1)] = np.nan
         lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))
-        return np.column_stack([self._indices(learned, F), lengths])
+        return np.column_stack([self._indices(normal, F), lengths])
 
     def severities(self, X: ArrayLike) -> pd.DataFrame:
         """Losses by which the test explains each record.
@@ -203,7 +193,7 @@ class DirectionalDetector(MahalanobisDetector):
             ``indistinguishable_`` share what either could explain.
         """
         check_is_fitted(self)
-        amounts = project(self.covariance_, self.directions_.to_numpy(), self._relative(X))[0]
+        amounts = project(normal_of(self.covariance_), self.directions_.to_numpy(), self._relative(X))[0]
         index = X.index if isinstance(X, pd.DataFrame) else None
         return pd.DataFrame(np.minimum(amounts, self._largest), index, self.directions_.index)
 
@@ -222,8 +212,8 @@ class DirectionalDetector(MahalanobisDetector):
             groups has happened, such as of a bearing or a mass. NaN where a record has no mode.
         """
         F = self._relative(X)
-        lengths = project(self.covariance_, self.directions_.to_numpy(), F)[1]
-        distances = Gaussian(self.covariance_.location_, self.covariance_.covariance_).distances(F)
+        lengths = project(normal_of(self.covariance_), self.directions_.to_numpy(), F)[1]
+        distances = normal_of(self.covariance_).distances(F)
         shares = np.full(len(F), np.nan)
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
 
@@ -296,19 +286,19 @@ class DirectionalDetector(MahalanobisDetector):
         return np.inf if isinstance(self.directions, pd.DataFrame) or np.ndim(self.directions) else 1.0
 
 
-def project(learned: BaseEstimator, directions: Array, F: Array, n_rows: int = 20_000) -> tuple[Array, Array]:
+def project(normal: Gaussian, directions: Array, F: Array, n_rows: int = 20_000) -> tuple[Array, Array]:
     """Amounts of the directions that explain each row best, and the length of its projection on their cone.
 
     So many rows are solved at once, which bounds memory.
     """
-    scale = np.sqrt(np.diag(learned.covariance_))
-    correlation, effects = learned.covariance_ / np.outer(scale, scale), directions.T / scale[:, np.newaxis]
+    scale = np.sqrt(np.diag(normal.covariance))
+    correlation, effects = normal.covariance / np.outer(scale, scale), directions.T / scale[:, np.newaxis]
     amounts, lengths = np.empty((len(F), len(directions))), np.empty(len(F))
     for start in range(0, len(F), n_rows):
         rows = slice(start, start + n_rows)
         masks, pattern = patterns(~np.isnan(F[rows]))
         weighted = precisions(correlation, masks) @ effects
-        standard = np.nan_to_num(F[rows] - learned.location_) / scale
+        standard = np.nan_to_num(F[rows] - normal.mean) / scale
         along = np.einsum("ij,ijk->ik", standard, weighted[pattern]) if len(masks) > 1 else standard @ weighted[0]
         amounts[rows], lengths[rows] = project_on_cones(effects.T @ weighted, along, pattern)
     amounts[np.isnan(F).all(axis=1)] = np.nan

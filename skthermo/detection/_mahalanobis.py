@@ -12,7 +12,7 @@ from sklearn.covariance import EmpiricalCovariance
 
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import HasMethods, StrOptions
-from skthermo.detection._base import DamageDetector, conformal_threshold, interleaved_folds
+from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.exceptions import FewRecordsWarning, ResultWarning, SkthermoWarning
 from skthermo.preprocessing.folds import Rows, out_of_fold
 from skthermo.residuals.gaussian import Gaussian, check_invertible, modes_text
@@ -36,7 +36,8 @@ class MahalanobisDetector(DamageDetector):
         How the threshold is set:
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances of the n baseline records,
-          each from records of other blocks of time: fifty blocks, dealt in turn to five folds.
+          each from records of other blocks of time, dealt in turn to five folds: fifty blocks or, of residuals, as
+          few as are longer than these remember.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
           of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5 % false alarms
           where 2 % are asked for.
@@ -106,14 +107,24 @@ class MahalanobisDetector(DamageDetector):
 
     def _learn(self, F: Array, times: Array) -> Array:
         self.covariance_ = self._fitted(F, self.findings_)
-        if self.threshold != "conformal":
-            return self._index(F)
+        return self._by_others(self._indices, F, times) if self.threshold == "conformal" else self._index(F)
+
+    def _by_others(self, value: Callable[[Gaussian, Array], Array], F: Array, times: Array) -> Array:
+        """Value of each row by the distribution of other rows; infinite where these do not determine one."""
+        whole, is_moments = normal_of(self.covariance_), self.covariance is None and not np.isnan(F).any()
 
         def learn(train: Rows) -> Callable[[Rows], Array]:
-            learned = self._fitted(F[train])
-            return lambda test: self._indices(learned, F[test])
+            try:
+                if is_moments:
+                    others = whole.without(np.delete(F, train, axis=0), len(F))
+                    check_invertible(others, len(train), has_gaps=False)
+                else:
+                    others = normal_of(self._fitted(F[train], []))
+            except ValueError:
+                return lambda test: np.full_like(value(whole, F[test]), np.inf)
+            return lambda test: value(others, F[test])
 
-        return out_of_fold(learn, interleaved_folds(times))
+        return out_of_fold(learn, self._interleaved_folds(F, times))
 
     def _limit(self, index: Array) -> float:
         if self.threshold == "chi2":
@@ -123,59 +134,47 @@ class MahalanobisDetector(DamageDetector):
         return conformal_threshold(index, self.contamination)
 
     def _index(self, F: Array) -> Array:
-        return self._indices(self.covariance_, F)
+        return self._indices(normal_of(self.covariance_), F)
 
-    def _indices(self, learned: BaseEstimator | None, F: Array) -> Array:
-        """Damage index of rows by a fitted covariance; infinite if there is none."""
-        if learned is None:
-            return np.full(len(F), np.inf)
-        if self.covariance is not None and not np.isnan(F).any():
-            return np.sqrt(learned.mahalanobis(F))
-        distances = Gaussian(learned.location_, learned.covariance_).distances(F)
+    def _indices(self, normal: Gaussian, F: Array) -> Array:
+        """Damage index of rows by a distribution of healthy ones."""
+        distances = normal.distances(F)
         return as_if_complete(distances, F) if np.isnan(F).any() else distances
 
-    def _fitted(self, F: Array, findings: list[SkthermoWarning] | None = None) -> BaseEstimator | None:
-        """Mean and covariance of rows, as one of scikit-learn's covariance estimators.
-
-        Rows that do not determine a covariance are refused with findings, and give None without.
-        """
+    def _fitted(self, F: Array, findings: list[SkthermoWarning]) -> BaseEstimator:
+        """Mean and covariance of rows, as one of scikit-learn's covariance estimators."""
         names = getattr(self, "feature_names_in_", None)
-        try:
-            if self.covariance is None:
-                return most_likely(F, names, [] if findings is None else findings)
-            complete = F[~np.isnan(F).any(axis=1)]
-            if len(complete) < 2:
-                raise ValueError(
-                    f"{len(complete)} of {len(F)} rows have every mode; expected at least 2 for the covariance "
-                    f"{self.covariance!r} (covariance=None takes rows with gaps)"
-                )
-            fitted = clone(self.covariance).fit(complete)
-            check_invertible(fitted.covariance_, complete, names=names)
-            return fitted
-        except ValueError:
-            if findings is not None:
-                raise
-            return None
+        if self.covariance is None:
+            return most_likely(F, names, findings)
+        complete = F[~np.isnan(F).any(axis=1)]
+        if len(complete) < 2:
+            raise ValueError(
+                f"{len(complete)} of {len(F)} rows have every mode; expected at least 2 for the covariance "
+                f"{self.covariance!r} (covariance=None takes rows with gaps)"
+            )
+        fitted = clone(self.covariance).fit(complete)
+        check_invertible(normal_of(fitted), len(complete), has_gaps=False, names=names)
+        return fitted
 
     def _has_likelihood(self) -> bool:
         return True
 
     def _log_densities(self, F: Array) -> Array:
-        return Gaussian(self.covariance_.location_, self.covariance_.covariance_).log_densities(F)
+        return normal_of(self.covariance_).log_densities(F)
+
+
+def normal_of(fitted: BaseEstimator) -> Gaussian:
+    """The normal distribution with the mean and the covariance that an estimator has learned."""
+    return Gaussian(fitted.location_, fitted.covariance_)
 
 
 def most_likely(F: Array, names: Sequence[str] | None, findings: list[SkthermoWarning]) -> EmpiricalCovariance:
     """Mean and covariance of rows with or without gaps, by expectation maximisation."""
-    empty = np.isnan(F).all(axis=0)
-    if empty.any():
-        raise ValueError(f"{modes_text(empty, names)} are NaN in all {len(F)} rows")
-    apart = np.argwhere(~(~np.isnan(F).T @ ~np.isnan(F)))
-    if len(apart):
-        pair = modes_text(np.isin(np.arange(F.shape[1]), apart[0]), names)
-        text = f"{pair} never have a value in the same row: their correlation is inferred from the other modes. Leave "
-        findings.append(FewRecordsWarning(text + "one of them out, or give records with both", "modes-never-together"))
+    has_gaps = bool(np.isnan(F).any())
+    if has_gaps:
+        look_at_gaps(F, names, findings)
     normal = Gaussian.fitted(F)
-    scale = check_invertible(normal.covariance, F, names=names)
+    scale = check_invertible(normal, len(F), has_gaps=has_gaps, names=names)
     if not normal.is_settled:
         text = (
             "gaps leave a part of the covariance nearly undetermined. Leave out the mode that is missing most, or give "
@@ -185,6 +184,18 @@ def most_likely(F: Array, names: Sequence[str] | None, findings: list[SkthermoWa
     learned.location_, learned.covariance_, learned.n_features_in_ = normal.mean, normal.covariance, F.shape[1]
     learned.precision_ = np.linalg.inv(normal.covariance / np.outer(scale, scale)) / np.outer(scale, scale)
     return learned
+
+
+def look_at_gaps(F: Array, names: Sequence[str] | None, findings: list[SkthermoWarning]) -> None:
+    """Refuse modes without a value, and find modes that have none in the same row."""
+    present = (~np.isnan(F)).astype(float)
+    n_together = present.T @ present
+    if (np.diag(n_together) == 0).any():
+        raise ValueError(f"{modes_text(np.diag(n_together) == 0, names)} are NaN in all {len(F)} rows")
+    if (n_together == 0).any():
+        pair = modes_text(np.isin(np.arange(F.shape[1]), np.argwhere(n_together == 0)[0]), names)
+        text = f"{pair} never have a value in the same row: their correlation is inferred from the other modes. Leave "
+        findings.append(FewRecordsWarning(text + "one of them out, or give records with both", "modes-never-together"))
 
 
 def as_if_complete(distances: Array, F: Array) -> Array:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, DensityMixin, clone
 from sklearn.neighbors import KernelDensity
 
-from skthermo._core.arrays import Array, as_floats
+from skthermo._core.arrays import Array, as_floats, spread_evenly
 from skthermo._core.estimators import HasMethods, Interval, StrOptions
 from skthermo._core.frames import column_names
 from skthermo._core.text import listed
-from skthermo.detection._base import DamageDetector, conformal_threshold, interleaved_folds
+from skthermo.detection._base import DamageDetector, conformal_threshold
 from skthermo.preprocessing.folds import BlockedKFold, out_of_fold
 
 
@@ -38,7 +38,7 @@ class OutlierDetector(DamageDetector):
         How the threshold is set:
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the indices that the n baseline records
-          have by clones fitted on others: five more fits, each without a fifth of fifty blocks of time.
+          have by clones fitted on others: five more fits, each without a fifth of the blocks of time.
         - ``"quantile"``: the (1 - contamination) quantile of the indices of the records that the estimator was fitted
           on, in one fit. Estimators that score such records better than new ones, as ``LocalOutlierFactor`` does, then
           raise more false alarms than asked for.
@@ -126,14 +126,14 @@ class OutlierDetector(DamageDetector):
         if self.threshold == "quantile":
             return self._index(F)
         known, index = F[complete], np.full(len(F), np.nan)
-        folds = self._folds(times[complete])
+        folds = self._folds(times[complete], known)
         index[complete] = out_of_fold(lambda train: lambda test: self._index_from(known[train], known[test]), folds)
         return index
 
-    def _folds(self, times: Array) -> NDArray[np.intp]:
+    def _folds(self, times: Array, F: Array) -> NDArray[np.intp]:
         """The fold of each complete row."""
         if self.block is None:
-            return interleaved_folds(times)
+            return self._interleaved_folds(F, times)
         is_timed = np.ptp(times) > 1e12  # numbers of rows are smaller, and nanoseconds larger
         index = pd.DatetimeIndex(times.astype("datetime64[ns]")) if is_timed else pd.Index(times)
         return BlockedKFold(min(5, len(times)), block=self.block).fold_of(pd.DataFrame(index=index))
@@ -160,8 +160,8 @@ class OutlierDetector(DamageDetector):
 
         The score of a support vector machine, as an example, grows with the number of records that it was fitted on.
         """
-        fitted = clone(self.estimator).fit(others)
-        own, ours = (np.quantile(_index_of(one, others), [0.25, 0.5, 0.75]) for one in (fitted, self.estimator_))
+        fitted, some = clone(self.estimator).fit(others), spread_evenly(others, 1000)  # which tell quartiles
+        own, ours = (np.quantile(_index_of(one, some), [0.25, 0.5, 0.75]) for one in (fitted, self.estimator_))
         scale = (ours[2] - ours[0]) / (own[2] - own[0]) if own[2] > own[0] else 1.0
         return ours[1] + scale * (_index_of(fitted, rows) - own[1])
 

@@ -32,13 +32,12 @@ class Corrected:
     """Records as the detector sees them, and what became of their values.
 
     ``notes`` has a row for each record: ``n_held`` responses that were set aside although the structure may have moved
-    them, ``held`` names them; ``n_left_out`` values, and ``note``. ``drift`` is the share of stiffness by day and group
-    that is taken out of the frequencies.
+    them, ``held`` names them; ``n_left_out`` values; ``note``; and the shares of stiffness by group, as in "drift top",
+    that are taken out of the frequencies. ``states`` are those at the beginning of each day.
     """
 
     records: pd.DataFrame
     notes: pd.DataFrame
-    drift: pd.DataFrame
     states: tuple[DayState, ...]
 
 
@@ -97,8 +96,7 @@ class Corrections:
             if stop < len(raw):
                 state = self._after(state, day)
         records, notes = (pd.concat(list(some)) for some in zip(*parts, strict=True))
-        drift = {} if self.drift is None else {one.day: self.drift.taken_out(one.drift) for one in states}
-        return Corrected(records, notes, pd.DataFrame(drift).T.add_prefix("drift "), tuple(states))
+        return Corrected(records, notes, tuple(states))
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
         return records.drop(columns=self.targets), records[self.targets]
@@ -129,12 +127,19 @@ class Corrections:
             seen = self.sensors.masked(state.sensors, T, F, acknowledged)
             T, F, held, n_left_out = seen.T, seen.F, seen.held, n_left_out + seen.n_left_out
             notes = ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)]
+        drift = {}
         if self.drift is not None:
             F = self.drift.corrected(state.drift, F)
+            drift = self.drift.taken_out(state.drift).add_prefix("drift ").to_dict()
         names = [""] * len(raw)
         for row in np.flatnonzero(held.any(axis=1)):
             names[row] = ", ".join(str(self.targets[k]) for k in np.flatnonzero(held[row]))
-        table = {"n_held": held.sum(axis=1).astype(float), "held": names, "n_left_out": n_left_out, "note": notes}
+        table = {
+            "n_held": held.sum(axis=1).astype(float),
+            "held": names,
+            "n_left_out": n_left_out,
+            "note": notes,
+        } | drift
         records = T.join(F)[[name for name in raw.columns if name not in self.reference]]
         return records, pd.DataFrame(table, raw.index).astype({"held": object, "note": object})
 

@@ -123,6 +123,8 @@ class Events:
         effects = decisions.filter(regex="^effect ")
         rows, spans = [], []
         for kind, limit in limits.items():
+            if limit["threshold"].isna().all() or (kind == MEASUREMENT and not is_held.any()):
+                continue
             of_kind = (held, 3) if kind == MEASUREMENT else (shown, persistence)
             level, found = followed(of_kind[0], times, limit, of_kind[1], starts)
             modes = decisions["held" if kind == MEASUREMENT else "modes"]

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import joblib
+import pandas as pd
 import sklearn
+from joblib.numpy_pickle import NumpyUnpickler
 from sklearn.utils.validation import check_is_fitted
 
 import skthermo
@@ -21,7 +23,6 @@ from skthermo._core.files import write_when_complete
 ENDINGS = (".joblib", ".skops")
 TRUSTED = ("skthermo", "sklearn")  # packages whose classes are read from skops' files
 PLAIN = {"zoneinfo.ZoneInfo", "datetime.timezone", "datetime.timedelta", "builtins.frozenset"}
-SPEED = 1  # fastest compression of zlib, which adds a checksum
 
 
 def versions() -> dict[str, str]:
@@ -109,6 +110,36 @@ def load_monitor(path: str | os.PathLike[str]) -> Any:
     return monitor
 
 
+def acknowledgements_in(path: str | os.PathLike[str]) -> pd.DataFrame:
+    """What the owner has said of events, from the file of a monitor, also from a joblib file of version 0.2."""
+    file = _checked(path)
+    try:
+        return load_monitor(file).acknowledgements_
+    except ValueError as refused:
+        try:
+            content = io.BytesIO(zlib.decompress(file.read_bytes()))
+            monitor = _SomeMonitor(str(file), content, ensure_native_byte_order=True).load()
+            said = [vars(one) for one in vars(monitor.history_)["acknowledgements"]]
+        except Exception:  # damaged files raise errors of every type
+            raise refused from None
+    names = {"kind": "kind", "peak_time": "time", "time": "at", "harmless": "harmless", "note": "note"}
+    return pd.DataFrame(said, columns=list(names)).rename(columns=names)
+
+
+class _OfOtherVersion:
+    """An object of skthermo in the file of another version: its attributes alone."""
+
+    def __setstate__(self, state: Any) -> None:
+        vars(self).update(state if isinstance(state, dict) else {})
+
+
+class _SomeMonitor(NumpyUnpickler):
+    """Reads a file of joblib without the classes of skthermo."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        return type(name, (_OfOtherVersion,), {}) if module.startswith("skthermo") else super().find_class(module, name)
+
+
 def _checked(path: Any) -> Path:
     file = check_path(path)
     if file.suffix not in ENDINGS:
@@ -124,12 +155,13 @@ def _by_joblib(monitor: Any) -> bytes:
     """A compressed file of joblib, which ends with a checksum."""
     stream = io.BytesIO()
     joblib.dump(monitor, stream)
-    return zlib.compress(stream.getbuffer(), SPEED)
+    compressor = zlib.compressobj(level=1, strategy=zlib.Z_RLE)  # the fastest, which adds a checksum
+    return compressor.compress(stream.getbuffer()) + compressor.flush()
 
 
 def _from_joblib(content: bytes) -> Any:
     """What joblib wrote, compressed as here or plain."""
-    is_compressed = content[:1] == zlib.compress(b"", SPEED)[:1]
+    is_compressed = content[:1] == zlib.compress(b"")[:1]
     return joblib.load(io.BytesIO(zlib.decompress(content) if is_compressed else content))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from datetime import timedelta
@@ -50,7 +49,7 @@ from skthermo.monitoring._events import (
     leading,
     with_acknowledgements,
 )
-from skthermo.monitoring._files import versions, write_monitor
+from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
 from skthermo.monitoring._records import OF_TRAINING, Intake, Lookback, read_records
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
@@ -90,7 +89,7 @@ class Monitor(SavesFrames, Estimator):
     max_delay : str or timedelta, default="7D"
         How late records may come and still be evaluated as if they had come in time.
     retention : str or timedelta, default="400D"
-        How long raw records are kept, for a new fit and to tell repeated records.
+        How far back records may train a new detector. All records since the baseline are kept.
     sensors : bool, default=True
         Whether sensors are watched, and those that fail left out.
     units : str or mapping of str to str, optional
@@ -124,8 +123,11 @@ class Monitor(SavesFrames, Estimator):
         such. NaN where none is seen.
     watch_threshold_ : float or None
         An event of kind "watch" opens with an index above it, in the same way; None without ``watch_per_year``.
+    baseline_peaks_ : Series
+        Highest levels of the index in separate times of the baseline, in descending order: the k-th is exceeded by k
+        events in as long a time, if the structure is healthy.
     lookback_ : object
-        Which earlier records the evaluation of a record needs.
+        How far before a record the detector looks.
     events_ : DataFrame
         A row for each event, counted from 1: ``kind`` ("damage", "watch", or "measurement or structure":
         responses that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it
@@ -137,7 +139,7 @@ class Monitor(SavesFrames, Estimator):
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
         ``index_median``, ``index_max`` and, where drift is followed, a column ``drift GROUP`` for each group.
     evaluations_ : DataFrame
-        The latest evaluation of each record that is kept, as `update` gives it.
+        The latest evaluation of each record since the baseline, as `update` gives it.
     faults_ : DataFrame
         Sensors that have failed: ``column``, ``kind``, ``since``, ``detected``, ``until``, ``detail``.
     drift_ : DataFrame or None
@@ -148,7 +150,7 @@ class Monitor(SavesFrames, Estimator):
         same), ``n_too_late`` and ``n_ahead`` (set aside at present), neither of them evaluated; ``n_repeated``; and
         ``n_left_out``: values that came and were not used.
     baseline_, records_, corrected_ : DataFrame
-        Records of the baseline and those kept since, both raw, and the latter as the detector sees them.
+        Records of the baseline and those since, both raw, and the latter as the detector sees them.
     last_ : Timestamp
         Stamp of the newest record.
     left_out_ : dict
@@ -157,17 +159,31 @@ class Monitor(SavesFrames, Estimator):
     set_aside_ : DataFrame
         Values of the baseline that cannot be, and count as missing: a row for each finding, as in
         `~skthermo.preprocessing.SetAside`.
-    columns_ : list
-        Names of the columns that `fit` saw, which `update` expects.
+    columns_, reference_, features_ : list
+        Names of the columns that `fit` saw, which `update` expects, those of ``reference`` among them, and those that
+        the detector sees.
     trained_ : DataFrame
         What the detector in charge was fitted on: the baseline, or what `refit` or `rebaseline` made of it.
     prior_, since_ : DataFrame and Timestamp, or None
         After `rebaseline`: records from before the intervention, and when it was complete.
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
-    active_, history_ : object
-        The detector in charge with all by which it evaluates, and all that was evaluated so far. Both are immutable:
-        `update`, `refit` and `rebaseline` put others in their place.
+    decisions_ : DataFrame
+        What was decided of each record since the baseline, from which ``events_``, ``evaluations_`` and ``days_`` are
+        computed: ``index``, levels of the detector in charge then, and what was left out, held or explained.
+    acknowledgements_ : DataFrame
+        What the owner has said: ``kind`` of the event, a ``time`` in it and the newest record ``at`` which it was said
+        (both in nanoseconds), ``harmless`` and ``note``.
+    transitions_ : tuple of dict
+        As `transitions` gives them.
+    restarts_ : tuple of int
+        Times (nanoseconds) at which a new baseline has ended all events.
+    ahead_ : DataFrame
+        Records that are set aside, because they are stamped too far ahead.
+    tallies_ : dict
+        Numbers of repeated, late and too late records.
+    corrections_, states_, began_ : object, tuple and Timestamp
+        Checks of sensors and drift; what they knew at the beginning of each of the last days; and their first day.
 
     See Also
     --------
@@ -179,8 +195,8 @@ class Monitor(SavesFrames, Estimator):
     batch of all of them. Lags and windows reach into earlier batches, and into the end of the baseline. Records that
     come late are evaluated with those around them, and later ones anew: what `update` says last of a stamp counts.
 
-    The damage index is rounded to six decimals, and one above 10 to seven digits. Where the last bits, which depend on
-    how many records are evaluated at once, would decide how, the index of the record alone with its memory counts.
+    The damage index is rounded to six decimals, and one above 10 to seven digits, as its last bits depend on how many
+    records are evaluated at once.
 
     A number that loggers write for a missing one (-999) is taken as missing where the baseline does not reach it, as is
     a temperature more than 100 degrees beyond the baseline's that is above 100 or below -80 degrees Celsius, as in
@@ -277,24 +293,22 @@ class Monitor(SavesFrames, Estimator):
                 "n_left_out": self.decisions_["n_left_out"],
             }
         ).astype(np.int64)
-        by_day = answers["index"].groupby(midnights(answers.index).rename("day"))
-        table = table.groupby(midnights(answers.index).rename("day")).sum()
-        return table.assign(index_median=by_day.median(), index_max=by_day.max()).join(self.drift_days_)
+        day = midnights(answers.index).rename("day")
+        index, drift = (one.groupby(day) for one in (answers["index"], self.decisions_.filter(regex="^drift ")))
+        table = table.groupby(day).sum().assign(index_median=index.median(), index_max=index.max())
+        return table.join(drift.first())
 
     @property
     def counts_(self) -> dict[str, int]:
         """Numbers of records that came, and what became of them."""
         n_outside = self.tallies_["n_too_late"] + len(self.ahead_)
-        n_unknown = int((self.evaluations_["state"] == "not evaluated").sum())
-        return (
-            {"n_records": len(self.decisions_) + n_outside}
-            | self.tallies_
-            | {
-                "n_ahead": len(self.ahead_),
-                "n_not_evaluated": n_unknown + n_outside,
-                "n_left_out": int(self.decisions_["n_left_out"].sum()),
-            }
-        )
+        return {
+            "n_records": len(self.decisions_) + n_outside,
+            **self.tallies_,
+            "n_ahead": len(self.ahead_),
+            "n_not_evaluated": int((self.evaluations_["state"] == "not evaluated").sum()) + n_outside,
+            "n_left_out": int(self.decisions_["n_left_out"].sum()),
+        }
 
     @property
     def faults_(self) -> pd.DataFrame:
@@ -388,7 +402,6 @@ class Monitor(SavesFrames, Estimator):
         self.records_ = self.ahead_ = nothing
         self.corrected_ = nothing.drop(columns=self.reference_)
         self.decisions_ = self._decisions(nothing.index)
-        self.drift_days_ = pd.DataFrame(index=nothing.index)
         kinds = {"kind": object, "time": np.int64, "at": np.int64, "harmless": bool, "note": object}
         self.acknowledgements_ = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
         self.transitions_, self.restarts_ = (), ()
@@ -429,9 +442,15 @@ class Monitor(SavesFrames, Estimator):
 
     def _with(self, detector: Any, trained: pd.DataFrame) -> Monitor:
         """This monitor with another detector in charge, which was fitted on some records."""
-        other = copy.copy(self)
-        other._take_charge(detector, trained)
-        return other
+        twin = self._twin()
+        twin._take_charge(detector, trained)
+        return twin
+
+    def _twin(self) -> Monitor:
+        """A monitor that stands as this one, to be changed in its place: an error leaves this one as it was."""
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self))
+        return twin
 
     def _events(self) -> Events:
         return Events(self.decisions_, self.persistence, self.restarts_)
@@ -457,9 +476,7 @@ class Monitor(SavesFrames, Estimator):
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
             self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
         seen = self.corrections_.corrected(begin, raw, self._explained())
-        days = pd.DatetimeIndex([one.day for one in seen.states])
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen.records])
-        self.drift_days_ = pd.concat([self.drift_days_[self.drift_days_.index < begin.day], seen.drift.reindex(days)])
         states = [*(one for one in earlier if one.day < begin.day), *seen.states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
@@ -489,7 +506,7 @@ class Monitor(SavesFrames, Estimator):
         said += [np.where(rows, text, "") for text, rows in remarks.items()]
         reason = ["; ".join(filter(None, parts)) for parts in zip(*said, strict=True)]
         columns = {"index": index, "is_blind": np.asarray(is_blind), "reason": reason}
-        return self._decisions(new.index, **columns, **notes[["n_held", "held", "n_left_out"]])
+        return self._decisions(new.index, **columns, **notes.drop(columns="note"))
 
     def _with_memory(self, n_before: int) -> tuple[pd.DataFrame, int]:
         """Records as the detector sees them, from those on that it looks back to, and the position of the first."""
@@ -576,26 +593,21 @@ class Monitor(SavesFrames, Estimator):
             *(self._read(new), self.baseline_, self.records_, self.ahead_, max_delay),
             are_confirmed=check_flag(confirm, "confirm"),
         )
-        after, fresh = copy.copy(self), intake.fresh.index
+        after, fresh = self._twin(), intake.fresh.index
         numbers = intake.n_repeated, int((fresh < self.last_).sum()), len(intake.too_late)
         after.tallies_ = {name: self.tallies_[name] + n for name, n in zip(self.tallies_, numbers, strict=True)}
         after.ahead_ = intake.ahead
-        answers = self.evaluations_.iloc[:0].assign(revised=False)
+        reasons = pd.concat([intake.too_late, intake.early])
+        refused = self._decisions(reasons.index, reason=reasons.to_numpy())
+        answers = evaluations(refused, Events(refused, 1), self.acknowledgements_).assign(revised=False)
         if len(fresh):
-            after.records_ = (
-                pd.concat([self.records_, intake.fresh]).sort_index() if len(self.records_) else intake.fresh
-            )
+            known = pd.concat([self.records_, intake.fresh])
+            after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
             after._decide(fresh[0])
             after._note(self, fresh[0])
-            answers = _news(self.evaluations_, after.evaluations_, fresh)
-        refused = pd.concat([intake.too_late, intake.early])
-        if len(refused):
-            rows = evaluations(
-                self._decisions(refused.index, reason=refused),
-                Events(self._decisions(refused.index), 1),
-                self.acknowledgements_,
-            )
-            answers = pd.concat([answers, rows.assign(revised=False)]).sort_index(kind="stable")
+            before = self.evaluations_ if fresh[0] < self.last_ else answers[:0]
+            news = _news(before, after.evaluations_, fresh)
+            answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
         vars(self).update(vars(after))
         return answers
@@ -707,7 +719,7 @@ class Monitor(SavesFrames, Estimator):
             raise ValueError(f"event is {event!r}; expected the number of one of the {len(events)} events, from 1")
         if not isinstance(note, str):
             raise ValueError(f"note is {note!r:.100}; expected text")
-        one, after = events.loc[event], copy.copy(self)
+        one, after = events.loc[event], self._twin()
         after._say(one["kind"], one["peak_time"], check_flag(harmless, "harmless"), note)
         done = {"what": "acknowledged", "time": self.last_, "kind": one["kind"], "event": int(event), "detail": note}
         after._note(after, self.last_, done)
@@ -718,6 +730,29 @@ class Monitor(SavesFrames, Estimator):
         row = {"kind": kind, "time": time.value, "at": self.last_.value, "harmless": harmless, "note": note}
         said = pd.DataFrame([row]).astype(self.acknowledgements_.dtypes)
         self.acknowledgements_ = pd.concat([self.acknowledgements_, said], ignore_index=True)
+
+    def keep_acknowledgements(self, path: str | os.PathLike[str]) -> int:
+        """Take over what the owner has said of events, from the file of an earlier monitor of the structure.
+
+        Parameters
+        ----------
+        path : str or path
+            The file of `save`, also one that version 0.2 has written with the ending ``.joblib``.
+
+        Returns
+        -------
+        int
+            Number of acknowledgements. Each holds for an event of the same kind at the same time.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be read.
+        """
+        check_is_fitted(self)
+        said = acknowledgements_in(path).astype(self.acknowledgements_.dtypes)
+        self.acknowledgements_ = pd.concat([said, self.acknowledgements_], ignore_index=True)
+        return len(said)
 
     def discard(self, start: Any, end: Any = None) -> int:
         """Take back records that should not have been taken in, such as those stamped by a wrong clock.
@@ -752,7 +787,7 @@ class Monitor(SavesFrames, Estimator):
         def others(table: pd.DataFrame) -> pd.DataFrame:
             return table[(table.index < first) | (False if last is None else table.index > last)]
 
-        after = copy.copy(self)
+        after = self._twin()
         for name in ("records_", "ahead_", "corrected_", "decisions_"):
             setattr(after, name, others(getattr(self, name)))
         n_discarded = len(self.records_) - len(after.records_) + len(self.ahead_) - len(after.ahead_)
@@ -843,12 +878,8 @@ class Monitor(SavesFrames, Estimator):
         return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
     def _check_times(self) -> None:
-        max_delay, retention = (check_duration(getattr(self, name), name) for name in ("max_delay", "retention"))
-        if retention < max_delay + 2 * DAY:
-            raise ValueError(
-                f"retention is {self.retention!r} and max_delay {self.max_delay!r}; expected records to be kept for at "
-                "least two days longer than they may be late"
-            )
+        for name in ("max_delay", "retention"):
+            check_duration(getattr(self, name), name)
         if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
             raise ValueError(
                 f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
@@ -857,7 +888,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
-        after, trained, today = copy.copy(self), retraining.baseline, midnight(self.last_)
+        after, trained, today = self._twin(), retraining.baseline, midnight(self.last_)
         after._take_charge(retraining.detector, trained)
         after.prior_, after.since_ = retraining.prior, retraining.since
         if retraining.kind == "new baseline":
@@ -923,7 +954,7 @@ def _news(before: pd.DataFrame, after: pd.DataFrame, fresh: pd.DatetimeIndex) ->
     """Evaluations of new records, and of known ones whose evaluation has changed."""
     answers = after[after.index >= fresh[0]]
     is_new = answers.index.isin(fresh)
-    old = before.reindex(answers.index)
+    old = before.reindex(index=answers.index, columns=answers.columns)
     is_same = ((answers == old) | (answers.isna() & old.isna())).all(axis=1).to_numpy()
     return answers.assign(revised=~is_new & ~is_same)[is_new | ~is_same]
 

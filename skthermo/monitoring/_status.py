@@ -102,7 +102,7 @@ class AlarmLevels:
 class MonitorStatus:
     """The state of a monitored structure, and the facts behind it.
 
-    `Monitor.status` and `~skthermo.fleet.Fleet.status` give it; `as_dict` makes it plain values, as JSON has them.
+    `Monitor.status` and `~skthermo.monitoring.Fleet.status` give it; `as_dict` makes it plain values, as JSON has them.
 
     Parameters
     ----------

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from scipy.stats import nbinom
 
 from skthermo._core.arrays import Array
-from skthermo._core.frames import YEAR, usual_step
+from skthermo._core.frames import DAY, YEAR
 from skthermo._core.text import counted_number, duration_text, percent
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning, WeatherWarning
-from skthermo.monitoring._events import levels
+from skthermo.monitoring._events import levels, open_events, runs
 
 WEEK = pd.Timedelta("7D")
-STEPS = (0.0, 0.5, 2.0, 5.0)  # standard deviations of a response, by which it is lowered
 
 
 def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = WEEK) -> NDArray[np.intp]:
@@ -73,7 +72,9 @@ class FalseAlarmEstimate:
 class EventLevels:
     """Levels of the damage index at which events open and close, from the out-of-fold indices of a baseline.
 
-    ``peaks`` are the highest levels of three days, or of as many records as a level has, by their time.
+    ``peaks`` are the highest levels of the times that begin above the level's 80 % quantile and end when it has been
+    within it for a day, as many as there would be events at a lower threshold; of single days where they are fewer
+    than six. They are independent of each other, and have their own times.
     """
 
     threshold: float
@@ -94,30 +95,33 @@ class EventLevels:
                 f"{len(known)} baseline records have a damage index, {len(infinite)} of them an infinite one"
                 f"{f' (the first at {infinite[0]})' if len(infinite) else ''}; expected at least 2, all of them finite"
             )
+        stamps = known.index.as_unit("ns").asi8
         level = pd.Series(levels(known.to_numpy(), persistence), known.index)
-        step = usual_step(known.index)
-        length = max(pd.Timedelta("3D"), (2 * persistence - 1) * step)
-        highest = level.groupby(blocks_of(known.index, length)).idxmax()
+        usual, release = level.quantile([0.8, 0.95])
+        spans = runs(open_events(level.to_numpy(), stamps, usual, usual))
+        highest = [level.iloc[first:stop].idxmax() for first, stop in spans]
+        if len(highest) < 6:
+            highest = level.groupby(blocks_of(known.index, DAY)).idxmax().tolist()
         peaks = level[highest].sort_values(ascending=False)
         if len(peaks) < 3 or not peaks.iloc[0] > 0:
             raise ValueError(
-                f"the baseline has only {counted_number(len(peaks), 'peak')} of its damage index, each of "
-                f"{duration_text(length)}; expected at least 3: two weeks of records or more"
+                f"the baseline has only {counted_number(len(peaks), 'peak')} of its damage index, one a "
+                "day; expected at least 3, better two weeks of records or more"
             )
-        steps = np.diff(known.index.asi8)
-        n_years = float(np.minimum(steps, max(length.value, np.median(steps))).sum() / YEAR.value)
+        steps = np.diff(stamps)
+        n_years = float(np.minimum(steps, max(DAY.value, np.median(steps))).sum() / YEAR.value)
         asked = per_year * n_years
         threshold = level_exceeded(peaks.to_numpy(), asked)
-        k = max(asked, 1.0)
-        lowest, highest_number = nbinom.ppf([0.05, 0.95], k, k / (k + per_year)).astype(int)
+        k = max(asked, 1.0)  # peaks above the threshold, by which its rate is known
+        fewest, most = nbinom.ppf([0.05, 0.95], k, k / (k + per_year)).astype(int)
         months = sorted({*range(1, 13)} - {*known.index.month})
         missing = ", ".join(pd.Timestamp(2001, month, 1).month_name() for month in months)
         method = (
             f"from {counted_number(len(peaks), 'peak')} of the damage index in {counted_number(n_years, 'year', 2)} of "
             "baseline" + (", extrapolated" if asked < 0.4 else "")
         )
-        estimate = FalseAlarmEstimate(per_year, int(lowest), int(highest_number), n_years, missing, method)
-        return cls(threshold, min(float(level.quantile(0.95)), threshold), peaks, estimate)
+        estimate = FalseAlarmEstimate(per_year, int(fewest), int(most), n_years, missing, method)
+        return cls(threshold, min(float(release), threshold), peaks, estimate)
 
     def findings(self, seen: SmallestChanges) -> Iterator[SkthermoWarning]:
         """What is doubtful: months without records, a threshold from too short a time, or raised by a single peak."""
@@ -212,11 +216,12 @@ class SmallestChanges:
         threshold: float,
         within: pd.Timedelta,
         losses: pd.DataFrame | None = None,
+        steps: Sequence[float] = (0.0, 0.5, 2.0, 5.0),
     ) -> SmallestChanges:
         """Falls by which the median of the indices, ``index_of`` records in order of time, exceeds a threshold.
 
         ``losses`` are relative changes of the responses, in their order, by the loss of each damage group that moves a
-        record by one standard deviation; their column ``"loss"`` is that loss.
+        record by one standard deviation; their column ``"loss"`` is that loss. ``steps`` are in standard deviations.
         """
         some = whole_weeks(records, 1000)
         responses = some[list(names)]
@@ -232,10 +237,10 @@ class SmallestChanges:
             changes["groups", group] = float(row["loss"]), {name: falls[name] for name in names}
         start, found = index_of(some), {"single": {}, "common": {}, "groups": {}}
         for (kind, name), (size, falls) in changes.items():
-            by_step = ({one: step * fall for one, fall in falls.items()} for step in STEPS[1:])
+            by_step = ({one: step * fall for one, fall in falls.items()} for step in steps[1:])
             indices = np.array([start, *(index_of(lowered(some, one)) for one in by_step)])
             known = indices[:, ~np.isnan(indices).any(axis=0)]
-            fall = crossing(size * np.array(STEPS), np.median(known, axis=1) / threshold) if known.size else np.nan
+            fall = crossing(size * np.array(steps), np.median(known, axis=1) / threshold) if known.size else np.nan
             found[kind][name] = fall if fall < 1 or not (is_relative or kind == "groups") else np.nan
         return cls(found["common"].get("", np.nan), found["single"], is_relative, within, found["groups"])
 

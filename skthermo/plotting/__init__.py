@@ -5,9 +5,6 @@ It uses what it draws; only pages and commands use it. Start with ``_display.py`
 
 from skthermo.plotting._damage_index import DamageIndexDisplay
 from skthermo.plotting._detectors import DetectorsDisplay
-from skthermo.plotting._identified_damage import IdentifiedDamageDisplay
-from skthermo.plotting._mode_shapes import ModeShapesDisplay
-from skthermo.plotting._monitor import MonitorDisplay
 from skthermo.plotting._pod_curve import PODCurveDisplay
 from skthermo.plotting._prediction import PredictionDisplay
 from skthermo.plotting._structure_display import StructureDisplay
@@ -15,9 +12,6 @@ from skthermo.plotting._structure_display import StructureDisplay
 __all__ = [
     "DamageIndexDisplay",
     "DetectorsDisplay",
-    "IdentifiedDamageDisplay",
-    "ModeShapesDisplay",
-    "MonitorDisplay",
     "PODCurveDisplay",
     "PredictionDisplay",
     "StructureDisplay",

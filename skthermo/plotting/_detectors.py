@@ -1,4 +1,4 @@
-"""Several detectors beside each other: their ranking, and measured rates of alarms beside simulated ones."""
+"""Bars with errors: detectors beside each other, causes of a shift of frequencies, smallest changes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._core.arrays import Array, check_names
-from skthermo._core.text import percent, printable, share_text
+from skthermo._core.text import chance_text, percent, printable, share_text
 from skthermo.plotting._display import (
     BLACK,
     BLUE,
@@ -32,21 +32,15 @@ if TYPE_CHECKING:
 
     from skthermo.studies import DetectabilityStudy
 
-SIMULATED, REFERENCE = "simulated", "reference"
 OF_RESULTS = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
-BOUNDED = ["false_alarms", "pod", "pod_deficit"]  # columns of a ranking that have bounds
+BOUNDED = ("false_alarms", "pod", "pod_deficit")
 OF_RANKING = [f"{name}{end}" for name in BOUNDED for end in ("", "_ci_low", "_ci_high")]
 OF_RANKING += ["within_limit", "pod_at_equal_pfa", "significantly_worse"]
+OF_CAUSES = ["probability", "severity", "ci_low", "ci_high"]
+OF_SHIFTS = ["measured", "explained", "standard_error"]
 BEST, ONE_REPEAT = "not significantly worse", "order uncertain: one repeat"
 WORSE, FAILED = "significantly lower POD", "failed"
 
-ROW, MARGINS = 0.26, 1.5
-"""Inches that a row takes, and all that is above and below the rows."""
-
-PERCENT = (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100)  # ticks of an axis of small rates
-MARGIN = 0.02  # share of an axis of small rates that is below 0
-CLOSEST = 0.07  # share of the axis that two ticks are apart at least
-LONGEST_NOTE = 45  # number of letters above which a note in a row is cut
 RATES = ["low", "high", "value", "mark"]
 
 
@@ -61,11 +55,12 @@ class RatesPanel:
     notes: Mapping[Hashable, str] = field(default_factory=dict)
     axis: Literal["small", "shares", "free"] = "shares"
     limit: float | None = None
+    mark_colour: str = BLUE
 
 
 @dataclass(eq=False, repr=False)
 class DetectorsDisplay(Display):
-    """Detectors beside each other, a row for each: their ranking, or measured rates beside simulated ones.
+    """Bars with errors, a row for each detector, cause, explanation or mode.
 
     Of a ranking, three panels show false alarms with their limit; the probability of detection (POD), the mean over all
     damaged scenarios, at the detector's own threshold and, as circles, with thresholds moved to equal false alarms; and
@@ -79,6 +74,11 @@ class DetectorsDisplay(Display):
 
     Failures, and shares of records that are not evaluated, are written beside the rates. The axis of false alarms has a
     square-root scale.
+
+    Of identified damage, one panel shows the probability of each cause and one its mean severity with a credible
+    interval of 90 % and, as circles, the severity that it does not exceed, if it is there, with a probability of 95 %;
+    or a panel shows the probability of each explanation, or the measured shift of each mode with two standard errors
+    beside the explained one. Of smallest changes, a bar is as long as the change.
 
     It is best made by `from_estimator` or `from_predictions`.
 
@@ -137,7 +137,7 @@ class DetectorsDisplay(Display):
         what: Literal["ranking", "agreement"] = "ranking",
         *,
         max_false_alarms: float = 0.02,
-        source: str = SIMULATED,
+        source: str = "simulated",
         by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         **options: object,
     ) -> DetectorsDisplay:
@@ -188,13 +188,16 @@ class DetectorsDisplay(Display):
         groups: Mapping[str, str] | None = None,
         **options: object,
     ) -> DetectorsDisplay:
-        """Draw a ranking, or results with measured records.
+        """Draw a ranking, results with measured records, identified damage, or smallest changes.
 
         Parameters
         ----------
-        table : DataFrame
+        table : DataFrame or Series
             What `~skthermo.studies.DetectabilityStudy.ranking` or `~skthermo.studies.DetectabilityStudy.run` returned,
-            or rows of several results, for example false alarms in one weather and detected damage in another.
+            or rows of several results, for example false alarms in one weather and detected damage in another; of
+            `~skthermo.studies.identify_damage`, the causes (``table``), the ``shifts``, or explanations with their
+            ``probability``; or a Series of the smallest change that is found by group, as
+            `~skthermo.detection.DirectionalDetector.minimum_detectable_damage` gives it.
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms with which a ranking was made.
         by : {"pod", "pod_at_equal_pfa"}, default="pod"
@@ -213,10 +216,15 @@ class DetectorsDisplay(Display):
         Raises
         ------
         ValueError
-            If the table lacks columns; if no scenario has both simulated and measured records, or a detector has two
-            rates of one scenario; if a scenario or a detector of a group is not in the table.
+            If the table lacks columns, or is empty; if no scenario has both simulated and measured records, or a
+            detector has two rates of one scenario; if a scenario or a detector of a group is not in the table.
         """
+        if isinstance(table, pd.Series) and len(table):
+            return cls(**of_changes(table)).plot(**options)
         columns = list(table.columns) if isinstance(table, pd.DataFrame) else []
+        for needed, made in ((OF_CAUSES, of_causes), (OF_SHIFTS, of_shifts), (["probability"], of_explanations)):
+            if columns and len(table) and set(needed) <= set(columns) and "rate" not in columns:
+                return cls(**made(table)).plot(**options)
         needed = OF_RANKING if "within_limit" in columns else OF_RESULTS
         missing = [name for name in needed if name not in columns]
         if missing or not len(table):
@@ -241,7 +249,8 @@ class DetectorsDisplay(Display):
         """
         n_columns = min(2 if len(self.panels) == 4 else 3, len(self.panels))
         n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
-        size = 3.6 + LETTER * n_letters / n_columns, max(ROW * len(self.places) + MARGINS, 2.4)
+        width = 3.6 if n_columns > 1 else 5.0
+        size = width + LETTER * n_letters / n_columns, max(0.26 * len(self.places) + 1.5, 2.4)  # inches
         self._take_axes(ax, list(self.panels), size, n_columns=n_columns)
         self.bars_: dict[str, BarContainer] = {}
         self.values_: dict[str, PathCollection] = {}
@@ -267,14 +276,17 @@ class DetectorsDisplay(Display):
         if panel.limit is not None:
             ax.axvline(panel.limit, color=BLACK, linestyle="--", linewidth=1, label="limit of the false-alarm rate")
         bounds, mean, filled, empty = self.labels
-        self.bars_[name] = ax.barh(y, high - low, 0.62, low, color=colours, alpha=0.35, label=bounds)
-        style = {"marker": "|", "s": 100, "linewidths": 2, "color": colours, "zorder": 3, "label": mean}
+        has_bounds, has_values = (np.isfinite(one).any() for one in (high - low, value))
+        style = {"color": colours, "alpha": 0.35, "label": bounds if has_bounds else None}
+        self.bars_[name] = ax.barh(y, high - low, 0.62, low, **style)
+        label = mean if has_values else None
+        style = {"marker": "|", "s": 100, "linewidths": 2, "color": colours, "zorder": 3, "label": label}
         self.values_[name] = ax.scatter(value, y, **style)
         self.marks_[name] = []
         is_open = panel.rates["is_open"].to_numpy(dtype=bool)
-        for rows, face, label in ((~is_open, BLUE, filled), (is_open, "white", empty)):
+        for rows, face, label in ((~is_open, panel.mark_colour, filled), (is_open, "white", empty)):
             rows = rows & np.isfinite(mark)
-            style = {"s": 30, "edgecolors": BLUE, "facecolors": face, "zorder": 4}
+            style = {"s": 30, "edgecolors": panel.mark_colour, "facecolors": face, "zorder": 4}
             self.marks_[name].append(ax.scatter(mark[rows], y[rows], **style, label=label if rows.any() else None))
 
     def _write_notes(self, ax: Axes, panel: RatesPanel) -> None:
@@ -283,11 +295,11 @@ class DetectorsDisplay(Display):
             text = printable(panel.notes.get(detector, ""))
             if not text:
                 continue
-            text = text if len(text) <= LONGEST_NOTE else f"{text[:LONGEST_NOTE].rstrip()} ..."
+            text = text if len(text) <= 45 else f"{text[:45].rstrip()} ..."
             is_right = False
             if detector in panel.rates.index:
-                drawn = panel.rates.loc[detector, RATES].astype(float)
-                is_right = bool(ax.get_xlim()[1] - drawn.max() > drawn.min())
+                drawn, (left, right) = panel.rates.loc[detector, RATES].astype(float), ax.get_xlim()
+                is_right = bool(right - drawn.max() > drawn.min() - left)
             place = {"x": 0.99 if is_right else 0.01, "ha": "right" if is_right else "left"}
             style = {"fontsize": "x-small", "color": GREY, "va": "center", "clip_on": True, "in_layout": False}
             ax.text(y=height, s=plain(text), transform=ax.get_yaxis_transform(), **place, **style)
@@ -321,6 +333,66 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
     labels = ["confidence interval", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]
     places = places_of(list(ranking.index), kinds.to_dict())
     return {"panels": panels, "places": places, "colours": colours, "labels": labels}
+
+
+def drawn_by_row(panels: dict[str, RatesPanel], colour: str, labels: Sequence[str]) -> dict[str, object]:
+    """What a display without headings is made of: all rows in one colour, in the order of the first panel."""
+    names = list(next(iter(panels.values())).rates.index)
+    return {"panels": panels, "places": places_of(names, {}), "colours": dict.fromkeys(names, colour), "labels": labels}
+
+
+def in_percent(index: pd.Index, is_open: bool = False, **columns: object) -> pd.DataFrame:
+    """Rates of a panel from shares; columns that are not given are empty."""
+    table = pd.DataFrame({name: columns.get(name, np.nan) for name in RATES}, index).astype(float)
+    return (100 * table).assign(is_open=is_open)
+
+
+def of_causes(table: pd.DataFrame) -> dict[str, object]:
+    """What a display of the causes of a shift is made of."""
+    probability = table["probability"]
+    notes = {name: chance_text(share) for name, share in probability.items()}
+    is_damage = "kind" not in table or table["kind"].eq("damage").all()
+    label = "loss of stiffness (%)" if is_damage else "loss of stiffness, or change (%)"
+    columns = {"low": table["ci_low"], "high": table["ci_high"], "value": table["severity"]}
+    severity = in_percent(table.index, is_open=True, mark=table.get("highest_if_damaged", np.nan), **columns)
+    shown = in_percent(table.index, mark=probability)
+    panels = {
+        "probability": RatesPanel("probability of a change", "probability (%)", shown, notes, mark_colour=ORANGE),
+        "severity": RatesPanel("mean severity", label, severity, axis="free", mark_colour=ORANGE),
+    }
+    names = ["credible interval, 90 %", "mean", "probability", "not exceeded, if there (95 %)"]
+    return drawn_by_row(panels, ORANGE, names)
+
+
+def of_shifts(table: pd.DataFrame) -> dict[str, object]:
+    """What a display of measured and explained shifts is made of."""
+    errors = 2 * table["standard_error"].fillna(0)
+    ends = {"low": table["measured"] - errors, "high": table["measured"] + errors}
+    rates = in_percent(table.index, value=table["measured"], mark=table["explained"], **ends)
+    label = "shift from the healthy prediction (%)"
+    panels = {"shift": RatesPanel("shift of frequencies", label, rates, axis="free", mark_colour=ORANGE)}
+    return drawn_by_row(panels, BLUE, ["± 2 standard errors", "measured", "explained", ""])
+
+
+def of_explanations(table: pd.DataFrame) -> dict[str, object]:
+    """What a display of the most probable explanations is made of; the last row has what the others have together."""
+    probability = table["probability"].set_axis(table.get("text", table.index))
+    shown = probability.iloc[:5]
+    if (others := 1 - shown.sum()) >= 0.001:
+        shown = pd.concat([shown, pd.Series({"all others": others})])
+    notes = {name: chance_text(share) for name, share in shown.items()}
+    rates = in_percent(shown.index, low=0.0, high=shown)
+    panels = {"probability": RatesPanel("explanations of the shifts", "probability (%)", rates, notes)}
+    return drawn_by_row(panels, ORANGE, ["", "", "", ""])
+
+
+def of_changes(changes: pd.Series) -> dict[str, object]:
+    """What a display of the smallest changes that are found is made of."""
+    known = changes.astype(float).where(np.isfinite(changes.astype(float)))
+    notes = dict.fromkeys(changes.index[known.isna()], "not found")
+    rates = in_percent(changes.index, low=0.0, high=known, value=known)
+    panels = {"smallest": RatesPanel("smallest change found", "loss of stiffness (%)", rates, notes, "free")}
+    return drawn_by_row(panels, BLUE, ["", "", "", ""])
 
 
 def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: Mapping[str, str]) -> dict[str, object]:
@@ -364,7 +436,9 @@ def both_rates(results: pd.DataFrame) -> pd.DataFrame:
         )
     n_unknown = results.get("n_not_evaluated", pd.Series(0, results.index))
     results = results.assign(unknown=n_unknown / (results.get("n_records", 0) + n_unknown))
-    simulated, measured = (results[results["source"] == source].set_index(keys) for source in (SIMULATED, REFERENCE))
+    simulated, measured = (
+        results[results["source"] == source].set_index(keys) for source in ("simulated", "reference")
+    )
     table = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
     measured = measured.rename(columns={"rate": "mark", "unknown": "unknown_measured", "n_repeats": "n_campaigns"})
     scenarios = measured.index.get_level_values("scenario")
@@ -421,9 +495,9 @@ def small_rates(ax: Axes, drawn: Array) -> None:
     largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
     functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
     ticks: list[float] = []
-    for value in PERCENT:
-        if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > CLOSEST * np.sqrt(largest)):
+    for value in (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100):
+        if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > 0.07 * np.sqrt(largest)):
             ticks.append(value)
     ax.set_xscale("function", functions=functions)
-    ax.set_xlim(-(MARGIN**2) * largest, largest)
+    ax.set_xlim(-0.0004 * largest, largest)  # 2 % of the axis
     ax.set_xticks(ticks, [f"{value:g}" for value in ticks])

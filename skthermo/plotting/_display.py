@@ -32,17 +32,9 @@ BLACK, GREY, LIGHT = "#000000", "#555555", "#BBBBBB"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, BLACK)
 MARKERS = ("o", "x", "^", "s", "+", "v", "D")
 LINES = ("-", "--", "-.", ":")
-LONGEST_NAME = 36  # number of letters above which a name is shortened
 DAMAGE_INDEX = "damage index (Mahalanobis, unsquared)"
 DENSE = 10_000  # points from which on files of vectors, such as SVG, hold them as an image
-HANDLE, LETTER = 0.5, 0.085
-"""Inches that the symbol and a letter of a legend take."""
-FEW = 0.02  # share of the points of a line, at either end, that may lie beyond an axis
-FEWEST = 10  # points of a line from which on it may have outliers
-LONG_GAP = 10  # usual steps of time from which on a line breaks between two records
-MARGIN = 0.05  # empty share of the axis next to its edges
-BEYOND = "beyond"
-"""Name (gid) of the marks at the edges."""
+LETTER = 0.085  # inches that a letter of a legend takes
 EDGES: dict[tuple[str, bool], tuple[str, float, dict[str, object]]] = {
     ("y", False): ("v", 0.0, {"x": 0.99, "y": 0.03, "ha": "right", "va": "bottom"}),
     ("y", True): ("^", 1.0, {"x": 0.99, "y": 0.96, "ha": "right", "va": "top"}),
@@ -65,8 +57,8 @@ def pyplot() -> ModuleType:
 def shortened(name: Hashable) -> str:
     """A name for a legend, a title or a tick: a very long one loses its middle, dollar signs stay as they are."""
     text = printable(name)
-    if len(text) > LONGEST_NAME:
-        text = f"{text[: LONGEST_NAME // 2].rstrip()} ... {text[-LONGEST_NAME // 3 :].lstrip()}"
+    if len(text) > 36:
+        text = f"{text[:18].rstrip()} ... {text[-12:].lstrip()}"
     return plain(text)
 
 
@@ -118,15 +110,13 @@ def panels(
     size: tuple[float, float],
     n_columns: int = 1,
     share_x: bool = False,
-    heights: Sequence[float] | None = None,
 ) -> np.ndarray:
-    """One axes for each name: those that are given, or those of a new figure, perhaps with heights of its rows."""
+    """One axes for each name: those that are given, or those of a new figure."""
     if ax is None:
         n_columns = min(n_columns, len(names))
         n_rows = -(-len(names) // n_columns)
-        height = size[1] * n_rows if heights is None else sum(heights)
-        figure = pyplot().figure(figsize=(size[0] * n_columns, height), layout="constrained")
-        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False, height_ratios=heights).ravel()
+        figure = pyplot().figure(figsize=(size[0] * n_columns, size[1] * n_rows), layout="constrained")
+        axes = figure.subplots(n_rows, n_columns, sharex=share_x, squeeze=False).ravel()
         for unused in axes[len(names) :]:
             unused.remove()
         for above in axes[max(len(names) - n_columns, 0) : len(names)] if share_x else ():
@@ -152,17 +142,6 @@ def figure_legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4) -> 
         axes[0].legend(handles, labels, frameon=False, markerscale=scale, fontsize="small")
 
 
-def panel_legend(ax: Axes, is_own_figure: bool, n_columns: int = 4) -> None:
-    """The legend of one panel: above it in a new figure, within given axes."""
-    handles, labels, scale = _labelled(np.array([ax]))
-    style: dict[str, object] = {"frameon": False, "markerscale": scale, "fontsize": "small"}
-    if is_own_figure:
-        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.2}
-        style |= place | {"ncols": legend_columns(labels, ax.figure, n_columns) if labels else 1}
-    if handles:
-        ax.legend(handles, labels, **style)
-
-
 def _labelled(axes: np.ndarray) -> tuple[list[Artist], list[str], float]:
     """Symbols and labels of panels, each label once, and how much larger small symbols are shown."""
     by_label: dict[str, Artist] = {}
@@ -175,7 +154,7 @@ def _labelled(axes: np.ndarray) -> tuple[list[Artist], list[str], float]:
 
 def legend_columns(labels: Sequence[str], figure: Figure, most: int) -> int:
     """How many columns of a legend fit into the width of a figure."""
-    widest = HANDLE + LETTER * max(map(len, labels))
+    widest = 0.5 + LETTER * max(map(len, labels))
     return int(np.clip(figure.get_figwidth() // widest, 1, most))
 
 
@@ -216,7 +195,7 @@ def hold_outliers(ax: Axes, keep: Iterable[float] = (), also: Iterable[Array] = 
     as long; these are marked at the edge and counted. Values in ``keep`` and those of bands in ``also`` stay in view.
     """
     for mark in [*ax.lines, *ax.texts]:
-        if mark.get_gid() == f"{BEYOND} {direction}":
+        if mark.get_gid() == f"beyond {direction}":
             mark.remove()
     lines = [line for line in ax.lines if line.get_transform() == ax.transData]
     columns = [getattr(line, f"get_{direction}data")(orig=False).astype(float) for line in lines]
@@ -229,7 +208,7 @@ def hold_outliers(ax: Axes, keep: Iterable[float] = (), also: Iterable[Array] = 
         return
     seen = np.concatenate([*columns, *also, [*keep]])
     seen = seen[(seen >= low) & (seen <= high)]
-    margin = MARGIN * np.ptp(seen)
+    margin = 0.05 * np.ptp(seen)
     lowest = seen.min() - margin if seen.min() not in keep else seen.min()
     getattr(ax, f"set_{direction}lim")(lowest, seen.max() + margin)
     for is_upper in (False, True):
@@ -239,9 +218,9 @@ def hold_outliers(ax: Axes, keep: Iterable[float] = (), also: Iterable[Array] = 
 
 
 def middle_of(values: Array) -> Array:
-    """All values but a few at either end, in order; of values that hardly differ otherwise, and of few values, all."""
+    """All values but 2 % at either end, in order; of values that hardly differ otherwise, and of few values, all."""
     known = np.sort(values[np.isfinite(values)])
-    n_few = int(np.ceil(FEW * len(known))) if len(known) >= FEWEST else 0
+    n_few = int(np.ceil(0.02 * len(known))) if len(known) >= 10 else 0
     middle = known[n_few : len(known) - n_few]
     return middle if middle[0] < middle[-1] else known
 
@@ -258,13 +237,13 @@ def _mark_edge(
         points = {other: along, direction: np.full(len(along), edge)}
         style = {"linestyle": "", "marker": marker, "markersize": 5, "color": line.get_color(), "markeredgewidth": 0}
         style["rasterized"] = len(along) > DENSE
-        ax.plot(points["x"], points["y"], transform=transform, gid=f"{BEYOND} {direction}", **style)
+        ax.plot(points["x"], points["y"], transform=transform, gid=f"beyond {direction}", **style)
     far = np.concatenate([values[rows] for values, rows in zip(columns, beyond, strict=True)])
     text = f"{len(far)} beyond, {'up' if is_upper else 'down'} to {far.max() if is_upper else far.min():.4g}"
-    _write(ax, text, gid=f"{BEYOND} {direction}", **place)
+    _write(ax, text, gid=f"beyond {direction}", **place)
 
 
-def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> None:
+def mark_not_evaluated(ax: Axes, places: dict[str, Array]) -> None:
     """Grey ticks at the bottom where records of each label are not evaluated, and a text that counts them."""
     texts = []
     for label, x in places.items():
@@ -272,8 +251,7 @@ def mark_not_evaluated(ax: Axes, places: dict[str, Array], noun: str = "") -> No
             style = {"linestyle": "", "marker": "|", "markersize": 7, "color": GREY, "markeredgewidth": 0.8}
             style["rasterized"] = len(x) > DENSE
             ax.plot(x, np.full(len(x), 0.02), transform=ax.get_xaxis_transform(), gid="not evaluated", **style)
-            nouns = f" {noun}{'' if len(x) == 1 else 's'}" if noun else ""
-            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)}{nouns} not evaluated")
+            texts.append(f"{f'{label}: ' if len(places) > 1 else ''}{len(x)} not evaluated")
     if texts:
         _write(ax, "; ".join(texts), x=0.01, y=0.95, ha="left", va="top", gid="not evaluated")
 
@@ -310,12 +288,12 @@ def in_time(table: pd.DataFrame) -> tuple[NDArray, NDArray]:
 
 
 def with_breaks(x: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """The same with NaN in long gaps of time, so that a line breaks there."""
+    """The same with NaN in gaps of more than ten usual steps of time, so that a line breaks there."""
     if not np.issubdtype(x.dtype, np.datetime64) or len(x) < 3:
         return x, values
     steps = np.diff(x)
     usual = np.median(steps)
-    before = np.flatnonzero(steps > LONG_GAP * usual)
+    before = np.flatnonzero(steps > 10 * usual)
     return np.insert(x, before + 1, x[before] + usual), np.insert(values, before + 1, np.nan, axis=0)
 
 

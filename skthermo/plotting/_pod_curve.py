@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 NEEDED = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
 QUANTILE = 1.959964
-N_DRAWN = 200
 
 
 @dataclass(eq=False, repr=False)
@@ -176,7 +175,7 @@ class PODCurveDisplay(Display):
         marker, dashes = MARKERS[number % len(MARKERS)], LINES[number % len(LINES)]
         severities = np.asarray(self.curve.severities, dtype=float)
         self._draw_shares(severities, colour, marker, number > 0)
-        drawn = np.linspace(severities.min(), severities.max(), N_DRAWN)
+        drawn = np.linspace(severities.min(), severities.max(), 200)
         pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in self.curve.predict(drawn))
         style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
         self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]

@@ -14,7 +14,7 @@ from sklearn.base import BaseEstimator
 from skthermo._core.arrays import Array, as_columns
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import check_same_rows
-from skthermo._core.warnings import warnings_once
+from skthermo._core.warnings import collected, warn_each
 from skthermo.plotting._display import (
     BLACK,
     BLUE,
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import PolyCollection
     from matplotlib.lines import Line2D
 
-FREQUENCIES, PARAMETERS = ("measured", "predicted"), ("from frequencies", "from temperatures")
 KINDS = ("time", "points", "lines", "scatter")
 
 
@@ -172,7 +171,11 @@ class PredictionDisplay(Display):
         if what == "parameters":
             tables = (estimator.estimate_parameters(y), estimator.predict_parameters(X))
             measured, predicted = (pd.DataFrame(table, columns=estimator.parameter_names_) for table in tables)
-            options = {"labels": PARAMETERS, "unit": "", "quantity": "multiple of nominal"} | options
+            options = {
+                "labels": ("from frequencies", "from temperatures"),
+                "unit": "",
+                "quantity": "multiple of nominal",
+            } | options
             return cls.from_predictions(measured, predicted, **options)
         if sensor is not None or options.get("kind") == "scatter":
             confidence = None
@@ -182,11 +185,12 @@ class PredictionDisplay(Display):
                 "estimator with one, such as DataInformedFEM, or confidence=None"
             )
         ends: Sequence[ArrayLike] = ()
-        with warnings_once():
+        with collected() as findings:
             predicted = estimator.predict(X)
             if confidence is not None:
                 ends = estimator.predict_interval(X, confidence)
                 options = {"interval_label": f"interval, {100 * confidence:g} %"} | options
+        warn_each(findings)
         return cls.from_predictions(y, predicted, *ends, **options)
 
     @classmethod
@@ -198,7 +202,7 @@ class PredictionDisplay(Display):
         highest: ArrayLike | None = None,
         *,
         temperature: ArrayLike | None = None,
-        labels: tuple[str, str] = FREQUENCIES,
+        labels: tuple[str, str] = ("measured", "predicted"),
         **options: object,
     ) -> PredictionDisplay:
         """Draw measured and predicted values, or true and estimated ones.

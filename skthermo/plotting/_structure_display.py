@@ -1,23 +1,24 @@
-"""Structures with a value for each member."""
+"""Structures with a value for each member, or in their modes."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from skthermo._core.arrays import Array, real_array
 from skthermo._core.estimators import last_step
-from skthermo.fem import Structure
-from skthermo.plotting._display import COLOURS, GREY, LIGHT, Display, legend_columns, plain, pyplot, shortened
+from skthermo.fem import FEModel, Structure
+from skthermo.plotting._display import COLOURS, GREY, LIGHT, ORANGE, Display, legend_columns, plain, pyplot, shortened
 from skthermo.plotting._structures import (
     Projection,
     add_members,
     check_structure,
+    dofs_of,
     draw_supports,
     height_of,
     set_view,
@@ -32,13 +33,11 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
 
 WIDTH, THIN = 2.5, 0.8
-LOW = 0.4  # share of its width below which a structure is too low for a colour bar beside it
-HEIGHT_OF_BAR = 0.5  # inches, with its label
 
 
 @dataclass(eq=False, repr=False)
 class StructureDisplay(Display):
-    """Members of a structure, coloured by value or by group, and its supports.
+    """Members of a structure, coloured by value or by group, or moved by its modes, and its supports.
 
     A structure whose nodes and motions lie in one plane is drawn in that plane, any other in space. A triangle marks a
     node that is held in a direction in which others move: filled where it is held in every such direction.
@@ -54,16 +53,21 @@ class StructureDisplay(Display):
     values : ndarray of shape (n_members,), optional
         Value of each member in the order of ``structure.members``; NaN draws a member in grey.
     groups : sequence of str, optional
-        Groups that get a colour each, and a line in the legend.
+        Groups that get a colour each, and a line in the legend; with shapes, those whose members are drawn.
     label : str, optional
         Label of the colour bar, with its unit.
+    shapes : ndarray of shape (n_dofs, n_modes), optional
+        Mode shapes, rows as in ``structure.dofs``: a panel for each, over the structure at rest.
+    titles : sequence of str, optional
+        Titles of the panels of modes.
 
     Attributes
     ----------
     axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
         Where it is drawn.
     members_ : dict
-        Collections of lines, surfaces and points, by ``"lines"``, ``"surfaces"`` and ``"points"`` or by group.
+        Collections of lines, surfaces and points, by ``"lines"``, ``"surfaces"`` and ``"points"``, by group, or of the
+        moved lines by mode, from 0.
     colorbar_ : Colorbar or None
         None without values.
 
@@ -77,6 +81,10 @@ class StructureDisplay(Display):
     >>> display.colorbar_.ax.get_ylabel(), display.members_["lines"].get_clim()
     ('error (%)', (0.2, 1.4))
     >>> plt.close(display.figure_)
+    >>> display = StructureDisplay.from_structure(kw51_structure(), modes=[0])
+    >>> display.ax_.get_title()
+    '$f_{1}$ = 0.477 Hz'
+    >>> plt.close(display.figure_)
     """
 
     structure: Structure
@@ -84,6 +92,8 @@ class StructureDisplay(Display):
     _: KW_ONLY
     groups: Sequence[str] | None = None
     label: str | None = None
+    shapes: Array | None = None
+    titles: Sequence[str] = ()
 
     @classmethod
     def from_structure(
@@ -93,9 +103,11 @@ class StructureDisplay(Display):
         *,
         groups: Sequence[str] | None = None,
         label: str | None = None,
+        model: FEModel | None = None,
+        modes: Sequence[int] | None = None,
         **options: object,
     ) -> StructureDisplay:
-        """Draw a structure.
+        """Draw a structure, or its modes.
 
         Parameters
         ----------
@@ -104,9 +116,15 @@ class StructureDisplay(Display):
         values : mapping of group or member to float, or array-like of shape (n_members,), optional
             What colours the members. A member's own value comes before its group's; members without a value are grey.
         groups : sequence of str, optional
-            Without values: groups that get a colour each; the last is drawn on top.
+            Without values: groups that get a colour each; the last is drawn on top. Of modes, groups whose members are
+            drawn; by default all members.
         label : str, optional
             Label of the colour bar, with its unit.
+        model : FE model, optional
+            Assembled from the structure, with the method ``modes``: its modes are drawn, with all parameters 1.
+        modes : sequence of int, optional
+            Columns of the model, from 0, that are drawn; by default all. Without a model, modes are those of the
+            structure with its groups as parameters.
         **options : dict
             Options of `plot`.
 
@@ -117,12 +135,15 @@ class StructureDisplay(Display):
         Raises
         ------
         ValueError
-            If a group or member is unknown, two groups give a member different values, or the number of values is not
-            that of the members.
+            If a group, member or mode is unknown, two groups give a member different values, or the number of values is
+            not that of the members; if the model has no mode shapes of the structure's degrees of freedom.
         """
         check_structure(structure, groups)
-        if values is not None and groups is not None:
-            raise ValueError("values and groups are both given; expected one of them to colour the members")
+        if values is not None and not (groups is None and model is None and modes is None):
+            raise ValueError("values are given beside groups or modes; expected one of them")
+        if model is not None or modes is not None:
+            shapes, titles = shapes_of(structure, model, modes)
+            return cls(structure, groups=groups, shapes=shapes, titles=titles).plot(**options)
         by_member = None if values is None else values_by_member(structure, values)
         return cls(structure, by_member, groups=groups, label=label).plot(**options)
 
@@ -176,32 +197,41 @@ class StructureDisplay(Display):
 
     def plot(
         self,
-        ax: Axes | None = None,
+        ax: Axes | np.ndarray | None = None,
         *,
         cmap: str = "viridis",
         limits: tuple[float, float] | None = None,
-        linewidth: float | Mapping[str, float] = 2.5,
+        linewidth: float | Mapping[str, float] | None = None,
+        amplitude: float = 0.06,
+        n_columns: int = 2,
     ) -> StructureDisplay:
         """Draw into axes.
 
         Parameters
         ----------
-        ax : matplotlib's Axes, optional
-            Three-dimensional for a structure in space, and where a plane one should be drawn there. A new figure by
-            default.
+        ax : matplotlib's Axes or array of Axes, optional
+            One for each mode; three-dimensional for a structure in space, and where a plane one should be drawn there.
+            A new figure by default.
         cmap : str, default="viridis"
             Colour map of the values.
         limits : tuple of float, optional
             Values at the ends of the colour map; by default the lowest and the highest.
-        linewidth : float or mapping of group to float, default=2.5
-            Width of lines in points.
+        linewidth : float or mapping of group to float, optional
+            Width of lines in points; by default 2.5, and 1.5 of modes.
+        amplitude : float, default=0.06
+            Largest displacement of a mode, as a share of the structure's extent.
+        n_columns : int, default=2
+            Panels of modes beside each other in a new figure.
 
         Returns
         -------
         StructureDisplay
             Itself.
         """
+        if self.shapes is not None:
+            return self._draw_modes(ax, amplitude, 1.5 if linewidth is None else linewidth, n_columns)
         is_own_figure = ax is None
+        linewidth = WIDTH if linewidth is None else linewidth
         view = Projection.of(self.structure, ax)
         nodes = np.array(list(view.nodes.values()))
         self.axes_ = structure_axes(ax, view, ["one display"], nodes, width=9.0, n_columns=1)
@@ -216,10 +246,38 @@ class StructureDisplay(Display):
             room = {"left": 0.03, "right": 0.97 if self.values is None else 0.87, "top": 0.97}
             self.ax_.get_gridspec().update(bottom=0.9 / self.figure_.get_figheight(), **room)
         set_view(self.ax_, nodes, is_own_figure)
-        is_low = is_own_figure and not view.is_space and height_of(nodes) < LOW
+        is_low = is_own_figure and not view.is_space and height_of(nodes) < 0.4  # no room beside it
         is_beside = is_own_figure and view.is_space
         self.colorbar_ = None if self.values is None else self._draw_colorbar(is_low, is_beside)
         self._draw_legend(view, supports, is_own_figure)
+        return self
+
+    def _draw_modes(self, ax: Axes | np.ndarray | None, amplitude: float, width: object, n_columns: int) -> Self:
+        """A panel for each mode: moved members over those at rest."""
+        view = Projection.of(self.structure, ax)
+        rest, moved = view.nodes, [moved_nodes(view, shape, amplitude) for shape in self.shapes.T]
+        points = np.array([place for places in (rest, *moved) for place in places.values()])
+        self.axes_ = structure_axes(ax, view, self.titles, points, width=5.0, n_columns=n_columns)
+        self.members_: dict[object, Collection] = {}
+        self.colorbar_ = None
+        all_groups = self.structure.groups
+        drawn = self.structure.members if self.groups is None else set().union(*(all_groups[g] for g in self.groups))
+        _, lines, surfaces = sort_members(self.structure, [name for name in self.structure.members if name in drawn])
+        for mode, (one, places, title) in enumerate(zip(self.axes_, moved, self.titles, strict=True)):
+            for nodes, colour in ((rest, LIGHT), (places, ORANGE)) if surfaces else ():
+                add_members(one, self.structure, nodes, "surfaces", surfaces, facecolors=colour, alpha=0.3)
+            if lines:
+                add_members(one, self.structure, rest, "lines", lines, colors=LIGHT, linewidths=THIN, zorder=1)
+                style = {"colors": ORANGE, "linewidths": width, "zorder": 2}
+                self.members_[mode] = add_members(one, self.structure, places, "lines", lines, **style)
+            draw_supports(one, view, size=7)
+            place = one.get_position(original=True)
+            set_view(one, points, is_own=ax is None)
+            one.set_title(title, fontsize="medium")
+            if ax is None and view.is_space:  # the enlarged axes would move the title away from the panel
+                enlarged = one.get_position(original=True)
+                one.set_title(title, fontsize="medium", y=1.0)
+                one.title.set_y((place.y1 - enlarged.y0) / enlarged.height)
         return self
 
     def _draw_values(
@@ -254,7 +312,7 @@ class StructureDisplay(Display):
         shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
         place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
         if is_low:
-            self.figure_.set_figheight(self.figure_.get_figheight() + HEIGHT_OF_BAR)
+            self.figure_.set_figheight(self.figure_.get_figheight() + 0.5)
             place = {"ax": self.ax_, "location": "top", "shrink": 0.5, "aspect": 40, "pad": 0.05}
         if is_beside:
             place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
@@ -291,6 +349,41 @@ class StructureDisplay(Display):
         else:
             place = "lower center" if view.is_space else "outside lower center"
             self.figure_.legend(handles, labels, loc=place, **style)
+
+
+def shapes_of(structure: Structure, model: FEModel | None, modes: Sequence[int] | None) -> tuple[Array, list[str]]:
+    """Mode shapes of a model of the structure with all parameters 1, (n_dofs, n_modes), and a title for each."""
+    if not structure.dofs:
+        raise ValueError(f"{structure!r} has no labels of degrees of freedom; expected (node, direction) of each")
+    if model is None:
+        if not structure.groups:
+            raise ValueError("structure has no groups; expected model, such as structure.assemble(...)")
+        model = structure.assemble(sorted(structure.groups), n_modes=max(modes or [0]) + 1)
+    if not hasattr(model, "modes"):
+        raise ValueError(f"{model!r:.200} has no method 'modes'; expected a model assembled from the structure")
+    frequencies, shapes = model.modes(np.ones((1, len(model.parameter_names))))
+    if shapes.shape[1] != len(structure.dofs):
+        expected = f"expected the structure's {len(structure.dofs)}"
+        raise ValueError(f"the model's shapes have {shapes.shape[1]} degrees of freedom; {expected}")
+    chosen = list(range(model.n_modes) if modes is None else modes)
+    if not chosen or any(mode not in range(model.n_modes) for mode in chosen):
+        raise ValueError(f"modes is {chosen}; expected numbers from 0 to {model.n_modes - 1}")
+    found = {mode: frequencies[0, mode] for mode in chosen}
+    titles = [f"$f_{{{mode + 1}}}$ = {f:.{3 if f < 10 else 2}f} Hz" for mode, f in found.items()]
+    return shapes[0][:, chosen], titles
+
+
+def moved_nodes(view: Projection, shape: Array, amplitude: float) -> dict[Hashable, Array]:
+    """Places of the nodes in a mode, whose largest displacement is a share of the structure's extent."""
+    nodes, axes = view.nodes, view.directions
+    moves = {node: np.zeros(len(axes)) for node in nodes}
+    for (node, direction), value in zip(dofs_of(view.structure), shape, strict=True):
+        if direction in list(axes) and node in moves:
+            moves[node][axes.index(direction)] = value
+    largest = max(np.linalg.norm(move) for move in moves.values())
+    places = np.array(list(nodes.values()))
+    scale = amplitude * np.linalg.norm(np.ptp(places, axis=0)) / (largest or 1.0)
+    return {node: nodes[node] + scale * move for node, move in moves.items()}
 
 
 def values_by_member(structure: Structure, values: Mapping[Hashable, float] | ArrayLike) -> Array:

@@ -29,8 +29,6 @@ OTHER_NAMES = {
 DIRECTIONS = {name: direction for direction, names in OTHER_NAMES.items() for name in names}
 """Directions by the names that other programs give them."""
 
-NORMALS = "yzx"  # a structure along one line is drawn with z upwards, if it moves there
-TRIANGLE = [(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)]  # its tip is at the node
 ELEVATION, AZIMUTH = 22, -60
 
 
@@ -50,7 +48,7 @@ class Projection:
         if not any(hasattr(one, "get_zlim") for one in np.ravel(np.asarray(ax, dtype=object))):
             moving = {direction for _, direction in dofs_of(structure)}
             extent = np.ptp(list(structure.nodes.values()), axis=0)
-            for normal in NORMALS:
+            for normal in "yzx":  # a structure along one line is drawn with z upwards, if it moves there
                 plane = AXES.replace(normal, "")
                 if extent[AXES.index(normal)] == 0 and moving <= {*plane, f"r{normal}"}:
                     return cls(structure, plane)
@@ -208,7 +206,7 @@ def draw_supports(ax: Axes, view: Projection, size: float = 11.0) -> dict[str, L
             drawn[label] = ax.plot(
                 *np.array(places).T,
                 linestyle="",
-                marker=TRIANGLE,
+                marker=[(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)],  # a triangle with its tip at the node
                 markersize=size,
                 color=BLACK,
                 markerfacecolor=face,

@@ -1,22 +1,16 @@
 """Preparing temperatures and frequencies: files, faults, outliers, lags, gaps, hinges, offsets, tracked modes, folds.
 
-It uses ``_core``. Start with ``checks/_set_aside.py``, through which all fits go.
+It uses ``_core``. Start with ``checks/_check_records.py``, through which all fits go.
 """
 
-from skthermo.preprocessing._find_memory import MemoryFindings, find_memory
 from skthermo.preprocessing._hampel import HampelFilter
 from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._mode_tracker import ModeTracker
 from skthermo.preprocessing._past import ExponentialMeans, LagFeatures
 from skthermo.preprocessing._read_records import read_records
+from skthermo.preprocessing._residual_trend import residual_trend
 from skthermo.preprocessing._transformers import BiasAligner, HingeFeatures, SensorMeans
-from skthermo.preprocessing.checks import (
-    RecordFindings,
-    SetAside,
-    check_records,
-    residual_trend,
-    set_aside,
-)
+from skthermo.preprocessing.checks import RecordFindings, SetAside, check_records, set_aside
 from skthermo.preprocessing.folds import BlockedKFold
 
 __all__ = [
@@ -27,13 +21,11 @@ __all__ = [
     "HingeFeatures",
     "KNNGapImputer",
     "LagFeatures",
-    "MemoryFindings",
     "ModeTracker",
     "RecordFindings",
     "SensorMeans",
     "SetAside",
     "check_records",
-    "find_memory",
     "read_records",
     "residual_trend",
     "set_aside",

@@ -22,7 +22,7 @@ from skthermo._core.frames import (
     row_times,
 )
 from skthermo.preprocessing._transformers import RecordTransformer
-from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, products, ridge, without_far
+from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, ridge, without_far
 
 
 class HampelFilter(RecordTransformer):
@@ -158,11 +158,10 @@ class WeatherRegression:
         """Learn from records, the second time without values that were far away the first time."""
         rows = spread_evenly(np.arange(len(T)), 20_000)
         lines, centre = WeatherLines.learned(T), median(F[rows])
-        inputs, values = lines.inputs(lines.coordinates(T[rows])), F[rows] - centre
-        first = ridge(*products(inputs, values))
-        near = without_far(values, values - inputs @ first.T)
-        return cls(lines, ridge(*products(inputs, near)), centre)
+        inputs, values = lines.inputs(T[rows])[1], F[rows] - centre
+        near = without_far(values, values - inputs @ ridge(inputs, values))
+        return cls(lines, ridge(inputs, near), centre)
 
     def predict(self, T: Array) -> Array:
         """Frequencies, (n_samples, n_modes); NaN where no sensor has a value."""
-        return self.lines.inputs(self.lines.coordinates(T)) @ self.coefficients.T + self.centre
+        return self.lines.inputs(T)[1] @ self.coefficients + self.centre

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Hashable, Sequence
 from datetime import timedelta
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any, Literal
 
 import numpy as np
@@ -20,7 +20,7 @@ from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.preprocessing._transformers import RecordTransformer
 
-MEAN_REACH = 4  # time constants beyond which records have no weight: they would have 2 % of it
+MEAN_REACH = 6  # half-lives beyond which records have no weight: they would have 2 % of it
 
 
 class PastFeatures(RecordTransformer):
@@ -320,21 +320,25 @@ def _most_frequent_step(stamps: pd.DatetimeIndex) -> np.timedelta64:
 class ExponentialMeans(PastFeatures):
     """Append exponentially weighted means of sensors: soil and large concrete follow the air late.
 
-    A body that exchanges heat with the air has the exponentially weighted mean of the air's temperature, with a time
-    constant of hours (steel), of a day (thick concrete) or of weeks (soil).
+    A body that exchanges heat with the air has the exponentially weighted mean of the air's temperature, with a
+    half-life of hours (steel), of a day (thick concrete) or of weeks (soil).
 
     Parameters
     ----------
-    time_constants : sequence of str, timedelta or int, default=("30D",)
-        Time constants, such as ``("12h", "30D")``: the weight of a record falls by a factor of e in this time. At most
-        ten years. Integers count rows, for arrays and frames without a DatetimeIndex.
+    half_lives : sequence of str, timedelta or int, default=("30D",)
+        Half-lives, such as ``("12h", "30D")``: the weight of a record halves in this time. At most ten years. Integers
+        count rows, for arrays and frames without a DatetimeIndex.
     sensors : sequence of str or int, optional
         Sensors that get means, by name or position; by default all.
+    recorded : float, default=0.75
+        Least share of a mean's weight that lies on recorded time; with less, as after an outage, the mean is missing.
 
     Attributes
     ----------
-    time_constants_ : ndarray
-        Time constants, in nanoseconds on a DatetimeIndex, else in rows.
+    half_lives_ : ndarray
+        Half-lives, in nanoseconds on a DatetimeIndex, else in rows.
+    step_ : int
+        Usual time between records of `fit`, likewise.
     sensors_ : ndarray of int
         Positions of the sensors that get means.
     history_ : ndarray of shape (n_samples, n_sensors) or None
@@ -352,16 +356,17 @@ class ExponentialMeans(PastFeatures):
 
     See Also
     --------
-    find_memory : Finds out whether such means explain frequencies, and with which time constant.
+    skthermo.surrogate.TemperatureMapper : Finds out whether such means explain its targets, and with which half-life.
     LagFeatures : Single earlier values, for delays of hours.
 
     Notes
     -----
-    The mean of a record at time t has weights exp(-(t - s) / time constant) for the known values at times s from four
-    time constants before t up to t itself. Near the first record it is the mean of the known values.
-    Missing values have no weight, and a mean is NaN only where no value is known. Records of `fit` and of `transform`
-    count together, as in `LagFeatures`. There is a warning if more than half of the rows have no record that is older
-    than the longest time constant, and do not begin as the records of `fit` do.
+    The mean of a record at time t has weights 2 ** (-(t - s) / half-life) for the known values at times s from six
+    half-lives before t up to t itself. Near the first record it is the mean of the known values. A record
+    stands for the time since the one before it, at most three usual steps. After a long outage, a mean is missing for
+    two half-lives. Records of `fit` and of `transform` count together, as in `LagFeatures`. There is a warning
+    if means are missing in more than half of the rows, or if these have no earlier record and do not begin as the
+    records of `fit` do.
 
     Examples
     --------
@@ -369,54 +374,71 @@ class ExponentialMeans(PastFeatures):
     >>> from skthermo.preprocessing import ExponentialMeans
     >>> days = pd.date_range("2025-01-01", periods=4)
     >>> T = pd.DataFrame({"air": [4.0, 4.0, 9.0, 9.0]}, index=days)
-    >>> means = ExponentialMeans(["2D"]).fit(T[:3])
+    >>> means = ExponentialMeans(half_lives=["1D"]).fit(T[:3])
     >>> means.transform(T).round(2)
-                air  air_mean2D
+                air  air_mean1D
     2025-01-01  4.0        4.00
     2025-01-02  4.0        4.00
-    2025-01-03  9.0        6.53
-    2025-01-04  9.0        7.66
+    2025-01-03  9.0        6.86
+    2025-01-04  9.0        8.00
     >>> means.transform(T[3:]).round(2)
-                air  air_mean2D
-    2025-01-04  9.0        7.66
-    >>> ExponentialMeans(["2D"]).fit(T.to_numpy())
+                air  air_mean1D
+    2025-01-04  9.0         8.0
+    >>> ExponentialMeans(half_lives=["2D"]).fit(T.to_numpy())
     Traceback (most recent call last):
     ...
-    ValueError: time constant '2D' is a duration, but X has no DatetimeIndex; expected a number of rows
+    ValueError: half-life '2D' is a duration, but X has no DatetimeIndex; expected a number of rows
     """
 
-    _parameter_constraints: dict = {"time_constants": ["array-like"], "sensors": ["array-like", None]}
+    _parameter_constraints: dict = {
+        "half_lives": ["array-like"],
+        "sensors": ["array-like", None],
+        "recorded": [Interval(Real, 0, 1, closed="both")],
+    }
 
     def __init__(
         self,
-        time_constants: Sequence[str | timedelta | int] = ("30D",),
         *,
+        half_lives: Sequence[str | timedelta | int] = ("30D",),
         sensors: Sequence[Hashable] | None = None,
+        recorded: float = 0.75,
     ):
-        self.time_constants = time_constants
+        self.half_lives = half_lives
         self.sensors = sensors
+        self.recorded = recorded
 
     def _learn(self, X: Table, values: NDArray) -> None:
         stamps = self._remember(X, values)
-        self.time_constants_ = _read_time_constants(self.time_constants, stamps is not None)
-        self.sensors_ = self._read_sensors(values.shape[1])
+        self.half_lives_ = _read_half_lives(self.half_lives, stamps is not None)
+        times = np.arange(len(values)) if stamps is None else np.sort(self.stamps_.view(np.int64))
+        self.step_ = int(np.median(np.diff(times))) if len(times) > 1 else int(self.half_lives_.min())
+        self.sensors_ = np.arange(values.shape[1])
+        if self.sensors is not None:
+            columns = list(getattr(self, "feature_names_in_", range(values.shape[1])))
+            known = [one for one in self.sensors if one in columns]
+            if len(known) < len(self.sensors) or len(set(known)) < len(known) or not known:
+                raise ValueError(f"sensors is {self.sensors!r}; expected different ones of the columns {columns}")
+            self.sensors_ = np.array([columns.index(one) for one in known], dtype=np.intp)
         self.first_row_ = values[0 if stamps is None else stamps.argmin()].copy()
 
     def _features(self, values: Array, stamps: pd.DatetimeIndex | None) -> tuple[Array, list[FewRecordsWarning]]:
-        if stamps is None:
-            own, records = np.arange(len(values)), values
-            times = own
-        else:
+        own, records = np.arange(len(values)), values
+        times = own
+        if stamps is not None:
             own = stamps.as_unit("ns").asi8
             times, records = self._joined(self._found(own, MEAN_REACH * self._longest), own, values)
         order = np.argsort(times, kind="stable")
-        sorted_times, sorted_records = times[order], records[np.ix_(order, self.sensors_)]
+        times, records = times[order], records[np.ix_(order, self.sensors_)]
         rows = np.argsort(order)[len(order) - len(own) :]
-        means = [trailing_means(sorted_times, sorted_records, int(constant))[rows] for constant in self.time_constants_]
-        return np.hstack([values, *means]), self._doubts_of_past(values, own, sorted_times)
+        begun = times[0] if self.stamps_ is None else min(int(times[0]), int(self.stamps_.view(np.int64).min()))
+        means = []
+        for half_life in self.half_lives_.tolist():
+            mean, share = trailing_means(times, records, half_life, self.step_, begun)
+            means.append(np.where(share < self.recorded, np.nan, mean)[rows])
+        return np.hstack([values, *means]), self._doubts_of_past(values, own, times, means)
 
     def lacks_past(self, X: pd.DataFrame) -> NDArray[np.bool_]:
-        """Which rows follow the first record by less than two time constants: their means lack the weather before.
+        """Which rows follow the first record by less than two half-lives: their means lack the weather before.
 
         Parameters
         ----------
@@ -426,7 +448,7 @@ class ExponentialMeans(PastFeatures):
         Returns
         -------
         ndarray of bool of shape (n_samples,)
-            By the longest time constant; records of `fit` count.
+            By the longest half-life; records of `fit` count.
         """
         check_is_fitted(self)
         own = self._stamps_as_in_fit(X).as_unit("ns").asi8
@@ -441,30 +463,22 @@ class ExponentialMeans(PastFeatures):
 
     @property
     def _longest(self) -> int:
-        return int(self.time_constants_.max())
-
-    def _read_sensors(self, n_sensors: int) -> NDArray[np.intp]:
-        if self.sensors is None:
-            return np.arange(n_sensors)
-        columns = list(getattr(self, "feature_names_in_", range(n_sensors)))
-        known = [one for one in self.sensors if one in columns]
-        if len(known) < len(self.sensors) or len(set(known)) < len(known) or not known:
-            raise ValueError(f"sensors is {self.sensors!r}; expected different ones of the columns {columns}")
-        return np.array([columns.index(one) for one in known], dtype=np.intp)
+        return int(self.half_lives_.max())
 
     def _names(self, sensors: Sequence[Hashable]) -> list[Hashable]:
         if not len(sensors):
             return []
-        chosen = [sensors[position] for position in self.sensors_]
-        return [*sensors, *(f"{one}_mean{_as_label(constant)}" for constant in self.time_constants for one in chosen)]
+        labels = [one if isinstance(one, str) else str(one).replace(" ", "") for one in self.half_lives]
+        return [*sensors, *(f"{sensors[place]}_mean{label}" for label in labels for place in self.sensors_)]
 
     def _doubts_of_past(
-        self, values: Array, own: NDArray[np.int64], times: NDArray[np.int64]
+        self, values: Array, own: NDArray[np.int64], times: NDArray[np.int64], means: list[Array]
     ) -> list[FewRecordsWarning]:
-        """A finding where more than half of the rows have no record a time constant back, unless the first of them is
-        that of `fit`."""
+        """A finding where more than half of the rows lack a mean, or a record a half-life back, unless the first of
+        them is that of `fit`."""
         at = np.searchsorted(times, own - self._longest, side="right") - 1
         lacking = (at < 0) | (own - times[np.maximum(at, 0)] > MEAN_REACH * self._longest)
+        lacking |= np.isnan(np.hstack(means)).any(axis=1) & ~np.isnan(values[:, self.sensors_]).any(axis=1)
         is_first = np.array_equal(values[own.argmin()], self.first_row_, equal_nan=True)
         if is_first or 2 * lacking.sum() <= len(own):
             return []
@@ -472,27 +486,33 @@ class ExponentialMeans(PastFeatures):
         reach = duration_text(pd.Timedelta(self._longest)) if is_timed else f"{self._longest} rows"
         return [
             FewRecordsWarning(
-                f"most rows have no record {reach} or more before, and their means are of fewer records than the time "
-                f"constant asks for. Give the records of {MEAN_REACH} times {reach} before, too",
+                f"most rows have too few records in the {reach} before, and their means are missing or of fewer "
+                f"records than the half-life asks for. Give the records of {MEAN_REACH} times {reach} before, too",
                 "no-earlier-records",
             )
         ]
 
 
-def trailing_means(times: NDArray[np.int64], values: NDArray, constant: int) -> NDArray[np.float64]:
-    """Exponentially weighted means of columns in order of time, NaN left out, over `MEAN_REACH` time constants."""
+def trailing_means(
+    times: NDArray[np.int64], values: NDArray, half_life: int, step: int, begun: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Exponentially weighted means of columns in order of time, NaN left out, over `MEAN_REACH` half-lives, and the
+    share of the weight since records have ``begun`` that lies on recorded time."""
     known = ~np.isnan(values)
     centre = np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    table = np.hstack([np.where(known, values - centre, 0.0), known])
-    ages = (times - times[0]) / constant
-    sums = _decayed_sums(ages, table)
-    before = np.searchsorted(times, times - MEAN_REACH * constant, side="right") - 1
+    ages = (times - times[0]) * (np.log(2) / half_life)
+    times_before = pd.DataFrame(np.where(known, times[:, np.newaxis], np.nan)).ffill().shift().to_numpy()
+    since = np.minimum(np.nan_to_num(times[:, np.newaxis] - times_before, nan=step), 3 * step)
+    covered = np.where(known, -np.expm1(-since * (np.log(2) / half_life)), 0.0)
+    sums = _decayed_sums(ages, np.hstack([np.where(known, values - centre, 0.0), known, covered]))
+    before = np.searchsorted(times, times - MEAN_REACH * half_life, side="right") - 1
     old = np.flatnonzero(before >= 0)
     sums[old] -= sums[before[old]] * np.exp(ages[before[old]] - ages[old])[:, np.newaxis]
-    counts = sums[:, values.shape[1] :]
-    is_known = counts > 0.5 * np.exp(-MEAN_REACH)
-    means = np.divide(sums[:, : values.shape[1]], counts, out=np.full(values.shape, np.nan), where=is_known)
-    return means + centre
+    totals, counts, recorded = np.hsplit(sums, 3)
+    is_known = counts > 0.5 * 2.0**-MEAN_REACH
+    means = np.divide(totals, counts, out=np.full(values.shape, np.nan), where=is_known) + centre
+    reach = np.minimum(times - begun + step, MEAN_REACH * half_life) * (np.log(2) / half_life)
+    return means, recorded / -np.expm1(-reach)[:, np.newaxis]
 
 
 def _decayed_sums(ages: NDArray[np.float64], table: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -500,7 +520,7 @@ def _decayed_sums(ages: NDArray[np.float64], table: NDArray[np.float64]) -> NDAr
     sums = np.empty(table.shape)
     carried, start = np.zeros(table.shape[1]), 0
     while start < len(ages):
-        # weights of more than 300 time constants, multiplied up, would overflow
+        # exp of ages above 300 would overflow
         stop = int(np.searchsorted(ages, ages[start] + 300, side="right"))
         growth = np.exp(ages[start:stop] - ages[start])[:, np.newaxis]
         before = carried * np.exp(ages[start - 1] - ages[start]) if start else carried
@@ -509,30 +529,23 @@ def _decayed_sums(ages: NDArray[np.float64], table: NDArray[np.float64]) -> NDAr
     return sums
 
 
-def _read_time_constants(given: Any, is_timed: bool) -> NDArray[np.int64]:
+def _read_half_lives(given: Any, is_timed: bool) -> NDArray[np.int64]:
     if isinstance(given, str) or not len(given):
-        raise ValueError(f"time_constants is {given!r}; expected a sequence, such as ['30D']")
-    constants = []
+        raise ValueError(f"half_lives is {given!r}; expected a sequence, such as ['30D']")
+    found = []
     for one in given:
         is_count = isinstance(one, Integral) and not isinstance(one, bool | np.bool_ | np.timedelta64)
         if is_timed:
-            duration = check_duration(one, "time constant", may_be_zero=False)
+            duration = check_duration(one, "half-life", may_be_zero=False)
             if duration > np.timedelta64(10 * 365, "D"):
-                raise ValueError(f"time constant is {one!r}; expected at most ten years")
-            constants.append(duration.value)
+                raise ValueError(f"half-life is {one!r}; expected at most ten years")
+            found.append(duration.value)
         elif not is_count:
-            raise ValueError(
-                f"time constant {one!r} is a duration, but X has no DatetimeIndex; expected a number of rows"
-            )
+            raise ValueError(f"half-life {one!r} is a duration, but X has no DatetimeIndex; expected a number of rows")
         elif not 1 <= one <= np.iinfo(np.int32).max:
-            raise ValueError(f"time constant is {one!r}; expected a positive number of rows")
+            raise ValueError(f"half-life is {one!r}; expected a positive number of rows")
         else:
-            constants.append(int(one))
-    if len(set(constants)) < len(constants):
-        raise ValueError(f"time_constants is {given!r}; expected different ones")
-    return np.array(constants, dtype=np.int64)
-
-
-def _as_label(constant: Any) -> str:
-    """A time constant as a part of a name, such as "30D"."""
-    return constant if isinstance(constant, str) else str(constant).replace(" ", "")
+            found.append(int(one))
+    if len(set(found)) < len(found):
+        raise ValueError(f"half_lives is {given!r}; expected different ones")
+    return np.array(found, dtype=np.int64)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,6 @@ from skthermo._core.arrays import (
     median,
     piecewise_linear,
     robust_deviation,
-    rows_by_pattern,
     spread_evenly,
 )
 from skthermo.preprocessing.folds import out_of_fold
@@ -47,10 +45,11 @@ class WeatherLines:
             n_needed = 1 + np.searchsorted(np.cumsum(variances), 0.99 * max(variances.sum(), 1e-300))
             components = vectors[:, : min(3, n_needed)].T
             filled = np.where(known, standard, filled @ components.T @ components)
-        return cls(centre, scale, components, quartiles(filled @ components.T))
+        return cls(centre, scale, components, np.quantile(filled @ components.T, (0.25, 0.5, 0.75), axis=0))
 
-    def coordinates(self, temperatures: Array) -> Array:
-        """Components of each row, (n_samples, n_components); NaN where no sensor has a value."""
+    def inputs(self, temperatures: Array) -> tuple[Array, Array]:
+        """Components of each row, (n_samples, n_components), NaN where no sensor has a value; and a constant beside
+        piecewise-linear functions of them."""
         known = ~np.isnan(temperatures)
         standard = np.where(known, (temperatures - self.centre) / self.scale, 0.0)
         places = standard @ self.components.T
@@ -58,72 +57,39 @@ class WeatherLines:
         for _ in range(20 if gaps.any() else 0):
             places[gaps] = np.where(known[gaps], standard[gaps], places[gaps] @ self.components) @ self.components.T
         places[~known.any(axis=1)] = np.nan
-        return places
-
-    def inputs(self, places: Array) -> Array:
-        """A constant, and piecewise-linear functions of the coordinates."""
-        return np.hstack([np.ones((len(places), 1)), piecewise_linear(places, self.knots)])
+        return places, np.hstack([np.ones((len(places), 1)), piecewise_linear(places, self.knots)])
 
 
-def quartiles(values: Array) -> Array:
-    """The quartiles of each column, at which piecewise-linear functions of it break."""
-    return np.quantile(values, (0.25, 0.5, 0.75), axis=0)
-
-
-def products(inputs: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Products of inputs with inputs and with each mode, and the number of rows that have an input and a value:
-    (n_modes, n_inputs, n_inputs), (n_modes, n_inputs) and (n_modes,). Sums of them are those of all rows."""
-    n_modes, n_inputs = values.shape[1], inputs.shape[1]
-    gram, targets, counts = np.zeros((n_modes, n_inputs, n_inputs)), np.zeros((n_modes, n_inputs)), np.zeros(n_modes)
+def ridge(inputs: Array, values: Array) -> Array:
+    """Ridge coefficients of each column of values, (n_inputs, n_columns), from the rows that have all inputs and the
+    value; the first input is a constant."""
     usable = ~np.isnan(inputs).any(axis=1)
-    for known, modes in rows_by_pattern(~np.isnan(values.T) & usable):
-        X = inputs if known.all() else inputs[known]
-        gram[modes], counts[modes] = X.T @ X, len(X)
-        targets[modes] = (X.T @ values[np.ix_(known, modes)]).T
-    return gram, targets, counts
-
-
-def ridge(gram: Array, targets: Array, counts: Array, sets: Sequence[Sequence[int]] | None = None) -> Array:
-    """Ridge coefficients of each mode, (n_modes, n_inputs), from `products`; the first input is a constant.
-
-    With sets of inputs, each of which begins with the constant, the result is (n_sets, n_modes, n_inputs), zero for
-    inputs that a set has not.
-    """
-    n_inputs = gram.shape[-1]
-    penalty = np.tile(1e-4 * np.maximum(counts, 1.0)[:, np.newaxis], n_inputs)
-    penalty[:, 0] = 1e-9
-    penalised = gram + penalty[..., np.newaxis] * np.eye(n_inputs)
-    if sets is None:
-        return np.linalg.solve(penalised, targets[..., np.newaxis])[..., 0]
-    coefficients = np.zeros((len(sets), *targets.shape))
-    for own, columns in zip(coefficients, sets, strict=True):
-        part = penalised[:, np.asarray(columns)[:, np.newaxis], columns]
-        own[:, columns] = np.linalg.solve(part, targets[:, columns, np.newaxis])[..., 0]
+    X, Y = (inputs, values) if usable.all() else (inputs[usable], values[usable])
+    known, coefficients = ~np.isnan(Y), np.zeros((inputs.shape[1], values.shape[1]))
+    columns = [slice(None)] if known.all() else range(values.shape[1])
+    for some in columns:
+        A, y = (X, Y) if known.all() else (X[known[:, some]], Y[known[:, some], some])
+        penalty = np.full(A.shape[1], 1e-4 * max(len(A), 1))
+        penalty[0] = 1e-9
+        coefficients[:, some] = np.linalg.solve(A.T @ A + np.diag(penalty), A.T @ y)
     return coefficients
 
 
-def predicted_by_ridge(
-    inputs: Array, values: Array, folds: NDArray[np.intp], sets: Sequence[Sequence[int]] | None = None
-) -> Array:
-    """Values of each fold as `ridge` predicts them from the other folds; with sets, (n_samples, n_sets, n_modes)."""
-    n_folds = folds.max() + 1
-    of_folds = [products(inputs[folds == fold], values[folds == fold]) for fold in range(n_folds)]
-    by_fold = [np.stack(parts) for parts in zip(*of_folds, strict=True)]
+def predicted_by_weather(inputs: Array, values: Array, folds: NDArray[np.intp], *, trim: bool = True) -> Array:
+    """Predictions of each fold's rows from at most 20,000 of the others, far values left out of the second of two fits
+    by ``trim``."""
+    centre = median(values)
+    learned = values - centre
 
     def learn(train: NDArray[np.intp]):
-        others = np.bincount(folds[train], minlength=n_folds) > 0
-        coefficients = ridge(*(np.tensordot(others, part, 1) for part in by_fold), sets)
-        return lambda test: np.moveaxis(inputs[test] @ np.swapaxes(coefficients, -1, -2), -2, 0)
+        rows = spread_evenly(train, 20_000)
+        coefficients = ridge(inputs[rows], learned[rows])
+        return lambda test: inputs[test] @ coefficients
 
-    return out_of_fold(learn, folds)
-
-
-def predicted_by_weather(inputs: Array, values: Array, folds: NDArray[np.intp], *, trim: bool = True) -> Array:
-    """Predictions of each fold's rows from the others, far values left out of the second of two fits by ``trim``."""
-    centre = median(values)
-    predicted = predicted_by_ridge(inputs, values - centre, folds)
+    predicted = out_of_fold(learn, folds)
     if trim:
-        predicted = predicted_by_ridge(inputs, without_far(values - centre, values - centre - predicted), folds)
+        learned = without_far(learned, learned - predicted)
+        predicted = out_of_fold(learn, folds)
     return predicted + centre
 
 

@@ -194,7 +194,7 @@ def out_of_fold(learn: Callable[[Rows], Callable[[Rows], ArrayLike]], folds: Row
     n_rows, splits = len(folds), folds
     if isinstance(folds, np.ndarray):
         splits = []
-        for number in np.unique(folds[folds >= 0]):
+        for number in np.flatnonzero(np.bincount(folds[folds >= 0])):
             splits.append((np.flatnonzero(folds != number), np.flatnonzero(folds == number)))
     else:
         n_rows = 1 + max(int(rows.max(initial=-1)) for pair in folds for rows in pair)

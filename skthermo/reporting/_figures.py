@@ -19,7 +19,7 @@ from skthermo._core.text import printable
 from skthermo.fem import Structure
 from skthermo.plotting import (
     DamageIndexDisplay,
-    IdentifiedDamageDisplay,
+    DetectorsDisplay,
     PODCurveDisplay,
     PredictionDisplay,
     StructureDisplay,
@@ -178,15 +178,17 @@ def draw_groups(structure: Structure, groups: Sequence[str], alt: str) -> Html:
 
 
 def draw_identified_damage(identified: IdentifiedDamage, alt: str) -> Html:
-    """Explanations, severities and shifts, one below the other."""
+    """Probabilities and severities, one below the other."""
     plt = import_optional("matplotlib.pyplot", extra="plot")
-    heights = [3.2, 1.6 + 0.4 * len(identified.table), 2.8]
+    height = 2.6 + 0.6 * len(identified.table)
 
-    def make() -> IdentifiedDamageDisplay:
-        axes = plt.subplots(3, 1, figsize=(WIDTH, sum(heights)), layout="constrained", height_ratios=heights)[1]
-        return IdentifiedDamageDisplay.from_predictions(identified, ax=axes)
+    def make() -> DetectorsDisplay:
+        axes = plt.subplots(2, 1, figsize=(WIDTH, height), layout="constrained")[1]
+        display = DetectorsDisplay.from_predictions(identified.table, ax=axes)
+        fold_legend(display.figure_, "outside upper center")
+        return display
 
-    return draw(make, alt, height=sum(heights))
+    return draw(make, alt, height=height)
 
 
 def chosen_sensor(T: pd.DataFrame, F: pd.DataFrame) -> pd.Series:

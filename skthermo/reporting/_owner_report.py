@@ -16,8 +16,7 @@ from skthermo.reporting._templates import check_templates, rendered
 from skthermo.reporting.service import Standing, monitor_facts
 
 if TYPE_CHECKING:  # jobs write the page on a monitor every night: studies and fleets are imported for their own pages
-    from skthermo.fleet import Fleet
-    from skthermo.monitoring import Monitor
+    from skthermo.monitoring import Fleet, Monitor
     from skthermo.studies import DetectabilityStudy, IdentifiedDamage
 
 KINDS = {
@@ -60,7 +59,7 @@ def owner_report(
     ----------
     subject : DetectabilityStudy, Monitor or Fleet
         A study with the results of `~skthermo.studies.DetectabilityStudy.run`, a fitted
-        `~skthermo.monitoring.Monitor`, or what `~skthermo.fleet.fit_fleet` gives.
+        `~skthermo.monitoring.Monitor`, or what `~skthermo.monitoring.fit_fleet` gives.
     path : str or path
         The file; an older one is replaced when the new one is complete.
     identified : IdentifiedDamage, optional

@@ -44,10 +44,7 @@ class BaselineResiduals:
     n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
     mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
     of the training records they are. ``ratios``, (n_records, n_parameters), are the parameters of the records over
-    out-of-fold predictions. ``errors``, (n_records, n_modes), are the relative standard deviations of out-of-fold
-    predictions as a mapper states them that knows the weather within which they hold, ``reach``, else None. ``beyond``,
-    (n_records,), is how far each record was outside the reach of the mapper that predicted it. ``findings`` say in
-    which weather residuals are not to be trusted.
+    out-of-fold predictions. ``findings`` say in which weather residuals are not to be trusted.
     """
 
     weather: Array
@@ -56,9 +53,6 @@ class BaselineResiduals:
     folds: NDArray[np.intp]
     rows: NDArray[np.intp] | None = None
     ratios: Array | None = None
-    errors: Array | None = None
-    reach: TrainingRange | None = None
-    beyond: Array | None = None
     findings: tuple[WeatherWarning, ...] = ()
 
     @cached_property
@@ -76,14 +70,11 @@ class BaselineResiduals:
         return self.values.shape[1]
 
     def spread(self, weather: Array) -> Array:
-        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown.
-
-        The errors that the mapper states of its predictions are left out.
-        """
+        """Root mean square of the residuals in similar weather, (n_samples, n_modes); NaN where weather is unknown."""
 
         def of_known(known: Array) -> Array:
-            reach = self.reach or TrainingRange.spanned(self.weather, slice(None))
-            return self._spread(self._scattered, known, reach.excess(known).mean(axis=1))
+            beyond = TrainingRange.spanned(self.weather, slice(None)).excess(known).mean(axis=1)
+            return self._spread(self.values, known, beyond)
 
         return self._where_known(weather, of_known)
 
@@ -328,26 +319,15 @@ class BaselineResiduals:
         return np.sqrt(np.where(np.isnan(squares), np.inf, squares)) * (1 + beyond)[:, np.newaxis]
 
     @cached_property
-    def _scattered(self) -> Array:
-        """The residuals, less the share of each that is as a rule an error that the mapper states."""
-        if self.errors is None or not self.errors.any():
-            return self.values
-        errors = np.where(np.isnan(self.values), np.nan, self.errors**2)
-        variances = means_of_known((self.values - means_of_known(self.values)) ** 2)
-        own = np.maximum(variances - means_of_known(errors), np.finfo(float).tiny)
-        return self.values * np.sqrt(own / (own + errors))
-
-    @cached_property
     def _scores(self) -> Array:
         """Absolute residuals over the spread that the records of the other folds give for their weather."""
         scores = np.empty_like(self.values)
         for fold in np.unique(self.folds):
             test = self.folds == fold
             weather = self.weather[test]
-            others = TrainingRange.spanned(self.weather, ~test).excess(weather).mean(axis=1)
-            beyond = others if self.beyond is None else self.beyond[test]
-            spread = self._spread(np.where(test[:, np.newaxis], np.nan, self._scattered), weather, beyond)
-            scores[test] = np.abs(self._scattered[test]) / spread
+            beyond = TrainingRange.spanned(self.weather, ~test).excess(weather).mean(axis=1)
+            spread = self._spread(np.where(test[:, np.newaxis], np.nan, self.values), weather, beyond)
+            scores[test] = np.abs(self.values[test]) / spread
         return scores
 
 

@@ -31,11 +31,20 @@ class Gaussian:
         """The most likely one, by expectation maximisation where modes are missing."""
         present = ~np.isnan(rows)
         if present.all():
-            return cls(rows.mean(axis=0), np.cov(rows.T, bias=True).reshape(2 * rows.shape[1:]))
+            mean = np.ones(len(rows)) @ rows / len(rows)
+            centred = rows - mean
+            return cls(mean, centred.T @ centred / len(rows))
         centre, deviations = np.nanmean(rows, axis=0), np.nanstd(rows, axis=0)
         scale = np.where(deviations > 0, deviations, 1.0)
         mean, covariance, is_settled = _most_likely(np.where(present, (rows - centre) / scale, 0.0), present)
         return cls(centre + scale * mean, covariance * np.outer(scale, scale), is_settled)
+
+    def without(self, some: Array, n_rows: int) -> Gaussian:
+        """The most likely one of the others of so many complete rows, whose most likely one this is."""
+        centred, n_others = some - self.mean, n_rows - len(some)
+        shift = -np.ones(len(some)) @ centred / n_others
+        products = n_rows * self.covariance - centred.T @ centred
+        return Gaussian(self.mean + shift, products / n_others - np.outer(shift, shift))
 
     def distances(self, rows: Array) -> Array:
         """Mahalanobis distances in the modes that rows have; NaN where there is none."""
@@ -86,13 +95,6 @@ def precisions(covariance: Array, masks: Mask) -> Array:
     return np.where(both, np.linalg.inv(_alone(covariance, masks, both)), 0.0)
 
 
-def check_not_empty(rows: Array, names: Sequence[str] | None = None) -> None:
-    """Refuse modes that no row has."""
-    empty = np.isnan(rows).all(axis=0)
-    if empty.any():
-        raise ValueError(f"{modes_text(empty, names)} are NaN in all {len(rows)} rows")
-
-
 def modes_text(chosen: Mask, names: Sequence[str] | None) -> str:
     """Some modes by their names or, without names, by their positions."""
     if names is None:
@@ -100,19 +102,18 @@ def modes_text(chosen: Mask, names: Sequence[str] | None) -> str:
     return f"modes {[str(name) for name in np.asarray(names)[chosen]]}"
 
 
-def check_invertible(
-    covariance: Array, rows: Array, size: Array | None = None, names: Sequence[str] | None = None
-) -> Array:
-    """Standard deviations of the modes, more than rounding beside their size, if no mode depends on others."""
-    size = np.fmax.reduce(np.abs(rows)) if size is None else size
-    deviations = np.sqrt(np.diag(covariance))
-    constant = (deviations <= 1e-14 * size) | (np.fmax.reduce(rows) == np.fmin.reduce(rows))
+def check_invertible(normal: Gaussian, n_rows: int, *, has_gaps: bool, names: Sequence[str] | None = None) -> Array:
+    """Standard deviations of the modes, more than rounding beside their size, if no mode depends on others.
+
+    With gaps, the iteration leaves a small variance where there is none.
+    """
+    covariance = normal.covariance
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    constant = deviations <= (1e-7 if has_gaps else 1e-14) * np.abs(normal.mean)
     scale = np.where(constant, np.inf, deviations)
-    # With gaps, the iteration leaves a small variance where there is none.
-    tolerance = SINGULAR_WITH_GAPS if np.isnan(rows).any() else None
+    tolerance = SINGULAR_WITH_GAPS if has_gaps else None
     rank = np.linalg.matrix_rank(covariance / np.outer(scale, scale), tolerance, hermitian=True)
     if rank < len(covariance):
-        n_rows = int((~np.isnan(rows)).any(axis=1).sum())
         which = f", {modes_text(constant, names)} are constant" if constant.any() else ""
         if not which and n_rows > len(covariance):
             combination = np.linalg.eigh(covariance / np.outer(scale, scale))[1][:, 0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,12 +15,10 @@ from sklearn.neighbors import NearestNeighbors
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._core.arrays import Array, as_floats, median, range_sums, robust_deviation, spread_evenly
-from skthermo._core.frames import Table, column_names, frame_like, row_times
-from skthermo._core.warnings import collected
+from skthermo._core.arrays import Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
+from skthermo._core.frames import Table, column_names
 from skthermo.exceptions import RecordsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
-from skthermo.residuals.gaussian import Gaussian
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
@@ -43,9 +41,21 @@ class TrainingRange:
 
     def excess(self, inputs: Any) -> Array:
         """How far each value is outside, in units of the range of its column; 0 inside, NaN where it is missing."""
-        values, width = as_floats(inputs), self.highest - self.lowest
+        values = as_floats(inputs)
         beyond = np.maximum(np.maximum(self.lowest - values, values - self.highest), 0.0)
-        return beyond / np.where(width > 0, width, 1.0) + np.where(np.isnan(values), np.nan, 0.0)
+        return beyond / self.width + np.where(np.isnan(values), np.nan, 0.0)
+
+    @property
+    def width(self) -> Array:
+        """Width of each column, 1 where it is constant."""
+        width = self.highest - self.lowest
+        return np.where(width > 0, width, 1.0)
+
+    def ends(self, values: Array) -> Array:
+        """How far each row is below and above, by its farthest column, (n_rows, 2); 0 where a value is missing."""
+        excess = np.nan_to_num(self.excess(values))
+        sides = values < self.lowest, values > self.highest
+        return np.column_stack([np.where(side, excess, 0.0).max(axis=1) for side in sides])
 
     def doubts(self, inputs: Any) -> list[WeatherWarning]:
         """The finding that rows are far outside the range, in units of it."""
@@ -64,6 +74,50 @@ class TrainingRange:
                 "outside-training-weather",
             )
         ]
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """How residuals scatter outside the weather that a regression has learned.
+
+    Where the farthest input of a record is e ranges below the lowest value of the baseline, or above the highest, the
+    variance of its residuals is 1 + growth ln(1 + e^2) times the one inside; ``growth``, (2,), has a value for each
+    end.
+    """
+
+    reach: TrainingRange
+    growth: Array
+
+    @classmethod
+    def learned(
+        cls,
+        reach: TrainingRange,
+        weather: Array,
+        residuals_of: Callable[[NDArray[np.intp], NDArray[np.intp]], Array],
+        *,
+        usual: float = 9.0,
+    ) -> Extrapolation:
+        """Learn from the coldest and from the warmest fifth of the records of a range.
+
+        ``residuals_of(others, fifth)`` are residuals of records, in their usual standard deviations, by a regression on
+        the others. The usual growth has the weight of a record at 0.6 ranges.
+        """
+        warmth = means_of_known((weather - reach.lowest) / reach.width, axis=1)
+        coldest_first = np.argsort(warmth)[: (~np.isnan(warmth)).sum()]
+        n_apart, growth = len(coldest_first) // 5, np.full(2, usual)
+        for end, order in enumerate((coldest_first, coldest_first[::-1])):
+            fifth, others = np.sort(order[:n_apart]), np.sort(order[n_apart:])
+            if not n_apart:
+                continue
+            added = np.log1p(TrainingRange.spanned(weather, others).ends(weather[fifth])[:, end] ** 2)
+            excess = means_of_known(residuals_of(others, fifth) ** 2, axis=1) - 1
+            known = ~np.isnan(excess)
+            growth[end] = max((added[known] @ excess[known] + 0.1 * usual) / (added[known] @ added[known] + 0.1), 0.0)
+        return cls(reach, growth)
+
+    def variances(self, weather: Any) -> Array:
+        """Variance of the residuals of each row, in terms of the one inside; unknown weather counts as inside."""
+        return 1 + np.log1p(self.reach.ends(as_floats(weather)) ** 2) @ self.growth
 
 
 def implausible(known: TrainingRange, temperatures: Any) -> list[RecordsWarning]:
@@ -107,190 +161,6 @@ def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> l
     ]
 
 
-@dataclass(frozen=True)
-class SensorRegression:
-    """What each sensor shows, given any others, as learned from records.
-
-    ``usual`` holds the largest mean departure of each sensor in some number of consecutive training records: from 36
-    to a tenth of them, so that some means are independent.
-    """
-
-    gaussian: Gaussian
-    learned: Array
-    reach: TrainingRange
-    usual: dict[int, Array] = field(default_factory=dict)
-
-    @classmethod
-    def fitted(cls, temperatures: Any) -> SensorRegression:
-        """Learn from records; a sensor without any value is not learned."""
-        values = as_floats(temperatures)
-        telling = _telling_rows(values)
-        learned = ~np.isnan(telling).all(axis=0)
-        found = Gaussian.fitted(telling[:, learned])
-        variances = np.diag(found.covariance)
-        own = np.diag(1e-9 * np.where(variances > 0, variances, 1.0))  # also where two sensors show the same
-        reach = TrainingRange.spanned(temperatures, np.ones(len(values), dtype=bool))
-        sensors = cls(Gaussian(found.mean, found.covariance + own), learned, reach)
-        departures = sensors.departures(values[np.argsort(row_times(temperatures), kind="stable")])
-        lengths = 36 << np.arange(20)
-        for length in lengths[lengths <= 0.1 * len(values)]:
-            sensors.usual[length] = np.fmax.reduce(np.abs(_running_means(departures, length)))
-        return sensors
-
-    def fill(self, temperatures: Any) -> tuple[Array, Array]:
-        """Temperatures with gaps filled from the other sensors, and the standard deviations of what was filled.
-
-        These are zero where a sensor has a value. Rows without any value stay NaN.
-        """
-        values = as_floats(temperatures).copy()
-        deviations = np.where(np.isnan(values), np.nan, 0.0)
-        gaps = np.flatnonzero(np.isnan(values[:, self.learned]).any(axis=1))
-        for part in parts(len(gaps), self.learned.sum() ** 2):
-            rows = np.ix_(gaps[part], self.learned)
-            values[rows], deviations[rows] = self.gaussian.completed(values[rows])
-        return values, deviations
-
-    def departures(self, temperatures: Any) -> Array:
-        """Value of each sensor minus its prediction from the other sensors of the record; NaN in records with gaps."""
-        values = as_floats(temperatures)
-        departures = np.full(values.shape, np.nan)
-        if self.learned.sum() > 1:
-            precision = np.linalg.inv(self.gaussian.covariance)
-            centred = values[:, self.learned] - self.gaussian.mean
-            departures[:, self.learned] = centred @ precision / np.diag(precision)
-        return departures
-
-    def doubts(self, temperatures: Any) -> list[RecordsWarning]:
-        """The finding that a sensor departs from the others as it did not in training.
-
-        Records count in which the others are within their training range and it is not far outside, if these are most.
-        A departure is one in the mean of consecutive records: three times the largest in training (a season that these
-        lack gives two), at least a degree, below which thermometers may differ without a fault, and at least 3 % of the
-        training range, below which predictions hardly move.
-        """
-        order = np.argsort(row_times(temperatures), kind="stable")
-        lengths = np.array(list(self.usual), dtype=int)
-        length = lengths[lengths <= len(order)].max(initial=0)
-        if not length:
-            return []
-        values = as_floats(temperatures)[order]
-        beyond = np.nan_to_num(self.reach.excess(values))
-        outside = beyond > 0
-        evaluated = (outside.sum(axis=1, keepdims=True) == outside) & (beyond <= FAR_OUTSIDE)
-        departures = np.where(evaluated, self.departures(values), np.nan)
-        departures[:, evaluated.mean(axis=0) < 0.5] = np.nan
-        least = np.maximum(0.03 * (self.reach.highest - self.reach.lowest), 1.0)
-        limits = np.maximum(3.0 * self.usual[length], least)
-        excess = np.nan_to_num(np.abs(_running_means(departures, length)) / limits)
-        sensor = int(np.unravel_index(excess.argmax(), excess.shape)[1])
-        if excess[:, sensor].max() <= 1:
-            return []
-        return [
-            RecordsWarning(
-                f"{self.reach.names[sensor]!r} departs from the other sensors' prediction more than it did in "
-                "training. It drifts, is stuck or was moved, which moves predictions and gives false alarms. Put NaN "
-                "where it is wrong: the other sensors fill it",
-                "sensor-disagrees",
-            )
-        ]
-
-    def errors(self, temperatures: Any) -> Iterator[Array]:
-        """Independent errors of what `fill` fills in, of one standard deviation each, as tables like the temperatures.
-
-        There is one for each sensor with gaps; zero where a sensor has a value.
-        """
-        values = as_floats(temperatures)
-        missing = np.isnan(values[:, self.learned])
-        gaps = missing.any(axis=1) & ~missing.all(axis=1)
-        roots, of_row = self.gaussian.error_roots(values[np.ix_(gaps, self.learned)])
-        for sensor in np.flatnonzero(missing[gaps].any(axis=0)):
-            error = np.zeros_like(values)
-            error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
-            yield error
-
-
-@dataclass(frozen=True)
-class PredictionError:
-    """Covariance of the error of predictions that is known of each row, (n_rows, n_modes, n_modes).
-
-    ``rows`` are those with such an error.
-    """
-
-    rows: NDArray[np.intp]
-    covariances: Array
-
-    @classmethod
-    def of_rows(cls, covariances: Array) -> PredictionError:
-        """That of rows with a covariance each; zero where it is unknown."""
-        known = np.nan_to_num(covariances)
-        rows = np.flatnonzero(known.any(axis=(1, 2)))
-        return cls(rows, known[rows])
-
-    @classmethod
-    def of_fills(
-        cls,
-        sensors: SensorRegression,
-        raw: Any,
-        filled: Any,
-        predict: Callable[[Any], Array],
-        outcome: Callable[[Array], Array] = np.asarray,
-    ) -> PredictionError:
-        """Errors of filled temperatures in predictions.
-
-        Filled values are moved by one standard deviation up and down, sensor by sensor, and predicted again. The error
-        of the ``outcome`` of each prediction counts.
-        """
-        with collected():
-            middle = np.empty(0)
-            moved: list[Array] = []
-            for error in sensors.errors(raw):
-                middle = middle if moved else predict(filled)
-                moved += [predict(frame_like(filled, as_floats(filled) + side)) for side in (-error, error)]
-            if not moved:
-                return NO_ERRORS
-            rows = np.flatnonzero(np.any([np.nan_to_num(one - middle).any(axis=1) for one in moved], axis=0))
-            start = outcome(middle[rows])
-            changes = np.nan_to_num([outcome(one[rows]) - start for one in moved])
-        return cls(rows, np.einsum("ijk,ijl->jkl", changes, changes) / 2)
-
-    def of_part(self, rows: slice) -> PredictionError:
-        """That of some rows of a table, counted from the first of them."""
-        first, stop = np.searchsorted(self.rows, [rows.start, rows.stop])
-        return PredictionError(self.rows[first:stop] - rows.start, self.covariances[first:stop])
-
-    def of_all(self, n_rows: int, n_modes: int) -> Array:
-        """The covariance of each row of a table, zero where nothing is known."""
-        covariances = np.zeros((n_rows, n_modes, n_modes))
-        if len(self.rows):
-            covariances[self.rows] = self.covariances
-        return covariances
-
-    def plus(self, other: PredictionError, n_rows: int) -> PredictionError:
-        """The error of two independent causes in a table of so many rows."""
-        if not len(other.rows):
-            return self
-        if not len(self.rows):
-            return other
-        n_modes = other.covariances.shape[1]
-        return PredictionError.of_rows(self.of_all(n_rows, n_modes) + other.of_all(n_rows, n_modes))
-
-
-NO_ERRORS = PredictionError(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
-"""Where no error of predictions is known."""
-
-
-def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:
-    """Text of the warning that names sensors that were filled, from standard deviations; else an empty string."""
-    filled = (deviations > 0).any(axis=0)
-    if not filled.any():
-        return ""
-    listed = ", ".join(repr(name) for name, is_filled in zip(names, filled, strict=True) if is_filled)
-    return (
-        f"missing temperatures were filled from the other sensors: {listed}. {consequence}. If a sensor has failed, "
-        "leave it out and fit again"
-    )
-
-
 def unpredicted_text(
     unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach to no record"
 ) -> str:
@@ -304,28 +174,6 @@ def unpredicted_text(
     }
     found = {cause: need for cause, (rows, need) in causes.items() if rows.any()}
     return f"rows {', and rows '.join(found)} cannot be predicted and are NaN. {'. '.join(found.values())}"
-
-
-def _running_means(columns: Array, length: int) -> Array:
-    """Means of so many consecutive values, NaN where most are missing."""
-    first = np.arange(len(columns) - length + 1)
-    sums, counts = np.split(
-        range_sums(np.hstack([np.nan_to_num(columns), ~np.isnan(columns)]), first, first + length), 2, 1
-    )
-    return np.where(2 * counts > length, sums / np.maximum(counts, 1), np.nan)
-
-
-def _telling_rows(values: Array) -> Array:
-    """At most 20,000 records to learn from: the complete ones where most are, or where gaps would take long; else any.
-
-    A step of the expectation maximisation for records with gaps may take some 5e7 operations.
-    """
-    n_rows, n_sensors = values.shape
-    complete = np.flatnonzero(~np.isnan(values).any(axis=1))
-    most = int(np.clip(5e7 / n_sensors**3, 3 * n_sensors, 20_000))
-    if 2 * len(complete) >= n_rows or (most < n_rows and len(complete) >= 10 * n_sensors):
-        return values[complete[one_in_each_part(len(complete), 20_000)]]
-    return values[one_in_each_part(n_rows, most)]
 
 
 @dataclass(frozen=True)

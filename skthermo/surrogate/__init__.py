@@ -4,6 +4,7 @@ It uses ``fem`` and ``preprocessing``. Start with ``chain/_data_informed.py``, w
 step.
 """
 
+from skthermo.surrogate._fleet_mapper import FleetMapper
 from skthermo.surrogate._regression import TemperatureMapper, paper_network
 from skthermo.surrogate.chain import DataInformedFEM, FitReport, refitted, resampled, with_model
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
@@ -11,6 +12,7 @@ from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse
 __all__ = [
     "DataInformedFEM",
     "FitReport",
+    "FleetMapper",
     "InverseSurrogate",
     "PosteriorInverse",
     "TemperatureMapper",

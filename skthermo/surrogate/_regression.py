@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from datetime import timedelta
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -15,10 +16,11 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._core.arrays import Array, as_columns, as_floats, by_name, check_flag
+from skthermo._core.arrays import Array, as_columns, as_floats, by_name, check_flag, is_auto
 from skthermo._core.estimators import (
     Estimator,
     HasMethods,
+    StrOptions,
     TransformerMixin,
     _fit_context,
     check_array,
@@ -36,6 +38,7 @@ from skthermo._core.frames import (
     check_same_rows,
     column_names,
     frame_like,
+    has_stamps,
     like_targets,
     row_weights,
 )
@@ -44,7 +47,8 @@ from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.fem import evaluate
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import HingeFeatures, set_aside
+from skthermo.preprocessing import ExponentialMeans, HingeFeatures, set_aside
+from skthermo.surrogate._means import chosen_means
 
 
 def default_network() -> MLPRegressor:
@@ -107,7 +111,59 @@ def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4,
     return MLPRegressor(**(networks[purpose] | {"learning_rate_init": 0.001, "max_iter": 1000} | parameters))
 
 
-class MultiplierRegressor(RegressorMixin, Estimator):
+class TableRegressor(RegressorMixin, Estimator):
+    """Base of regressors whose inputs and outputs are tables with gaps, and names where frames have them."""
+
+    parameter_names_: list | None
+    predict: Callable[..., Any]
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
+        """Coefficient of determination R2 over complete rows, averaged over parameters.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_features)
+            Inputs.
+        y : array-like or DataFrame of shape (n_samples, n_parameters)
+            Multipliers.
+        sample_weight : array-like of shape (n_samples,), optional
+            Weight of each row; weights in a series are matched to the rows of a frame by index.
+
+        Returns
+        -------
+        float
+            NaN if fewer than two rows are complete.
+        """
+        predicted = self.predict(X)
+        targets = by_name(y, self.parameter_names_, "y") if self.parameter_names_ and hasattr(y, "columns") else y
+        return complete_r2(as_columns(targets), as_columns(predicted), row_weights(sample_weight, X))
+
+    def _inputs(self, X: ArrayLike) -> Array:
+        check_is_fitted(self)
+        return validate_data(self, X, dtype=np.float64, reset=False)
+
+    def _read_xy(self, X: Table, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
+        """X and y, (n_samples, n_parameters), with NaN where something is missing."""
+        if y is None:
+            raise ValueError(
+                f"This {type(self).__name__} estimator requires y to be passed, but the target y is None; "
+                f"expected {names[1]}"
+            )
+        inputs = validate_data(self, X, dtype=np.float64)
+        targets = check_array(y, dtype=np.float64, ensure_2d=False)
+        plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
+        check_same_rows(X, targets if plain_rows else y, names)
+        self.y_is_vector_ = targets.ndim == 1
+        self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
+        return inputs, as_columns(targets)
+
+
+class MultiplierRegressor(TableRegressor):
     """Base of regressors that predict multipliers: fitted to complete rows, NaN where an input is missing.
 
     A subclass stores ``regressor`` and ``random_state``; its ``fit`` reads the data and calls `_learn`. Hooks:
@@ -154,48 +210,8 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         table = like_targets(X, theta, names, is_vector=is_vector)
         return table if std is None else (table, like_targets(X, std, names, is_vector=is_vector))
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
-        """Coefficient of determination R2 over complete rows, averaged over parameters.
-
-        Parameters
-        ----------
-        X : array-like or DataFrame of shape (n_samples, n_features)
-            Inputs.
-        y : array-like or DataFrame of shape (n_samples, n_parameters)
-            Multipliers.
-        sample_weight : array-like of shape (n_samples,), optional
-            Weight of each row; weights in a series are matched to the rows of a frame by index.
-
-        Returns
-        -------
-        float
-            NaN if fewer than two rows are complete.
-        """
-        predicted = self.predict(X)
-        targets = by_name(y, self.parameter_names_, "y") if self.parameter_names_ and hasattr(y, "columns") else y
-        return complete_r2(as_columns(targets), as_columns(predicted), row_weights(sample_weight, X))
-
     def _default_part(self, name: str) -> BaseEstimator | None:
         return self._default_regressor() if name == "regressor" else None
-
-    def _inputs(self, X: ArrayLike) -> Array:
-        check_is_fitted(self)
-        return validate_data(self, X, dtype=np.float64, reset=False)
-
-    def _read_xy(self, X: Table, y: Any, names: tuple[str, str]) -> tuple[Array, Array]:
-        """X and y, (n_samples, n_parameters), with NaN where something is missing."""
-        if y is None:
-            raise ValueError(
-                f"This {type(self).__name__} estimator requires y to be passed, but the target y is None; "
-                f"expected {names[1]}"
-            )
-        inputs = validate_data(self, X, dtype=np.float64)
-        targets = check_array(y, dtype=np.float64, ensure_2d=False)
-        plain_rows = isinstance(y, pd.DataFrame) and y.index.equals(pd.RangeIndex(len(y)))
-        check_same_rows(X, targets if plain_rows else y, names)
-        self.y_is_vector_ = targets.ndim == 1
-        self.parameter_names_ = column_names(y, "") if isinstance(y, pd.DataFrame) else None
-        return inputs, as_columns(targets)
 
     def _learn(
         self,
@@ -255,11 +271,6 @@ class MultiplierRegressor(RegressorMixin, Estimator):
         with np.errstate(over="ignore"):
             theta[complete] = np.exp(found) if self.log_targets_ else found
         return theta, std * theta if std is not None and self.log_targets_ else std
-
-    def __sklearn_tags__(self):
-        tags = super().__sklearn_tags__()
-        tags.target_tags.multi_output = True
-        return tags
 
 
 class FrequencyInverse(TransformerMixin):
@@ -345,6 +356,11 @@ class TemperatureMapper(MultiplierRegressor):
         parameters are not positive, no logarithm is taken. By default piecewise-linear regression,
         ``make_pipeline(HingeFeatures(), RidgeCV(numpy.logspace(-3, 5, 33)))``, which goes on straight beyond the data.
         See `paper_network` for the paper's network.
+    means : "auto", sequence of half-lives or None, default="auto"
+        Exponential means of earlier temperatures beside those of now (`~skthermo.preprocessing.ExponentialMeans`): of
+        all columns with these half-lives, or none. "auto" takes those of one column, with 6 hours, a day, 5 or 30 days
+        or all of these, with which periods held out are predicted better, if any (:doc:`/guide/records_theory`). It
+        needs a DatetimeIndex and records of nine months.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -356,6 +372,8 @@ class TemperatureMapper(MultiplierRegressor):
         Means and scales of the temperatures and of the parameters, or of their logarithms.
     log_inputs_, log_targets_ : bool
         Whether logarithms of the inputs, and of the parameters, are standardised; never of temperatures.
+    means_ : ExponentialMeans or None
+        What gives means of earlier temperatures, where there are some.
     findings_ : list of SkthermoWarning
         Values of the records that were set aside.
     n_parameters_, parameter_names_ : int, list of str or None
@@ -384,13 +402,19 @@ class TemperatureMapper(MultiplierRegressor):
     _default_regressor = staticmethod(default_lines)
     _parameter_constraints: dict = {
         "regressor": [HasMethods(["fit", "predict"]), None],
+        "means": [StrOptions({"auto"}), "array-like", None],
         "random_state": ["random_state"],
     }
 
     def __init__(
-        self, regressor: BaseEstimator | None = None, *, random_state: int | np.random.RandomState | None = None
+        self,
+        regressor: BaseEstimator | None = None,
+        *,
+        means: Sequence[str | timedelta | int] | Literal["auto"] | None = "auto",
+        random_state: int | np.random.RandomState | None = None,
     ):
         self.regressor = regressor
+        self.means = means
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
@@ -422,21 +446,63 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        harmless = ("no-rows", "stuck-sensor", "implausible-values")  # in rows of any order, of any inputs
+        harmless = ("no-rows", "stuck", "implausible-values")  # in rows of any order, of any inputs
         with collected() as self.findings_:
             found = set_aside(frame_like(X, T), exclude=harmless, needs_all=True)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)
-        self._learn(np.asarray(found.temperatures), theta, weights, random_state=self.random_state)
+        self._learn_with_means(found.temperatures, theta, weights)
         warn_each(self.findings_)
         return self
+
+    def behind_means(self, X: Table, y: Table, steps: Sequence[tuple[str, Any]] = ()) -> BaseEstimator:
+        """This mapper, with the means that suit some records as a step of a pipeline before it.
+
+        What is fitted to parts of records, as out of fold, then has means of all.
+
+        Parameters
+        ----------
+        X : array-like or DataFrame of shape (n_samples, n_sensors)
+            Temperatures in degrees Celsius, without gaps.
+        y : array-like or DataFrame of shape (n_samples, n_targets)
+            What follows them; NaN is allowed.
+        steps : sequence of (name, transformer), optional
+            Unfitted steps of a pipeline before the mapper.
+
+        Returns
+        -------
+        TemperatureMapper or Pipeline
+            Unfitted, and without means of its own.
+        """
+        last, steps = clone(self).set_params(means=None), [*steps]
+        with collected():
+            means = self._chosen(clone(Pipeline(steps)).fit_transform(X, y) if steps else X, as_columns(y))
+        steps += [] if means is None else [("means", clone(means))]
+        return Pipeline([*steps, ("mapper", last)]) if steps else last
 
     def _fit_checked(self, X: Table, y: Table, sample_weight: Array | None) -> TemperatureMapper:
         self.findings_ = []
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        self._learn(T, theta, sample_weight, random_state=self.random_state)
+        self._learn_with_means(frame_like(X, T), theta, sample_weight)
         return self
+
+    def _learn_with_means(self, T: Table, theta: Array, weights: Array | None) -> None:
+        known = theta if weights is None else np.where(weights[:, np.newaxis] > 0, theta, np.nan)
+        self.means_ = self._chosen(T, known)
+        inputs = as_floats(T) if self.means_ is None else as_floats(self.means_.fit_transform(T))
+        self._learn(inputs, theta, weights, random_state=self.random_state)
+
+    def _chosen(self, T: Table, targets: Array) -> ExponentialMeans | None:
+        """Unfitted means of earlier temperatures."""
+        is_timed = has_stamps(T) and not (T.index.hasnans or T.index.has_duplicates)
+        if self.means is None or (is_auto(self.means) and not is_timed):
+            return None
+        return chosen_means(T, targets) if is_auto(self.means) else ExponentialMeans(half_lives=self.means)
+
+    def _inputs(self, X: ArrayLike) -> Array:
+        T = super()._inputs(X)
+        return T if self.means_ is None else as_floats(self.means_.transform(frame_like(X, T)))
 
 
 def fit_checked(regressor: BaseEstimator, X: Table, y: Any, sample_weight: Array | None = None) -> BaseEstimator:

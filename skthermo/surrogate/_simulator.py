@@ -49,15 +49,14 @@ class Simulator:
         """The simulator with, if it is to be reduced, a reduced model for a box around rows of theta.
 
         It will solve ``n_rows``, by default as many as these, three times: for predictions, for simulations, and to
-        refine parameters. The reduced model of a known simulator of the same model serves if its box covers that box.
+        refine parameters. The reduced model of a known simulator of the same model serves if its box holds these rows.
         """
         auto, box = is_auto(reduce), box_around(theta)
         tol = tolerance(model, reduce, 3 * (len(theta) if n_rows is None else n_rows))
         allowed = 1e-5 if auto else tol
-        if known is not None and known.box is not None and allowed is not None:
-            covers = (known.box[:, 0] <= box[:, 0]).all() and (box[:, 1] <= known.box[:, 1]).all()
-            if covers and known.tol <= allowed:
-                return replace(known, usual=theta)
+        serves = known is not None and known.box is not None and allowed is not None and known.tol <= allowed
+        if serves and not known.outside(theta).any():  # NaN is nowhere outside
+            return replace(known, usual=theta)
         if tol is None:
             may_pay = hasattr(model, "reduction_pays")
             reason = "a reduced model would save no time" if may_pay else "it has no reduced model"
@@ -102,21 +101,6 @@ class Simulator:
             f"Solved by a reduced model of {self.reduced.basis_size_} coordinates (of {self.reduced.n_dof}), accurate "
             f"to {self.tol:g}."
         )
-
-    def extended(self, theta: Array) -> Simulator:
-        """The simulator whose reduced model also covers a box around rows of theta.
-
-        Where no basis is accurate in so wide a box, the reduced model stays as it is.
-        """
-        if self.box is None or not self.outside(theta).any():
-            return self
-        wanted = box_around(theta)
-        lowest, highest = np.minimum(self.box[:, 0], wanted[:, 0]), np.maximum(self.box[:, 1], wanted[:, 1])
-        box = np.column_stack([lowest, highest])
-        try:
-            return Simulator(self.model, self.reduced.reduced(box, tol=self.tol, random_state=0), box, self.tol)
-        except RuntimeError:
-            return self
 
     @property
     def approximate(self) -> Simulator:

@@ -1423,7 +1423,6 @@ for name in ("make_truss_campaign", "make_kw51_campaign"):
     use(f"datasets.{name}", **size, correlation=(0.5, number(-1.0, 1.0)), random_state=(0, {}))
 use("datasets.make_fleet", lambda **a: list(datasets.make_fleet(**a)), usual="random_state", n_bridges=(3, count()))
 fitted(preprocessing.SensorMeans, (T, {}), roles=(None, bad(3, "air", True)))
-use("preprocessing.find_memory", temperatures=(T, table(T, fixed=False)), frequencies=(F, table(F, fixed=False)))
 
 
 # --------------------------------------------------------------------------- what depends on several arguments
@@ -1478,8 +1477,8 @@ def chain(model=TRUSS, **parts):
     return surrogate.DataInformedFEM(model, **(PARTS | {"random_state": 0} | parts))
 
 
-def means(time_constants, **options):
-    return preprocessing.ExponentialMeans(time_constants, **options)
+def means(half_lives, **options):
+    return preprocessing.ExponentialMeans(half_lives=half_lives, **options)
 
 
 def folded(cv):
@@ -1557,7 +1556,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("ExponentialMeans", "negative", lambda: means(["-1h"]).fit(HOURLY), "'-1h'"),
     ("ExponentialMeans", "thirty years", lambda: means(["11000D"]).fit(HOURLY), "years"),
     ("ExponentialMeans", "the same twice", lambda: means(["24h", "1D"]).fit(HOURLY), "different"),
-    ("ExponentialMeans", "none", lambda: means([]).fit(HOURLY), "time_constants"),
+    ("ExponentialMeans", "none", lambda: means([]).fit(HOURLY), "half_lives"),
     ("ExponentialMeans", "no rows", lambda: means([0]).fit([[1.0]] * 9), "positive"),
     ("ExponentialMeans", "unknown sensor", lambda: means(["1D"], sensors=["soil"]).fit(HOURLY), "'soil'"),
     ("ExponentialMeans", "no sensor", lambda: means(["1D"], sensors=[]).fit(HOURLY), "sensors"),
@@ -1782,7 +1781,6 @@ NOT_CALLED |= {
     "studies.IdentifiedDamage": "made by identify_damage",
     "studies.LocatedDamage": "made by locate_damage",
     "studies.locate_damage": "not tried: it wants a structure whose model is fitted",
-    "preprocessing.MemoryFindings": "made by find_memory",
     "datasets.BridgeFleet": "made by make_fleet",
     "datasets.FleetBridge": "made by make_fleet",
     "studies.PODCurve": "made by pod_curve",
@@ -1797,7 +1795,7 @@ UNTRIED |= {
     "datasets.make_truss_campaign": {"damage_from", "drift"},
     "detection.OutlierDetector": {"block"},
     "fem.AffineModel": {"contents"},
-    "preprocessing.ExponentialMeans": {"sensors", "time_constants"},
+    "preprocessing.ExponentialMeans": {"half_lives", "sensors"},
     "preprocessing.check_records": {"unit"},
     "preprocessing.set_aside": {"exclude", "is_baseline", "needs_all"},
     "reporting.owner_report": {"detector", "drift_limit", "fdr", "max_false_alarms", "now"},
@@ -1880,7 +1878,6 @@ for argument, callables in VECTORS.items():
 UNITS = ("rad/s", "kHz", "periods")
 WEATHER = ["surrogate.DataInformedFEM.weather"]
 legal("X", ["surrogate.DataInformedFEM.extrapolation_distance"], CELSIUS, "the answer says how far outside")
-legal("X", ["fleet.FleetMapper.from_fleet"], CELSIUS, "the answer says that neither bridge nor fleet has such weather")
 legal("X", WEATHER, CELSIUS, "fills gaps alone: predict warns of the weather")
 legal("X", WEATHER, ["stamps missing", "stamps equal", "stamps from numbers"], "there are no lags")
 READ_FOR_NAMES = [*UNITS, "9999", "a slipped point", "a mode twice"]

@@ -1,20 +1,18 @@
-"""Monitoring and fleets: valid calls, with bad values of their arguments."""
+"""Monitoring, of one bridge and of many: valid calls, with bad values of their arguments."""
 
 import copy
 
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 
-from skthermo import fleet, monitoring
+from skthermo import monitoring, surrogate
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from tests.bad_input.examples import BOTH, CHAIN, MODES, F, T
-from tests.bad_input.registry import FOLDER, LEGAL, NOT_CALLED, UNTRIED, method, use
+from tests.bad_input.registry import FOLDER, LEGAL, NOT_CALLED, method, use
 from tests.bad_input.values import (
     NAN,
     bad,
-    choice,
-    count,
     durations,
     flag,
     frequencies,
@@ -22,7 +20,6 @@ from tests.bad_input.values import (
     jobs,
     names,
     number,
-    vector,
     weather,
 )
 
@@ -78,12 +75,6 @@ use(
 method("monitoring.Monitor.status", SERVED, now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
 method("monitoring.Monitor.transitions", SERVED, after=(1, number(-1, 1.5, 10**6)))
 method("monitoring.Monitor.years_watched", SERVED, since=("2025-06-10", MOMENT))
-method(
-    "monitoring.Monitor.event_p_values",
-    SERVED,
-    since=("2025-06-10", MOMENT),
-    tail_shape=(0.1, number(-1, 1, 2, but=("None",))),
-)
 use(
     *served("acknowledge", lambda monitor: monitor.events_),
     event=(1, number(0, -1, 1.5, 1000)),
@@ -140,12 +131,12 @@ def tables(given):
     return [given.table.drop(columns=["seconds", "megabytes"]), given.errors]
 
 
-WATCHED = fleet.fit_fleet(ESTIMATORS, RECORDS, monitor=watch, folder=FOLDER / "fleet")
+WATCHED = monitoring.fit_fleet(ESTIMATORS, RECORDS, monitor=watch, folder=FOLDER / "fleet")
 WATCHED.update({"a": NEW})
 MAPPING = bad(3, None, True, "a", ["a"], {"no such name": 3}, str)
 use(
-    "fleet.fit_fleet",
-    lambda **a: tables(fleet.fit_fleet(**a)),
+    "monitoring.fit_fleet",
+    lambda **a: tables(monitoring.fit_fleet(**a)),
     usual="random_state",
     estimators=(ESTIMATORS, MAPPING),
     records=(RECORDS, MAPPING),
@@ -155,26 +146,26 @@ use(
     progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
 )
 use(
-    "fleet.Fleet",
-    lambda folder: tables(fleet.Fleet(folder)),
+    "monitoring.Fleet",
+    lambda folder: tables(monitoring.Fleet(folder)),
     folder=(FOLDER / "fleet", bad("nowhere", 3, None, True, ["a"], b"a", str)),
 )
-method("fleet.Fleet.status", WATCHED, now=("2025-05-01", MOMENT), max_age=("3D", durations("None")))
+method("monitoring.Fleet.status", WATCHED, now=("2025-05-01", MOMENT), max_age=("3D", durations("None")))
 method(
-    "fleet.Fleet.update",
+    "monitoring.Fleet.update",
     WATCHED,
     records=({}, MAPPING),
     n_jobs=(1, jobs()),
     progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
 )
 use(
-    "fleet.Fleet.discoveries",
+    "monitoring.Fleet.discoveries",
     lambda **a: WATCHED.discoveries(**a).summary(),
     fdr=(0.1, number(0, 1, -0.1, 2)),
     days=(365.25, number(0, -1)),
 )
 use(
-    "fleet.Fleet.acknowledge",
+    "monitoring.Fleet.acknowledge",
     WATCHED.acknowledge,
     bridge=("a", bad("no such name", 3, None, ["a"], True)),
     event=(1, number(0, -1, 1.5, 1000)),
@@ -182,33 +173,19 @@ use(
     note=("", bad(3, None)),
 )
 FEW = F[["f1", "f2"]]
-SEVERAL = {name: (T, FEW * (1 + 0.01 * n)) for n, name in enumerate("abc")}
-PRIOR = fleet.FleetPrior().fit(SEVERAL)
+OTHERS = [surrogate.TemperatureMapper().fit(T, FEW * (1 + 0.01 * n)) for n in range(3)]
 use(
-    "fleet.FleetPrior",
-    lambda X, **a: fleet.FleetPrior(**a).fit(X).summary(),
-    n_knots=(4, count("zero", 1000)),
-    families=(None, bad(3, True, "a", ["a"], {"no such name": 3}, str)),
-    link=("log", choice()),
-    X=(SEVERAL, MAPPING),
-)
-method("fleet.FleetPrior.effects", PRIOR, temperatures=([0.0, 10.0], vector([0.0, 10.0], positive=False)))
-use(
-    "fleet.FleetMapper",
-    lambda X, y, **a: fleet.FleetMapper(**a).fit(X, y).predict(X),
-    prior=(PRIOR, bad(3, True, "a", str)),
-    link=("log", choice("None")),
+    "surrogate.FleetMapper",
+    lambda X, y, **a: surrogate.FleetMapper(**a).fit(X, y).predict(X),
+    mappers=(OTHERS, bad(3, True, "a", ["a"], {"no such name": 3}, str)),
     X=(T, weather(T, rows=True, fixed=False, fitting=True)),
     y=(FEW, frequencies(FEW, rows=True, fixed=False)),
 )
-MAPPER = fleet.FleetMapper(PRIOR).fit(T, FEW)
-method("fleet.FleetMapper.predict", MAPPER, X=(T, weather(T, rows=False)), return_std=(False, flag()))
-method("fleet.FleetMapper.predict_covariance", MAPPER, X=(T, weather(T, rows=False)))
-method("fleet.FleetMapper.from_fleet", MAPPER, X=(T, weather(T, rows=False)))
-UNTRIED |= {"fleet.FleetMapper": {"covariates", "families"}}
+MAPPER = surrogate.FleetMapper(OTHERS).fit(T, FEW)
+method("surrogate.FleetMapper.predict", MAPPER, X=(T, weather(T, rows=False)), return_std=(False, flag()))
 LEGAL |= {
     "lookback": {("zero", "monitoring.Monitor"): "the detector looks at single records"},
-    "max_age": {("zero", f"{owner}.status"): "any age is too old" for owner in ("monitoring.Monitor", "fleet.Fleet")},
+    "max_age": {("zero", f"monitoring.{one}.status"): "any age is too old" for one in ("Monitor", "Fleet")},
     "new": {
         (cause, "monitoring.Monitor.update"): "left out, with its reason in the row and in the counts"
         for cause in ("1e308 inside", "a slipped point", "infinite inside")

@@ -22,7 +22,6 @@ ROOMS = (
     "datasets",
     "studies",
     "monitoring",
-    "fleet",
     "plotting",
     "reporting",
 )

@@ -22,8 +22,7 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, shown
-from inside import estimate_false_alarms, find_events
+from harness import arguments, compensated, last_step, shown
 from scipy.signal import lfilter
 from sklearn.covariance import EmpiricalCovariance
 from sklearn.linear_model import LinearRegression
@@ -32,7 +31,6 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_fleet, make_truss_campaign
 from skthermo.detection import DirectionalDetector
-from skthermo.monitoring import Monitor
 
 LAWS = {
     "iid": "independent, normal",
@@ -44,16 +42,17 @@ LAWS = {
     "winter": "twice as large in winter",
 }
 YEARS, YEAR, N_DAYS, STARTS = 3, 365, 180, (20, 200)
+BASELINE = 2 * YEAR  # days before the first record in service, the longest baseline
 SEVERITIES, DAY = (0.05, 0.10, 0.20), pd.Timedelta("1D")
 LEAST, MOST = 0.5, 1.5
 APART = 5  # days between alarms of two events
 WATCHES = 12.0  # events a year of the lower level
-STAMPS = pd.date_range("2021-01-01", periods=(1 + YEARS) * YEAR)
+STAMPS = pd.date_range("2020-01-01", periods=BASELINE + YEARS * YEAR)
 
 
 @cache
 def truss():
-    made = {s: make_truss_campaign(1 + YEARS, damage={"bottom": s}, random_state=1) for s in (0.0, *SEVERITIES)}
+    made = {s: make_truss_campaign(2 + YEARS, damage={"bottom": s}, random_state=1) for s in (0.0, *SEVERITIES)}
     return made[0.0].temperatures.to_numpy(), {s: one.clean_frequencies.to_numpy() for s, one in made.items()}, 0.01
 
 
@@ -94,10 +93,9 @@ def drawn(law, shape, random):
     return z
 
 
-def series(monitor, records):
+def series(detector, records):
     """Rounded damage indices, as those of ``update``."""
-    values = -monitor.detector_.score_samples(records[monitor.active_.columns])
-    return pd.Series(values, records.index).round(6)
+    return pd.Series(-detector.score_samples(records), records.index).round(6)
 
 
 def waited(index, start, events_of):
@@ -121,8 +119,24 @@ def measured(index, events_of):
     return found | {f"{s:.0%}": [waited(index, start, events_of)(s) for start in STARTS] for s in SEVERITIES}
 
 
-def ruled(rule):
-    return lambda values: find_events(values.to_numpy(), values.index, rule)
+def ruled(index, a_year, persistence):
+    """Events of a series of indices, by the levels that a baseline's own indices give for so many a year."""
+    try:
+        from inside import EventLevels, followed
+    except ImportError:  # in 0.2
+        from inside import estimate_false_alarms, find_events
+
+        rule = estimate_false_alarms(index, a_year, persistence=persistence).rule
+        return lambda values: find_events(values.to_numpy(), values.index, rule)
+    levels = EventLevels.learned(index, a_year, persistence)
+
+    def events_of(values):
+        limits = pd.DataFrame({"threshold": levels.threshold, "release": levels.release}, values.index)
+        found = followed(values.to_numpy(), values.index.as_unit("ns").asi8, limits, persistence)[1]
+        ends = [values.index[stop] if stop < len(values) else pd.NaT for _, stop in found]
+        return pd.DataFrame({"start": values.index[[first for first, _ in found]], "end": pd.DatetimeIndex(ends)})
+
+    return events_of
 
 
 def above(limit):
@@ -137,32 +151,35 @@ def above(limit):
     return events_of
 
 
-def rows_of(name, law, seed):
-    """A row for each way."""
+def rows_of(name, law, seed, days, asked):
+    """A row for each way, length of the baseline and number of events that is asked for."""
     T, clean, noise = STRUCTURES[name]()
     z = drawn(law, clean[0.0].shape, np.random.default_rng(seed))
     modes, sensors = ([f"{letter}{i + 1}" for i in range(table.shape[1])] for letter, table in (("f", z), ("T", T)))
     T = pd.DataFrame(T, STAMPS, sensors)
     F = {s: pd.DataFrame(one * (1 + noise * z), STAMPS, modes) for s, one in clean.items()}
-    monitor = Monitor(compensated(modes, DirectionalDetector()), sensors=False).fit(T[:YEAR].join(F[0.0][:YEAR]))
-    index = {s: series(monitor, T[YEAR:].join(one[YEAR:])) for s, one in F.items()}
-
-    def rule(a_year, persistence):
-        return ruled(estimate_false_alarms(monitor.active_.baseline_index, a_year, persistence=persistence).rule)
-
-    distance = plain_distance(T, F)
-    limit = np.quantile(distance(0.0)[:YEAR], 1 - 1 / YEAR)
-    of = {"structure": name, "law": LAWS[law]}
-    yield of | {"way": "monitor"} | measured(index, rule(1.0, 3))
-    yield of | {"way": "single records"} | measured(index, rule(1.0, 1))
-    yield of | {"way": "watch"} | measured(index, rule(WATCHES, 3))
-    yield of | {"way": "plain"} | measured({s: distance(s)[YEAR:] for s in F}, above(limit))
+    for length in days:
+        before = slice(BASELINE - length, BASELINE)
+        detector = compensated(modes, DirectionalDetector()).fit(T[before].join(F[0.0][before]))
+        own = pd.Series(last_step(detector).baseline_index_, STAMPS[before])
+        index = {s: series(detector, T[BASELINE:].join(one[BASELINE:])) for s, one in F.items()}
+        of = {"structure": name, "law": LAWS[law], "days": length}
+        for number in asked:
+            yield of | {"way": "monitor", "asked": number} | measured(index, ruled(own, number, 3))
+        if length == YEAR:
+            of |= {"asked": 1.0}
+            distance = plain_distance(T, F)
+            limit = np.quantile(distance(0.0)[before], 1 - 1 / YEAR)
+            yield of | {"way": "single records"} | measured(index, ruled(own, 1.0, 1))
+            yield of | {"way": "watch"} | measured(index, ruled(own, WATCHES, 3))
+            yield of | {"way": "plain"} | measured({s: distance(s)[BASELINE:] for s in F}, above(limit))
 
 
 def plain_distance(T, F):
     """Mahalanobis distance of what a quadratic regression leaves, learned from the healthy first year."""
-    regression = make_pipeline(PolynomialFeatures(2), LinearRegression()).fit(T[:YEAR], F[0.0][:YEAR])
-    covariance = EmpiricalCovariance().fit(F[0.0][:YEAR] - regression.predict(T[:YEAR]))
+    year = slice(BASELINE - YEAR, BASELINE)
+    regression = make_pipeline(PolynomialFeatures(2), LinearRegression()).fit(T[year], F[0.0][year])
+    covariance = EmpiricalCovariance().fit(F[0.0][year] - regression.predict(T[year]))
     return lambda s: pd.Series(covariance.mahalanobis(F[s] - regression.predict(T)), STAMPS)
 
 
@@ -178,14 +195,29 @@ def main():
         structures=STRUCTURES,
         laws=dict.fromkeys(LAWS),
         baselines=(30, "of each law, divided among the structures"),
+        days=([14, 60, 365, 730], "of a baseline"),
+        asked=([0.2, 1.0, 4.0], "false events a year"),
         seed=1000,
     )
     rows = []
     for law in options.laws:
         for n in range(options.baselines):
-            rows += rows_of(options.structures[n % len(options.structures)], law, options.seed + n)
+            name = options.structures[n % len(options.structures)]
+            rows += rows_of(name, law, options.seed + n, options.days, options.asked)
     table = pd.DataFrame(rows)
-    a_year = table.pivot_table(index="law", columns="way", values="a year", sort=False)
+    own = table[table["way"] == "monitor"]
+    by_law = {"index": "law", "values": "a year", "sort": False}
+    for number in options.asked:
+        shown(
+            f"False alarms a year where {number:g} was asked for, by days of the baseline; {options.baselines} "
+            "baselines of daily records for each noise",
+            own[own["asked"] == number].pivot_table(columns="days", **by_law).rename_axis("noise"),
+            2,
+        )
+    table = table[(table["days"] == YEAR) & (table["asked"] == 1.0)]
+    if not len(table):
+        return 0
+    a_year = table.pivot_table(columns="way", **by_law)
     own = table[table["way"] == "monitor"].groupby("law", sort=False)
     error, sums = own["a year"].sem(), own[["lasted", "events"]].sum()
     columns = {
@@ -198,9 +230,7 @@ def main():
     }
     settings = f"{options.baselines} baselines of a year of daily records for each noise"
     shown(f"False alarms a year where one was asked for; {settings}", pd.DataFrame(columns).rename_axis("noise"), 1)
-    by_structure = table[table["way"] == "monitor"].pivot_table(
-        index="law", columns="structure", values="a year", sort=False
-    )
+    by_structure = table[table["way"] == "monitor"].pivot_table(columns="structure", **by_law)
     shown("The same by structure, monitor by default", by_structure.rename_axis("noise"), 1)
     names = {
         "monitor": "monitor, by default",

@@ -9,7 +9,7 @@ drawn, then a year in service. Its monitor is set for one false alarm a year. At
 in; it is found if an event opens within 30 days. The
 means by role of the thermometers now and 12 and 48 hours ago, for all regressions.
 
-fleet        residuals of ``FleetPrior(...).mapper()`` on the logarithms of the frequencies
+fleet        residuals of ``FleetMapper(mappers)`` (of 0.2.0, of ``FleetPrior``) of the other bridges' frequencies
 fleet mean   a ridge on the bridge's own records towards the mean coefficients of the fleet's bridges; its weight is the
              one that predicts the fleet's own bridges best after as many days. It does not know how uncertain it is.
 lines        piecewise-linear in all temperatures, the library's default, on the bridge's own records
@@ -20,30 +20,36 @@ than 90 % of them are within their range, after any number of days; or if the fl
 best of the others whose false alarms are as few.
 """
 
+import copy
 import sys
 
 import numpy as np
 import pandas as pd
 from harness import arguments, compensated, joined, shown
-from inside import find_events
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_fleet
-from skthermo.fleet import FleetPrior
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import HingeFeatures, LagFeatures, SensorMeans
 from skthermo.surrogate import TemperatureMapper
 
-PER_DAY, LAGS, MEMORY = 4, [0, 2, 8], 60
+try:
+    from skthermo.surrogate import FleetMapper
+
+    FleetPrior = None
+except ImportError:  # before 0.3
+    from skthermo.fleet import FleetPrior
+
+PER_DAY, LAGS = 4, [0, 2, 8]
 DAYS = (15, 30, 60, 120)
-SEVERITIES, FOUND_WITHIN, SETS_IN = (0.05, 0.2), 30, (15, 137, 259)
+SEVERITIES, FOUND_WITHIN, SETS_IN = (0.05, 0.1, 0.2), 30, (15, 137, 259)
 MOST_EVENTS, LEAST_WITHIN = 1.5, 0.9
 DAMAGED = {"truss": "bottom", "girder": "first span", "arch": "girder"}
 PENALTIES, N_ASKED = 10.0 ** np.arange(-1, 5), 8
-WAYS = {"fleet": "prior from the fleet", "fleet mean": "ridge towards the fleet's mean", "lines": "own records only"}
+WAYS = {"fleet": "mapper of the fleet", "fleet mean": "ridge towards the fleet's mean", "lines": "own records only"}
 
 
 class ByPenalty(RegressorMixin, BaseEstimator):
@@ -124,50 +130,45 @@ class Kind:
         years = {name: history(bridge, 365, "2024-01-01") for name, bridge in members.items()}
         fleet = {name: prepared(members[name], year) for name, year in years.items()}
         self.columns = list(next(iter(fleet.values()))[0])
-        covariates = made.covariates.loc[list(members), ["material", "span"]]
-        self.prior = FleetPrior().fit(fleet, covariates)
+        if FleetPrior:
+            self.prior = FleetPrior().fit(fleet, made.covariates.loc[list(members), ["material", "span"]])
+        else:
+            self.mappers = [TemperatureMapper().fit(X, F) for X, F in fleet.values()]
         self.mean = FleetMean(fleet)
         self.penalties = {}
 
     def regressors(self, bridge, days):
         if days not in self.penalties:
             self.penalties[days] = self.mean.penalty(days)
-        own = {"material": bridge.covariates["material"], "span": bridge.covariates["span"]}
         found = {
-            "fleet": self.prior.mapper(own),
+            "fleet": self.prior.mapper({what: bridge.covariates[what] for what in ("material", "span")})
+            if FleetPrior
+            else FleetMapper(self.mappers),
             "fleet mean": ByPenalty(self.mean, self.penalties[days]),
             "lines": TemperatureMapper(),
         }
         return {name: make_pipeline(*weather_of(bridge), regressor) for name, regressor in found.items()}
 
 
-def events_of(index, rule):
-    return find_events(index.to_numpy(), index.index, rule)
-
-
 def served(detector, modes, baseline, healthy, damaged):
-    """A monitor's threshold, false events in a year, highest number of its range, and the share of damage found.
+    """A monitor's false events in a year, whether they are in its range, and the share of damage found.
 
     Damage is found by an event that opens after it has set in; while a false one is open, none can.
     """
-    monitor = Monitor(detector, targets=modes, sensors=False).fit(baseline)
-    rule, before = monitor.false_alarm_estimate_.rule, baseline[-MEMORY:]
-
-    def index_of(new):
-        values = -monitor.detector_.score_samples(pd.concat([before, new])[monitor.active_.columns])
-        return pd.Series(values[len(before) :], new.index).round(6)
-
-    calm, found = index_of(healthy), {}
-    for severity, records in damaged.items():
-        hurt, opened = index_of(records), []
-        for day in SETS_IN:
-            first, last = day * PER_DAY, (day + FOUND_WITHIN) * PER_DAY
-            events = events_of(pd.concat([calm[:first], hurt[first:last]]), rule)
-            opened.append((events["start"] >= hurt.index[first]).any())
-        found[f"found {severity:.0%}"] = float(np.mean(opened))
-    events = events_of(calm, rule)
-    is_within = len(events) <= monitor.false_alarm_estimate_.highest
-    return {"events": len(events), "within": is_within, **found}
+    calm, before = Monitor(detector, targets=modes, sensors=False).fit(baseline), 0
+    found = {f"found {severity:.0%}": [] for severity in damaged}
+    for day in SETS_IN:
+        first, last = day * PER_DAY, (day + FOUND_WITHIN) * PER_DAY
+        calm.update(healthy[before:first])
+        before = first
+        for severity, records in damaged.items():
+            hurt = copy.deepcopy(calm)
+            hurt.update(records[first:last])
+            found[f"found {severity:.0%}"].append((hurt.events_["start"] >= records.index[first]).any())
+    calm.update(healthy[before:])
+    shares = {name: float(np.mean(opened)) for name, opened in found.items()}
+    n_events = len(calm.events_)
+    return {"events": n_events, "within": n_events <= calm.false_alarm_estimate_.highest, **shares}
 
 
 def rows_of(kind, bridge, number, options):

@@ -1,4 +1,4 @@
-"""What a fleet's prior gives to a new bridge: errors of a later year after 15, 30, 60 and 120 days.
+"""What other bridges' mappers give to a new bridge: errors of a later year after 15, 30, 60 and 120 days.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py --members chains
     OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py --members frequencies --starts winter summer
@@ -11,14 +11,15 @@ alone     the library without a fleet: `TemperatureMapper` in the chain, or for 
 mean      the mean response to the weather of the other bridges of its kind, at the bridge's own level
 ridge     the bridge's own ridge regression towards that mean, its penalty chosen by what would have predicted the
           others' later records best after as many days from the same date
-prior     ``FleetPrior().fit(...).mapper(covariates=...)``, covariates kind, material, span and latitude
+fleet     ``FleetMapper(mappers)``, mappers of the bridges of its kind (0.2.0: ``FleetPrior`` with the covariates kind,
+          material, span and latitude, of all kinds)
 own year  alone, with all of 2026
 
 Members are frequencies alone, or chains with the FE models that come with the bridges (``mean`` and ``ridge`` then
 predict ln theta). Then new bridges with thermal laws of their own come to the fleet. For frequencies alone, intervals
 are of the posterior and the scatter of the bridge's own residuals.
 
-Targets: the prior's mean error is below that of alone and no more than 2 % above the better of mean and ridge, at
+Targets: the fleet's mean error is below that of alone and no more than 2 % above the better of mean and ridge, at
 each number of days and start; with atypical at most 5 % above alone; 85 to 95 % of the records of the year are in
 intervals of 90 %. The exit code is 1 if one is missed.
 """
@@ -35,9 +36,15 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_fleet
-from skthermo.fleet import FleetPrior
 from skthermo.preprocessing import BiasAligner, HingeFeatures, SensorMeans
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+
+try:
+    from skthermo.surrogate import FleetMapper
+
+    FleetPrior = None
+except ImportError:  # before 0.3
+    from skthermo.fleet import FleetMapper, FleetPrior
 
 DAYS = (15, 30, 60, 120)
 STARTS = {"winter": "2026-01-01", "summer": "2026-07-01"}
@@ -46,7 +53,7 @@ WAYS = {
     "alone": "alone",
     "mean": "mean of the fleet",
     "ridge": "ridge towards the mean",
-    "prior": "prior from the fleet",
+    "fleet": "mapper of the fleet",
     "own year": "a year of its own",
 }
 CLOSE, LOSS, LEAST, MOST = 1.02, 1.05, 0.85, 0.95
@@ -70,6 +77,11 @@ class Frequencies:
         X, records = self.year("2025-01-01")
         return X, records.frequencies
 
+    @cached_property
+    def mapper(self):
+        """What the fleet knows of it."""
+        return TemperatureMapper().fit(*self.of_fleet)
+
     def pair(self):
         """Inputs and logarithms of its year in the fleet."""
         X, F = self.of_fleet
@@ -82,10 +94,9 @@ class Frequencies:
         complete = evaluated.notna().all(axis=1).to_numpy()
         centre = np.full(later.frequencies.shape, np.nan)
         spread = np.zeros_like(centre)
-        if hasattr(mapper, "prior"):
+        if isinstance(mapper, FleetMapper):
             mapper.fit(X, records.frequencies)
-            centre[complete] = mapper.predict(evaluated[complete])
-            spread[complete] = np.sqrt(np.einsum("tii->ti", mapper.predict_covariance(evaluated[complete])))
+            centre[complete], spread[complete] = mapper.predict(evaluated[complete], return_std=True)
             at = X.notna().all(axis=1).to_numpy()
             left = records.frequencies[at].to_numpy() - mapper.predict(X[at]).to_numpy()
             noise = 1.4826 * np.nanmedian(np.abs(left), axis=0) * np.sqrt(days / (days - 3))
@@ -136,13 +147,17 @@ class Chain(Frequencies):
     def of_fleet(self):
         return self.chain_alone("2025-01-01", 365)
 
+    @cached_property
+    def mapper(self):
+        return self.of_fleet.mapper_[-1]
+
     def pair(self):
         known = self.of_fleet.records_
         return np.asarray(known.inputs), np.log(known.targets)
 
     def fitted(self, mapper, start, days):
         records, later = self.bridge.records(days, start), self.evaluated[1]
-        if hasattr(mapper, "prior"):
+        if isinstance(mapper, FleetMapper):
             chain = self.chain(mapper).fit(records.temperatures, records.frequencies)
         else:
             chain = self.chain_alone(start, days)
@@ -266,7 +281,8 @@ def campaign_rows(members, covariates, folds, days_asked, starts, newcomers=None
     rows = []
     for fold in folds:
         known = {name: member for name, member in members.items() if name not in fold}
-        prior = FleetPrior().fit({n: m.of_fleet for n, m in known.items()}, covariates=covariates.loc[list(known)])
+        facts = covariates.loc[list(known)]
+        prior = FleetPrior and FleetPrior().fit({n: m.of_fleet for n, m in known.items()}, covariates=facts)
         kinds = defaultdict(dict)
         for name, member in known.items():
             kinds[member.bridge.kind][name] = member
@@ -279,7 +295,10 @@ def campaign_rows(members, covariates, folds, days_asked, starts, newcomers=None
                 for days in days_asked:
                     ways = {"alone": TemperatureMapper()}
                     ways |= by_kind[member.bridge.kind].ways(start, days)
-                    ways |= {"prior": prior.mapper(covariates=known_of(member.bridge, covariates.loc[list(known)]))}
+                    if prior:
+                        ways |= {"fleet": prior.mapper(covariates=known_of(member.bridge, facts))}
+                    else:
+                        ways |= {"fleet": FleetMapper([mate.mapper for mate in kinds[member.bridge.kind].values()])}
                     found = evaluate(member, name, start, days, ways) + [row | {"days": days} for row in year]
                     rows += [row | {"start": label, "thermal law": member.bridge.atypical_law or ""} for row in found]
             if hasattr(member, "alone"):
@@ -288,15 +307,15 @@ def campaign_rows(members, covariates, folds, days_asked, starts, newcomers=None
 
 
 def table(rows, by=("start", "days")):
-    """A row for each number of days, a column for each way: mean error, %, and the share in the prior's intervals."""
+    """A row for each number of days, a column for each way: mean error, %, and the share in the fleet's intervals."""
     found = rows.pivot_table(index=list(by), columns="way", values="error", sort=False)[list(WAYS)]
-    inside = rows[rows["way"] == "prior"].groupby(list(by), sort=False)["inside"].mean()
+    inside = rows[rows["way"] == "fleet"].groupby(list(by), sort=False)["inside"].mean()
     return found, inside
 
 
 def shown_by(title, rows, by=("start", "days")):
     found, inside = table(rows, by)
-    found = found.rename(columns=WAYS).assign(**{"in the prior's 90 % intervals, %": 100 * inside})
+    found = found.rename(columns=WAYS).assign(**{"in the fleet's 90 % intervals, %": 100 * inside})
     shown(title, found.rename_axis(["first days" if name == "days" else name for name in found.index.names]))
 
 
@@ -304,10 +323,10 @@ def missed_targets(rows, is_atypical):
     """Number of targets that the rows miss."""
     missed = 0
     for (case, row), share in zip(table(rows)[0].iterrows(), table(rows)[1], strict=True):
-        prior = row["prior"]
-        missed += is_missed(f"{case}: beside alone", prior, f"<= {(LOSS if is_atypical else 1.0) * row['alone']:.4f}")
+        fleet = row["fleet"]
+        missed += is_missed(f"{case}: beside alone", fleet, f"<= {(LOSS if is_atypical else 1.0) * row['alone']:.4f}")
         if not is_atypical:
-            missed += is_missed(f"{case}: beside the best", prior, f"<= {CLOSE * min(row['mean'], row['ridge']):.4f}")
+            missed += is_missed(f"{case}: beside the best", fleet, f"<= {CLOSE * min(row['mean'], row['ridge']):.4f}")
             missed += is_missed(f"{case}: within 90 %", share, f">= {LEAST}")
             missed += is_missed(f"{case}: within 90 %", share, f"<= {MOST}")
     return missed

@@ -3,16 +3,15 @@
 import importlib
 
 PLACES = {
-    "_core.matrix_child": ["read"],
-    "_core.matrix_files": ["form_of"],
     "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
-    "fleet._fleet": ["Storage"],
-    "fleet._workers": ["BridgeOutcome", "known_of", "pickled"],
-    "monitoring._events": ["find_events"],
+    "fem.external._files": ["form_of", "read_file"],
+    "monitoring._fleet_bridge": ["KnownBridge"],
+    "monitoring._events": ["find_events", "followed"],
+    "monitoring._records": ["Lookback", "Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._sensors": ["SensorWatch"],
-    "monitoring._threshold": ["estimate_false_alarms"],
+    "monitoring._threshold": ["EventLevels", "estimate_false_alarms"],
     "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }
 

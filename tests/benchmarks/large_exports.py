@@ -2,9 +2,8 @@
 
     OMP_NUM_THREADS=1 python tests/benchmarks/large_exports.py --dofs 100000
 
-A plate of nodes with six degrees of freedom each is written in every format, and each file is read in a process of its
-own, as `load_affine` does it. Memory is the peak of that process less what it took before, in times the file's size, of
-which ten are allowed. Every matrix is compared with the one that was written.
+A plate of nodes with six degrees of freedom each is written in every format, and each file is read in a new process.
+Memory is the peak of that process less what it took before. Every matrix is compared with the one that was written.
 """
 
 import multiprocessing
@@ -17,7 +16,7 @@ import pandas as pd
 import scipy.io
 import scipy.sparse
 from harness import arguments, peak_megabytes, shown, timed
-from inside import form_of, read
+from inside import form_of, read_file
 
 DIRECTIONS = 6
 
@@ -112,7 +111,7 @@ def measured(reader, file, pipe):
 
 
 def ours(file):
-    return read(file, form_of(Path(file)))
+    return read_file(Path(file), form_of(Path(file)))
 
 
 def row(reader, file, matrix):

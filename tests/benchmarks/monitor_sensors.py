@@ -31,7 +31,7 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.monitoring import Monitor
-from skthermo.residuals.weather import SensorRegression
+from skthermo.residuals.sensors import SensorRegression
 
 WEEK, PATIENCE = 7, 91  # days in which a fault and a drift are to be named
 OFFSET, DRIFT = 3.0, 1.0 / 30.4

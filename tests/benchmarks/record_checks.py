@@ -81,8 +81,8 @@ def faults(T, F, seed):
     at_20, stuck = T.copy(), F.copy()
     at_20.iloc[month, 0] = 20.0
     stuck.iloc[month, 0] = float(F.iloc[:, 0].mean())
-    yield "stuck-sensor", "thermometer stuck at 20 degrees for a month", (at_20, F)
-    yield "stuck-mode", "mode stuck for a month", (T, stuck)
+    yield "stuck", "thermometer stuck at 20 degrees for a month", (at_20, F)
+    yield "stuck", "mode stuck for a month", (T, stuck)
     yield "time-shift", "temperatures 60 rows late", (T, F.shift(-60))
     yield "time-shift", "temperatures 60 rows early", (T, F.shift(60))
     shuffled = T.iloc[random.permutation(n_rows)].set_axis(T.index)
@@ -100,8 +100,6 @@ def faults(T, F, seed):
             f"outliers, {share:.1%}",
             (T, F * np.where(wrong, random.choice(OUTLIERS, F.shape), 1.0)),
         )
-    drift = 1 + 0.03 * np.linspace(0, 1, n_rows)[:, np.newaxis]
-    yield "trend", "frequencies drift by 3 %", (T, F * drift)
 
 
 def with_values(table, rows, column, values):
@@ -140,18 +138,18 @@ def gross_errors(T, F, seed):
     for value in (-999.0, 9999.0):
         yield f"mode is {value:g} in 2 % of the rows", {"placeholders"}, in_F, of_mode(some, value)
     for value, share, rows in ((0.0, "2 %", some), (0.0, "a third", third), (-1.0, "2 %", some)):
-        yield f"mode is {value:g} in {share} of the rows", {"not-positive"}, in_F, of_mode(rows, value)
+        yield f"mode is {value:g} in {share} of the rows", {"placeholders"}, in_F, of_mode(rows, value)
     here = T.iloc[:, sensor]
     yield "kelvin", {"kelvin"}, set(T), (T + 273.15, F)
     yield "kelvin in one sensor", {"kelvin"}, in_T, of_sensor(both, here + 273.15)
     yield "kelvin in a third of the rows", {"kelvin"}, in_T, of_sensor(third, here.iloc[third] + 273.15)
-    yield "Fahrenheit", {"fahrenheit"}, set(T), (1.8 * T + 32, F)
-    yield "tenths of a degree", {"scaled-temperatures"}, set(T), ((10 * T).round(), F)
+    yield "Fahrenheit", {"unit-of-temperatures"}, set(T), (1.8 * T + 32, F)
+    yield "tenths of a degree", {"unit-of-temperatures"}, set(T), ((10 * T).round(), F)
     if T.shape[1] > 1:
-        yield "Fahrenheit in one sensor", {"fahrenheit"}, in_T, of_sensor(both, 1.8 * here + 32)
-        yield "tenths of a degree in one sensor", {"scaled-temperatures"}, in_T, of_sensor(both, 10 * here)
+        yield "Fahrenheit in one sensor", {"unit-of-temperatures"}, in_T, of_sensor(both, 1.8 * here + 32)
+        yield "tenths of a degree in one sensor", {"unit-of-temperatures"}, in_T, of_sensor(both, 10 * here)
         either = in_T if T.shape[1] > 2 else set(T)
-        yield "one sensor of opposite sign", {"opposite-signs"}, either, of_sensor(both, -here)
+        yield "one sensor of opposite sign", {"unit-of-temperatures"}, either, of_sensor(both, -here)
         yield "equal sensors", {"equal-columns"}, set(T), of_sensor(both, T.iloc[:, sensor - 1])
     yield "constant sensor", {"constant"}, in_T, of_sensor(both, 12.5)
     yield "sensor without a value", {"missing-column"}, in_T, of_sensor(both, np.nan)
@@ -163,8 +161,8 @@ def gross_errors(T, F, seed):
     if F.shape[1] > 1:
         yield "equal modes", {"equal-columns"}, set(F), of_mode(both, F.iloc[:, mode - 1])
     yield "exchanged tables", {"exchanged-tables"}, {""}, (F, T)
-    yield "frequencies as temperatures", {"temperatures-are-frequencies"}, set(F), (F, F)
-    yield "infinite values", {"infinite-values"}, in_T, of_sensor(some, np.inf)
+    yield "frequencies as temperatures", {"exchanged-tables"}, set(F), (F, F)
+    yield "infinite values", {"placeholders"}, in_T, of_sensor(some, np.inf)
     yield "no rows", {"no-rows"}, {""}, (T[:0], F[:0])
     yield "one row", {"no-rows"}, {""}, (T[:1], F[:1])
     yield from wrong_rows(T, F, random)
@@ -180,28 +178,28 @@ def wrong_rows(T, F, random):
     yield "stamps twice", {"repeated-stamps"}, {""}, (T.iloc[again], F.iloc[again])
     yield "stamps in disorder", {"unsorted-stamps"}, {""}, (T.iloc[unsorted], F.iloc[unsorted])
     for name, kind, index in (
-        ("equal-stamps", "equal-stamps", pd.DatetimeIndex([stamps[0]] * n_rows)),
-        ("a missing stamp", "missing-stamps", stamps.where(np.arange(n_rows) != 7)),
-        ("seconds read as nanoseconds", "stamps-from-numbers", pd.to_datetime(stamps.as_unit("s").asi8)),
-        ("20230101 read as nanoseconds", "stamps-from-numbers", pd.to_datetime(stamps.strftime("%Y%m%d").astype(int))),
+        ("equal stamps", "wrong-stamps", pd.DatetimeIndex([stamps[0]] * n_rows)),
+        ("a missing stamp", "wrong-stamps", stamps.where(np.arange(n_rows) != 7)),
+        ("seconds read as nanoseconds", "wrong-stamps", pd.to_datetime(stamps.as_unit("s").asi8)),
+        ("20230101 read as nanoseconds", "wrong-stamps", pd.to_datetime(stamps.strftime("%Y%m%d").astype(int))),
         ("stamps-as-text", "stamps-as-text", text),
     ):
-        yield name, {kind, "equal-stamps"}, {""}, (T.set_axis(index), F.set_axis(index))
+        yield name, {kind, "wrong-stamps"}, {""}, (T.set_axis(index), F.set_axis(index))
     late = T.set_axis(stamps + pd.Timedelta("1D"))
     yield "tables of other times", {"different-rows"}, {""}, (late, F)
     yield "tables of other lengths", {"different-rows"}, {""}, (T[:-3], F)
     if T.shape[1] > 1:
         names = [T.columns[0], *T.columns[:-1]]
-        yield "a name twice", {"column-names"}, {T.columns[0]}, (T.set_axis(names, axis=1), F)
-    yield "tuples as names", {"column-names"}, {""}, (T.set_axis(pd.MultiIndex.from_product([["a"], T]), axis=1), F)
+        yield "a name twice", {"no-table"}, {T.columns[0]}, (T.set_axis(names, axis=1), F)
+    yield "tuples as names", {"no-table"}, {""}, (T.set_axis(pd.MultiIndex.from_product([["a"], T]), axis=1), F)
 
 
 def no_tables(T, F):
     """What is no table of numbers."""
     texts, mixed = T.astype(str), T.astype(object)
     mixed.iloc[3, 0] = "error"
-    yield "values as text", {"no-numbers"}, set(T), (texts, F)
-    yield "one text", {"no-numbers"}, {T.columns[0]}, (mixed, F)
+    yield "values as text", {"no-table"}, set(T), (texts, F)
+    yield "one text", {"no-table"}, {T.columns[0]}, (mixed, F)
     for name, table in (
         ("a dict", dict(T)),
         ("three dimensions", np.stack([T, T])),

@@ -26,9 +26,8 @@ from harness import arguments, compensated, shown
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.fleet import FleetMapper, FleetPrior
 from skthermo.monitoring import Monitor, track_parameters
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+from skthermo.surrogate import DataInformedFEM, FleetMapper, TemperatureMapper
 
 PER_DAY = 4
 SHARES = (20,)
@@ -53,7 +52,7 @@ OF_ONE_TABLE = {
 }
 OF_ALL = [
     *("DataInformedFEM.fit", "DataInformedFEM.predict", "TemperatureMapper.fit", "TemperatureCompensator.fit"),
-    *("MahalanobisDetector.fit", "Monitor.fit", "Monitor.update", "track_parameters", "FleetPrior.fit"),
+    *("MahalanobisDetector.fit", "Monitor.fit", "Monitor.update", "track_parameters", "FleetMapper.fit"),
 ]
 SAME = 1e-6  # relative difference of answers that are the same
 
@@ -100,7 +99,7 @@ def callables(T, F):
 
     fitted = monitor().fit(T.join(F))
     chain = DataInformedFEM(model, random_state=0).fit(T[half], F[half])
-    others, T_short, F_short = [(T, F * (1 + 0.01 * k)) for k in range(2)], healthy_T[months], healthy_F[months]
+    others = [TemperatureMapper().fit(T, F * (1 + 0.01 * k)) for k in range(2)]
     later = pd.Timedelta(366, "D")
 
     def updated(T, F):
@@ -121,9 +120,7 @@ def callables(T, F):
         "Monitor.fit": lambda T, F: monitor().fit(T.join(F)).update(healthy[months])["index"],
         "Monitor.update": updated,
         "track_parameters": lambda T, F: track_parameters(chain, T, F).rates["per_year"],
-        "FleetPrior.fit": lambda T, F: (
-            FleetMapper(FleetPrior().fit([*others, (T, F)])).fit(T_short, F_short).predict(healthy_T)
-        ),
+        "FleetMapper.fit": lambda T, F: FleetMapper(others).fit(T, F).predict(healthy_T),
     }
 
 

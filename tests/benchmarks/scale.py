@@ -18,19 +18,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, compensated, peak_megabytes, shown
-from inside import BridgeOutcome, Storage, known_of, pickled
+from inside import KnownBridge
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_fleet, make_truss
-from skthermo.fleet import Fleet
-from skthermo.monitoring import Monitor
+from skthermo.monitoring import Fleet, Monitor
 from skthermo.preprocessing import (
     BlockedKFold,
     HampelFilter,
@@ -144,18 +142,16 @@ def says(name, value, *, is_missed=False):
 def made_fleet(n_bridges):
     """A folder of bridges with files of their own, of a few fitted monitors, and their new records of a day."""
     folder, many = Path(tempfile.mkdtemp()), range(n_bridges)
-    fitted, days = [], {}
+    fitted, days, fleet = [], [], Fleet._in(folder)
     for bridge in list(make_fleet(N_FITTED, kinds=["girder"], random_state=0).values()):
         records = bridge.records(372, "2025-01-01", samples_per_day=24)
         X = SensorMeans(bridge.roles).fit_transform(records.temperatures).join(records.frequencies)
-        monitor = Monitor(detector_of(records.frequencies)).fit(X[:"2025-12-31"])
-        fitted.append((BridgeOutcome("", is_fitted=True, **known_of(monitor)), pickled((None, monitor))))
-        days[len(fitted) - 1] = [own for _, own in X["2026-01-01":].groupby(X["2026-01-01":].index.normalize())]
-    storage = Storage(folder)
-    with storage.alone():
-        for number in many:
-            outcome, content = fitted[number % N_FITTED]
-            storage.put(replace(outcome, name=f"bridge {number:04}"), content)
+        fitted.append(Monitor(detector_of(records.frequencies)).fit(X[:"2025-12-31"]))
+        later = X["2026-01-01":]
+        days.append([own for _, own in later.groupby(later.index.normalize())])
+    for number in many:
+        monitor = fitted[number % N_FITTED]
+        fleet._put(KnownBridge(f"bridge {number:04}", is_fitted=True).after(monitor), (None, monitor))
 
     def new(day):
         found = {}

@@ -307,7 +307,7 @@ def test_check_and_init_say_what_they_found(records, tmp_path):
     stuck.iloc[300:340, 0] = 7.0
     files = write_pair(stuck[:FIRST], tmp_path)
     checked = run("check", *files, "--json")
-    assert (checked.code, valid(checked.json)["findings"][0]["what"]) == (1, "stuck-sensor")
+    assert (checked.code, valid(checked.json)["findings"][0]["what"]) == (1, "stuck")
     made = run("init", *files, "--into", tmp_path / "b", "--json")
     assert (made.code, valid(made.json)["findings"]) == (0, checked.json["findings"])
     assert "stuck" in (tmp_path / "b" / "monitor.toml").read_text()

@@ -48,7 +48,7 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
         'class = "DirectionalDetector"': 'class = "MahalanobisDetector"',
         "# window = ...": 'window = "5D"',
         '# regimes = "auto"': 'regimes = "none"',
-        '[[features]]\nclass = "H': '[[features]]\nclass = "ExponentialMeans"\ntime_constants = ["2D", "20D"]\n\n'
+        '[[features]]\nclass = "H': '[[features]]\nclass = "ExponentialMeans"\nhalf_lives = ["2D", "20D"]\n\n'
         '[[features]]\nclass = "H',
         "# persistence = 3": 'persistence = 5\nmax_delay = "3D"',
     }
@@ -58,7 +58,7 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
     file.write_text(text, encoding="utf-8")
     done = run("fit", file, "--replace")
     assert done.code == 0, done.err
-    steps = ExponentialMeans(["2D", "20D"]), HingeFeatures(), Ridge()
+    steps = ExponentialMeans(half_lives=["2D", "20D"]), HingeFeatures(), Ridge()
     given = {"compensated": {"window": "5D", "regimes": None}, "persistence": 5, "max_delay": "3D"}
     assert repr(load_monitor(folder / "monitor.joblib")) == repr(by_python(MahalanobisDetector(), *steps, **given))
 

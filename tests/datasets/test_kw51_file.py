@@ -14,8 +14,6 @@ from skthermo.datasets import load_kw51
 from tests.datasets.kw51_file import CHANNELS, SENSORS, cell, kw51_bytes, kw51_fields, write_kw51
 from tests.nights import by_day
 
-pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
-IN_A_CHILD = pytest.mark.parametrize("in_process", [False], indirect=True)
 FUZZ = settings(
     max_examples=by_day(25, at_night=60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
@@ -200,7 +198,6 @@ def outcome(file, content):
 SMALL = kw51_fields(frequencies=np.full((3, 2), 2.0), shapes=np.ones((3, 2, 2)) * 1j, channels=CHANNELS[:3])
 
 
-@IN_A_CHILD
 @NOT_PUBLISHED
 @settings(FUZZ, max_examples=by_day(2, at_night=5))
 @given(

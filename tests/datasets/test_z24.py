@@ -12,8 +12,6 @@ from hypothesis import strategies as st
 
 from skthermo.datasets import load_z24
 
-pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
-IN_A_CHILD = pytest.mark.parametrize("in_process", [False], indirect=True)
 SENSORS = ["TP", "TWN", "TWC", "TDS", "TDT", "TS", "Tair"]
 MODES = ["f1", "f2", "f3", "f4"]
 RNG = np.random.default_rng(0)
@@ -162,7 +160,6 @@ def test_damaged_and_truncated_tables_never_become_nonsense(csv_file, cut, posit
 
 
 @pytest.mark.nightly
-@IN_A_CHILD
 @settings(FUZZ, max_examples=2)
 @given(cut=st.integers(0, 10_000), position=st.integers(0, 10_000), byte=st.integers(0, 255))
 @pytest.mark.parametrize("form", ["mat_file", "packed_file"])

@@ -15,7 +15,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skthermo.preprocessing import BlockedKFold, KNNGapImputer, LagFeatures
-from skthermo.residuals.weather import SensorRegression
+from skthermo.residuals.sensors import SensorRegression
 from skthermo.surrogate import TemperatureMapper
 from tests.detection.compensated import (
     LAGGED,

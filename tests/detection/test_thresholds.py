@@ -10,6 +10,7 @@ from scipy.stats import chi
 from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 
 from skthermo.detection import DirectionalDetector, MahalanobisDetector
+from skthermo.residuals.numbers import independent_records
 
 TOO_FEW = pytest.mark.filterwarnings("ignore:.*few-baseline-records")
 
@@ -27,9 +28,11 @@ def autoregressive(n_rows, correlation, seed=0, n_modes=4):
 
 @TOO_FEW
 @pytest.mark.parametrize("covariance", [None, LedoitWolf()], ids=["default", "shrunk"])
-@pytest.mark.parametrize(("n_rows", "block", "n_folds"), [(500, 10, 5), (123, 2, 5), (60, 1, 20)])
-def test_each_record_is_evaluated_by_records_of_other_blocks(covariance, n_rows, block, n_folds):
-    rows, folds, index = records(n_rows), np.arange(n_rows) // block % n_folds, np.empty(n_rows)
+@pytest.mark.parametrize(("n_rows", "correlation", "n_folds"), [(500, 0, 5), (123, 0, 5), (60, 0, 20), (400, 0.9, 5)])
+def test_each_record_is_evaluated_by_records_of_other_blocks(covariance, n_rows, correlation, n_folds):
+    rows, index = autoregressive(n_rows, correlation), np.empty(n_rows)
+    n_blocks = np.clip(np.median([independent_records(mode) for mode in rows.T]) / 2, 5, 50)
+    folds = np.arange(n_rows) // int(n_rows / n_blocks) % n_folds
     for fold in range(n_folds):
         others = MahalanobisDetector(covariance=covariance, threshold="chi2").fit(rows[folds != fold])
         index[folds == fold] = others.damage_index(rows[folds == fold])
@@ -37,6 +40,18 @@ def test_each_record_is_evaluated_by_records_of_other_blocks(covariance, n_rows,
     np.testing.assert_allclose(detector.baseline_index_, index, rtol=1e-9)
     rank = int(np.ceil((n_rows + 1) * 0.98))
     assert detector.threshold_ == pytest.approx(np.sort(index)[rank - 1])
+
+
+def test_a_block_is_longer_than_records_remember():
+    rates = {}
+    for correlation in (0.0, 0.9):
+        found = []
+        for seed in range(10):
+            baseline, new = np.split(autoregressive(1365, correlation, seed), [365])
+            found.append((MahalanobisDetector().fit(baseline).predict(new) == -1).mean())
+        rates[correlation] = np.mean(found)
+    assert rates[0.0] == pytest.approx(0.02, abs=0.01)
+    assert rates[0.9] < 0.04
 
 
 def test_blocks_are_of_time_whatever_the_order_of_rows():

@@ -194,6 +194,8 @@ def read_op4(content):
         at += 1
         if len(words) == 3:
             column, row, length = words
+            if column == n_columns + 1:  # a number without meaning follows
+                break
             if row == 0:
                 continue
         elif n_rows < 0:
@@ -210,9 +212,8 @@ def read_op4(content):
             at += 1
         if length != kind * len(values) and not (len(words) == 3 and length == len(values)):
             raise ValueError("length")
-        if column <= n_columns:
-            n_given += len(values)
-            entries |= {(row - 1 + i, column - 1): value for i, value in enumerate(values)}
+        n_given += len(values)
+        entries |= {(row - 1 + i, column - 1): value for i, value in enumerate(values)}
     if column != n_columns + 1 or len(entries) < n_given:
         raise ValueError("end")
     if any(not (0 <= i < n_columns and 0 <= j < n_columns) for i, j in entries):

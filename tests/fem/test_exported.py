@@ -24,8 +24,6 @@ from tests.fem.exported_files import (
     write_npz,
 )
 
-pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
-
 CLUTTER = {"measDOFs": np.arange(3.0), "shapes": np.ones((N, 2)), "n": 4, "cube": np.ones((2, 2, 2)), "text": "SAP"}
 THETA = RNG.uniform(0.7, 1.3, (5, 3))
 

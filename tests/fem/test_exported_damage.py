@@ -22,9 +22,6 @@ from tests.fem.exported_files import (
     write_npz,
 )
 
-pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
-IN_A_CHILD = pytest.mark.parametrize("in_process", [False], indirect=True)
-
 
 @pytest.fixture
 def intact(tmp_path, form):
@@ -112,16 +109,21 @@ def test_complex_matrices_are_real_or_refused(tmp_path, form):
     ("text", "message"),
     [
         ("%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n", "1 x 1, pattern, general; expected numbers"),
-        ("%%MatrixMarket matrix coordinate real general\n999999999 999999999 0\n", "would take .* MB of memory; exp"),
-        ("%%MatrixMarket matrix coordinate real general\n2 2 999999999999\n1 1 1\n", "3 numbers; expected 9999"),
-        ("%%MatrixMarket matrix coordinate real skew-symmetric\n2 2 1\n1 1 5.0\n", "entries on its diagonal; exp"),
+        (
+            "%%MatrixMarket matrix coordinate real general\n999999999 999999999 0\n",
+            "999 rows for 0 entries; exp",
+        ),
+        (
+            "%%MatrixMarket matrix coordinate real general\n2 2 999999999999\n1 1 1\n",
+            "999,999 entries in 69 bytes",
+        ),
         (
             "%%MatrixMarket matrix array real symmetric\n2 1\n1\n2\n",
             "2 x 1, real, symmetric; expected numbers, and a square",
         ),
-        ("%%MatrixMarket matrix array real general\n1 1\n1.0x\n", "1.0x"),
+        ("%%MatrixMarket matrix array real general\n1 1\n1.0D+03\n", r"line 3: '1.0D\+03' is not a number"),
         ("%%MatrixMarket matrix coordinate real general\n2 2 1\n1 0 5.0\n", "Column index out of bounds"),
-        ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 5.0\n2 2\n", "5 numbers; expected 2 times"),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 5.0\n2 2\n", "Line 4: Invalid"),
         ("%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 2 5.0\n2 1 5.0\n", "both sides of its diagonal"),
     ],
 )
@@ -133,7 +135,6 @@ def test_bad_matrix_market_files_are_refused(tmp_path, text, message):
 
 
 @pytest.mark.nightly
-@IN_A_CHILD
 @FUZZ
 @given(position=st.integers(0, 10**6), bit=st.integers(0, 7), cut=st.booleans())
 @pytest.mark.parametrize("form", ["npz", "mtx", "mtx sparse", "folder of npz"])

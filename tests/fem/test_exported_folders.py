@@ -20,8 +20,6 @@ from tests.fem.exported_files import (
     spring,
 )
 
-pytestmark = pytest.mark.usefixtures("in_process")  # files that are sound to their readers
-
 REST = spring(3, 3, 500.0)
 
 

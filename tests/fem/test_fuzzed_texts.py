@@ -7,11 +7,9 @@ import warnings
 import numpy as np
 import pytest
 
-from skthermo._core.matrix_files import read_named_matrices
+from skthermo.fem.external._files import read_named_matrices
 from tests.fem.exported_files import TEXTS, TOTAL
 from tests.fem.slow_readers import agrees
-
-pytestmark = pytest.mark.usefixtures("in_process")
 
 NUMBERS = [0, 1, 2, 3, 7, 8, 127, 255, 65535, 10**6, 2**24, 2**27, 2**31 - 1, 2**31, 2**32 - 1, 2**62, 2**63 - 1]
 WORDS = [b"-1", b"0", b"1", b"7", b"1000000", b"100000000", b"2147483648", b"99999999999", b"1e300", b"nan", b"inf"]

@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 import scipy.sparse
 
-from skthermo._core.matrix_files import read_named_matrices
+from skthermo.fem.external._files import read_named_matrices
 from tests.fem.exported_files import DOFS, TOTAL, M
 
 with np.printoptions():  # which pyyeti changes
     nastran = pytest.importorskip("pyyeti.nastran", reason="pyyeti is not installed: the extra 'drop-ins' brings it")
-pytestmark = [pytest.mark.usefixtures("in_process"), pytest.mark.filterwarnings("ignore::DeprecationWarning")]
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
 SHIPPED = Path(nastran.__file__).parents[1] / "tests"
 NO_NAMES = "double_bigmat_ascii_badname.op4"  # names of zero bytes

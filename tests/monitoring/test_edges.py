@@ -434,7 +434,7 @@ def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(s
     assert monitor.threshold_ == expected.threshold_
 
 
-@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records|few-peaks)")
+@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records)")
 def test_a_column_that_says_nothing_is_left_out_and_named():
     records = truss()
     baseline = records[:N_BASELINE].assign(f2=records["f2"].iloc[0], T1=np.where(np.arange(N_BASELINE) % 4, 484.6, 5))

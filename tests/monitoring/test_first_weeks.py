@@ -9,7 +9,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
-from tests.bayesian import EVERYWHERE, MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of
+from tests.bayesian import MEAN, NOISE, WIDTH, BayesianLogs, Logs, records_of
 
 MODES = ["f1", "f2"]
 WEEKS, YEAR = 60, 365
@@ -35,7 +35,7 @@ def served(seed, days=WEEKS + YEAR, damage=0.0):
 
 
 def monitor_of(regressor=BayesianLogs, **options):
-    estimator = regressor(MEAN, WIDTH, NOISE, EVERYWHERE)
+    estimator = regressor(MEAN, WIDTH, NOISE)
     compensator = TemperatureCompensator(estimator, targets=MODES, **options)
     return Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False)
 

@@ -368,8 +368,6 @@ def test_a_monitor_is_cloned_and_has_parameters():
     again = pickle.loads(pickle.dumps(after))
     pd.testing.assert_frame_equal(again.evaluations_, after.evaluations_)
     assert again.summary() == after.summary()
-    with pytest.raises(ValueError, match="retention"):
-        Monitor(MahalanobisDetector(), targets=MODES, retention="5D").fit(BASELINE)
 
 
 @pytest.mark.nightly

@@ -221,3 +221,38 @@ def test_a_curve_of_a_study_is_that_of_the_detector_that_is_named():
     second = PODCurveDisplay.from_estimator(study, "deck", detector="whitened", ax=first.ax_)
     assert (first.curve, second.curve) == (curves["raw"], curves["whitened"])
     assert (first.line_.get_label(), second.line_.get_label()) == ("raw", "whitened")
+
+
+def causes(n_groups=3):
+    """Causes of a shift by hand; the first one is certain."""
+    values = np.vstack([[1.0, 0.2, 0.15, 0.25, 0.25], *[[0.3, 0.05, 0.0, 0.1, 0.18]] * (n_groups - 1)])
+    columns = ["probability", "severity", "ci_low", "ci_high", "highest_if_damaged"]
+    return pd.DataFrame(values, [f"E_{number}" for number in range(n_groups)], columns)
+
+
+def test_causes_have_their_probability_and_a_severity_with_its_interval():
+    display = DetectorsDisplay.from_predictions(causes())
+    assert [ax.get_title() for ax in display.axes_] == ["probability of a change", "mean severity"]
+    np.testing.assert_allclose(display.marks_["probability"][0].get_offsets()[:, 0], [100, 30, 30])
+    spans = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in display.bars_["severity"]]
+    np.testing.assert_allclose(spans, [(15, 25), (0, 10), (0, 10)])
+    np.testing.assert_allclose(display.values_["severity"].get_offsets()[:, 0], [20, 5, 5])
+    np.testing.assert_allclose(display.marks_["severity"][1].get_offsets()[:, 0], [25, 18, 18])
+
+
+def test_measured_shifts_have_two_standard_errors_beside_the_explained_ones():
+    columns = {"measured": [-0.01, -0.05], "explained": [-0.012, -0.04], "standard_error": [0.002, np.nan]}
+    display = DetectorsDisplay.from_predictions(pd.DataFrame(columns, ["f1", "f2"]))
+    spans = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in display.bars_["shift"]]
+    np.testing.assert_allclose(spans, [(-1.4, -0.6), (-5, -5)])
+    np.testing.assert_allclose(display.marks_["shift"][0].get_offsets()[:, 0], [-1.2, -4])
+
+
+def test_explanations_beyond_the_fifth_share_a_row_and_changes_that_are_not_found_are_said():
+    probabilities = [0.5, 0.2, 0.1, 0.08, 0.06, 0.05]
+    display = DetectorsDisplay.from_predictions(pd.DataFrame({"probability": probabilities}, list("abcdef")))
+    np.testing.assert_allclose([bar.get_width() for bar in display.bars_["probability"]], [50, 20, 10, 8, 6, 6])
+    assert display.ax_.get_yticklabels()[-1].get_text() == "all others"
+    display = DetectorsDisplay.from_predictions(pd.Series({"deck": 0.12, "piers": np.inf}))
+    np.testing.assert_allclose([bar.get_width() for bar in display.bars_["smallest"]], [12, np.nan])
+    assert [text.get_text() for text in display.ax_.texts] == ["not found"]

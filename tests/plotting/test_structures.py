@@ -8,7 +8,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from skthermo.datasets import kw51_structure, make_kw51
 from skthermo.fem import AffineModel, Bar, Beam, CallableModel, ImportedStructure, PointMass, Spring, Structure
-from skthermo.plotting import ModeShapesDisplay, StructureDisplay
+from skthermo.plotting import StructureDisplay
 
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
 
@@ -64,14 +64,14 @@ def test_members_from_another_program_are_drawn_as_our_own(directions):
     assert colours(displays[1]) == pytest.approx(colours(displays[0]), nan_ok=True)
     assert len(displays[1].ax_.lines) == len(displays[0].ax_.lines) == 2
     if directions:
-        ours, theirs = (ModeShapesDisplay.from_structure(one, modes=[0]).lines_[0][0] for one in (own, imported))
+        ours, theirs = (StructureDisplay.from_structure(one, modes=[0]).members_[0] for one in (own, imported))
         shapes = [np.array(lines.get_segments()) for lines in (ours, theirs)]
         rest = np.array([[own.nodes[node] for node in pair] for pair in ends.values()])
         sign = np.sign(np.sum((shapes[0] - rest) * (shapes[1] - rest)))
         np.testing.assert_allclose(shapes[1] - rest, sign * (shapes[0] - rest), atol=1e-9)
     else:
         with pytest.raises(ValueError, match="labels"):
-            ModeShapesDisplay.from_structure(imported)
+            StructureDisplay.from_structure(imported, modes=[0])
 
 
 def test_supports_are_drawn_where_they_are_and_filled_where_nothing_can_move():
@@ -164,22 +164,21 @@ def test_wrong_values_are_named(values, message):
 
 def test_flat_axes_for_a_structure_in_space_are_refused():
     ax = plt.figure().add_subplot()
-    for draw in (StructureDisplay.from_structure, ModeShapesDisplay.from_structure):
-        options = {"modes": [0]} if draw.__self__ is ModeShapesDisplay else {}
+    for options in ({}, {"modes": [0]}):
         with pytest.raises(ValueError, match="projection='3d'"):
-            draw(tripod(), ax=ax, **options)
+            StructureDisplay.from_structure(tripod(), ax=ax, **options)
 
 
 def test_a_mode_is_drawn_at_its_shape_and_the_largest_displacement_is_the_amplitude():
     structure = king_post()
     model = structure.assemble(["ties", "rafters", "post"], n_modes=3)
-    display = ModeShapesDisplay.from_structure(structure, model, [2, 0], amplitude=0.1)
+    display = StructureDisplay.from_structure(structure, model=model, modes=[2, 0], amplitude=0.1)
     frequencies, shapes = model.modes([[1.0, 1.0, 1.0]])
     titles = [ax.get_title() for ax in display.axes_]
     assert titles == [f"$f_{{{m + 1}}}$ = {frequencies[0, m]:.2f} Hz" for m in (2, 0)]
     extent = np.hypot(6, 2)
     for number, mode in enumerate((2, 0)):
-        segments = np.array(display.lines_[number][0].get_segments())
+        segments = np.array(display.members_[number].get_segments())
         places = dict(zip([tuple(m.nodes) for m in structure.members.values()], segments, strict=True))
         moves = {
             "f": places["l", "f"][1] - [3, 0],
@@ -195,12 +194,12 @@ def test_a_mode_is_drawn_at_its_shape_and_the_largest_displacement_is_the_amplit
 
 def test_modes_in_space_by_groups():
     structure = kw51_structure()
-    display = ModeShapesDisplay.from_structure(structure, make_kw51(), modes=[0, 1, 2], groups=["girders", "arch"])
+    options = {"model": make_kw51(), "modes": [0, 1, 2], "groups": ["girders", "arch"]}
+    display = StructureDisplay.from_structure(structure, **options)
     assert len(display.axes_) == 3
     display.figure_.canvas.draw()  # which projects the lines
-    assert [len(lines.get_segments()) for lines in display.lines_[0]] == [
-        len(structure.groups[group]) for group in ("girders", "arch")
-    ]
+    n_members = len(structure.groups["girders"] | structure.groups["arch"])
+    assert len(display.members_[0].get_segments()) == n_members
     assert display.axes_[0].get_title() == "$f_{1}$ = 0.477 Hz"
 
 
@@ -217,4 +216,4 @@ def test_wrong_modes_are_named(options, message):
     structure = king_post()
     given = {"model": structure.assemble(["ties"], n_modes=2), **options}
     with pytest.raises(ValueError, match=message):
-        ModeShapesDisplay.from_structure(structure, **given)
+        StructureDisplay.from_structure(structure, **given)

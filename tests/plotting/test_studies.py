@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.special import expit
 from scipy.stats import binomtest
@@ -12,7 +11,7 @@ from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.detection import MahalanobisDetector
-from skthermo.plotting import DamageIndexDisplay, IdentifiedDamageDisplay, PODCurveDisplay
+from skthermo.plotting import DamageIndexDisplay, PODCurveDisplay
 from skthermo.studies import pod_curve
 
 
@@ -122,74 +121,3 @@ def test_curves_of_strengthenings_and_of_records_without_a_slope():
     with pytest.warns(UserWarning, match="above 0.2.*separated-severities"):
         missed = pod_curve([0.1, 0.2], [0, 0], [100] * 2)
     assert PODCurveDisplay.from_predictions(missed).marks_["bracket"].get_label() == "$a_{90}$ beyond 20.0 %"
-
-
-def given(n_groups=3, **changed):
-    """An identification by hand: the last group is not seen."""
-    groups = ["deck", "piers", "soil", *(f"E_{number}" for number in range(4, n_groups + 1))][:n_groups]
-    first = [0.3, 0.05, 0.02, 0.1, 0.16, 0.18]
-    values = np.vstack([first, *[[0.8, 0.2, 0.15, 0.25, 0.2, 0.25]] * (n_groups - 1)])
-    columns = ["probability", "severity", "ci_low", "ci_high", "if_damaged", "highest_if_damaged"]
-    labels = ["piers 20 %", "deck 4 %, piers 12 %", "soil 8 %", "deck 5 %", "piers 3 %, soil 2 %", "no damage"]
-    frames = {
-        "summary_table": pd.DataFrame({"probability": [0.5, 0.2, 0.1, 0.08, 0.06, 0.05]}, labels),
-        "table": pd.DataFrame(values, groups, columns),
-        "shifts": pd.DataFrame(
-            {"measured": [-0.01, -0.05], "explained": [-0.012, -0.04], "standard_error": [0.002, 0.003]}, ["f1", "f2"]
-        ),
-        "separability": SimpleNamespace(unobservable=groups[-1:]),
-    }
-    return SimpleNamespace(**frames | changed)
-
-
-def test_explanations_beyond_the_fifth_share_a_bar_and_shifts_are_in_percent():
-    found = given()
-    display = IdentifiedDamageDisplay.from_predictions(found)
-    np.testing.assert_allclose([bar.get_width() for bar in display.bars_], [50, 20, 10, 8, 6, 6])
-    assert [text.get_text() for text in display.axes_[0].texts][::2] == [*found.summary_table.index[:5], "all others"]
-    np.testing.assert_allclose(display.shifts_[0].get_ydata(), [-1, -5])
-    np.testing.assert_allclose(display.explained_.get_ydata(), [-1.2, -4])
-    np.testing.assert_allclose(display.shifts_[2][0].get_segments()[1][:, 1], [-5.6, -4.4])
-    whole = IdentifiedDamageDisplay.from_predictions(
-        given(summary_table=pd.DataFrame({"probability": [0.9, 0.1]}, ["a", "b"]))
-    )
-    assert len(whole.bars_) == 2
-
-
-def test_severities_have_bands_and_probabilities_and_what_is_not_seen_has_none():
-    display = IdentifiedDamageDisplay.from_predictions(given())
-    ax = display.axes_[1]
-    spans = [segment[:, 0] for segment in display.severities_[2][0].get_segments()]
-    np.testing.assert_allclose(spans, [[2, 10], [15, 25]])
-    np.testing.assert_allclose([bar.get_width() for bar in ax.patches[:2]], [18, 25])
-    assert np.isnan(ax.patches[2].get_width())
-    (anything,) = (line for line in ax.lines if line.get_linestyle() == ":")
-    assert list(anything.get_ydata()) == [2, 2]
-    shades = ax.collections[-1].get_facecolor()[:, 3]
-    np.testing.assert_allclose(shades, [0.3, 0.8])
-    assert [tick.get_text() for tick in ax.get_yticklabels()] == ["deck", "piers", "soil"]
-
-
-@pytest.mark.parametrize("n_groups", [1, 14])
-def test_nothing_that_is_written_overlaps_in_a_figure_of_its_own(n_groups):
-    long = "Rebar of the upper floors in the eastern wing"
-    found = given(n_groups, separability=SimpleNamespace(unobservable=[]))
-    found.table = found.table.rename(index={"deck": long})
-    found.summary_table = found.summary_table.rename(
-        index={"piers 20 %": f"{long} 12 %, main stays of the western pylon 4 %"}
-    )
-    display = IdentifiedDamageDisplay.from_predictions(found)
-    display.figure_.canvas.draw()
-    for ax in display.axes_[:2]:
-        boxes = [text.get_window_extent() for text in [*ax.texts, *ax.get_yticklabels(), ax.title]]
-        for number, box in enumerate(boxes):
-            assert not any(box.overlaps(other) for other in boxes[number + 1 :])
-    assert len(display.axes_[1].get_yticklabels()) == n_groups
-    assert display.axes_[0].texts[0].get_text().count("\n") <= 1
-
-
-def test_incomplete_results_are_named():
-    broken = given()
-    del broken.shifts
-    with pytest.raises(ValueError, match=r"without \['shifts'\]"):
-        IdentifiedDamageDisplay.from_predictions(broken)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from skthermo.fleet._discoveries import COLUMNS, Discoveries
+from skthermo.monitoring._discoveries import Discoveries
 from skthermo.monitoring._status import status_of
 from skthermo.monitoring._threshold import SmallestChanges
 
@@ -99,9 +99,7 @@ class FakeMonitor:
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
         self.trained_, self.since_ = self.baseline_, None
         self.counts_ = {"n_records": len(stamps), "n_not_evaluated": int((~known).sum()), "n_repeated": 2}
-        rule = SimpleNamespace(threshold=3.0, release=2.0, hold=pd.Timedelta("1D"))
         self.false_alarm_estimate_ = SimpleNamespace(
-            rule=rule,
             expected=false_alarms_per_year,
             lowest=0,
             highest=3,
@@ -112,12 +110,6 @@ class FakeMonitor:
         self.watch_per_year, self.watch_threshold_ = watch_per_year, None if watch_per_year is None else 2.5
         self.smallest_changes_ = smallest_changes(0.01, {"f1": 0.02, "f2": 0.03}, True)
         self.detector_ = SimpleNamespace()
-
-    @property
-    def history_(self):
-        opened = set(self.events_.loc[self.events_["end"].isna(), "kind"])
-        newest = "watch" if "watch" in opened else str(self.evaluations_["state"].iloc[-1])
-        return SimpleNamespace(state="alarm" if opened & {"damage", "measurement or structure"} else newest)
 
     def transitions(self, after=0):
         return []
@@ -153,7 +145,8 @@ class FakeFleet:
             for number, event in monitor.events_.to_dict("index").items()
             if event["kind"] == "damage"
         ]
-        table = pd.DataFrame(rows, columns=[*COLUMNS, "is_discovery"])
+        columns = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged", "is_discovery"]
+        table = pd.DataFrame(rows, columns=columns)
         table["is_discovery"] = table["end"].isna() & (table["p_value"] < 0.01)
         p_values = pd.Series(1.0, list(self.monitors))
         return Discoveries(fdr, table, p_values, 0.01, [], 0.5, float(len(self.monitors)))

@@ -100,7 +100,6 @@ def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*slow-temperatures")
 def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
     known = YEAR.temperatures[["T1", "T2"]]
     inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01)

@@ -1,13 +1,12 @@
-"""Laws of a chain whose mapper states standard deviations: intervals, and weather that a fleet has seen."""
+"""Laws of a chain whose mapper states standard deviations."""
 
 import functools
-import re
 import warnings
 
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.linear_model import BayesianRidge, LinearRegression, Ridge
+from sklearn.linear_model import BayesianRidge, Ridge
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
@@ -15,13 +14,12 @@ from skthermo.fem import AffineModel
 from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.studies import DetectabilityStudy, identify_damage
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
-from tests.bayesian import EVERYWHERE, NOISE, WIDTH, BayesianLogs, Logs, basis, weather
 from tests.bayesian import MEAN as FLEET_MEAN
+from tests.bayesian import NOISE, WIDTH, BayesianLogs, Logs, basis, weather
 
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
-        "rows-from-fleet",
         "outside-(prior|training-weather)",
         "weather-of-one-fold",
         "few-rows",
@@ -46,7 +44,7 @@ def bridge(seed, days, noise=NOISE):
 
 
 def chain(mapper=None, **options):
-    prior = BayesianLogs(MEAN, WIDTH, 2 * NOISE, EVERYWHERE)
+    prior = BayesianLogs(MEAN, WIDTH, 2 * NOISE)
     inverse = PosteriorInverse(MODEL, noise=NOISE, prior=0.2)
     return DataInformedFEM(MODEL, inverse=inverse, mapper=prior if mapper is None else mapper, **options)
 
@@ -108,17 +106,13 @@ def test_a_mapper_that_is_certain_changes_nothing():
     np.testing.assert_array_equal(*noisy)
 
 
-def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature_and_not_the_distance():
+def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature():
     fem, T, _ = fitted()
     later = T[30:]
     frequencies, std = (table.to_numpy() for table in fem.predict(later, return_std=True))
     scatter = np.sqrt((std / frequencies) ** 2 - stated(fem, later) ** 2)
     spread = fem.recorder_.residuals.spread(later.to_numpy())
     np.testing.assert_allclose(scatter, spread, rtol=1e-6)
-    assert spread.max() < 2.5 * NOISE  # of thirty records, and however far from their weather
-    assert (
-        fem.recorder_.residuals.spread(np.full((1, 2), 160.0)) > 1.5 * spread.min()
-    ).all()  # beyond what anybody has seen
 
 
 @pytest.mark.nightly
@@ -132,36 +126,11 @@ def test_intervals_after_thirty_days_hold_a_later_year():
     assert np.mean(np.array(held) < 0.7) < 0.2
 
 
-def test_rows_in_weather_of_the_fleet_and_those_beyond_it_are_warned_of():
-    fem, T, _ = fitted()
-    table, own = fem.extrapolation_distance(T), (T[:30].min(), T[:30].max())
-    seen = ((own[0] <= T) & (own[1] >= T)).all(axis=1)
-    np.testing.assert_array_equal(table["from_fleet"], ~seen)
-    assert list(table)[-2:] == ["T2", "from_fleet"]
-    np.testing.assert_array_equal((table[["T1", "T2"]] > 0).any(axis=1), ~seen)
-    with pytest.warns(UserWarning, match="rows-from-fleet") as given:
-        fem.predict(T)
-    assert len(given) == 1
-    with pytest.warns(UserWarning, match="outside-training-weather"):
-        fem.predict(T[:1] + 200)
-
-
-def test_the_report_says_what_weather_is_the_fleets():
-    report = fitted()[0].report_
-    assert report.fleet.loc["T1", ["fleet lowest", "fleet highest"]].tolist() == list(EVERYWHERE)
-    assert re.search("predictions are based on the fleet: 'T[12]' from -40 to 60, here -", repr(report))
-    assert not list(chain().fit(*(table[:15] for table in bridge(0, 60))).report_.warnings())
-    T, F = bridge(0, 15)
-    alone = chain(TemperatureMapper(LinearRegression())).fit(T, F).report_
-    assert alone.fleet is None
-    assert [warning.kind for warning in alone.warnings()] == ["few-rows"]
-
-
 def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
     T, F = bridge(0, 120)
-    fem = chain(make_pipeline(LagFeatures(2), BayesianLogs(MEAN, WIDTH, 2 * NOISE, EVERYWHERE))).fit(T, F)
+    fem = chain(make_pipeline(LagFeatures(2), BayesianLogs(MEAN, WIDTH, 2 * NOISE))).fit(T, F)
     assert stated(fem, T).shape == (120, 2)
-    assert list(fem.extrapolation_distance(T)) == [*fem.training_range_.names, "from_fleet"]
+    assert list(fem.extrapolation_distance(T)) == list(fem.training_range_.names)
     assert len(fem.training_range_.names) == 4
 
 

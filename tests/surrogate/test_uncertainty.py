@@ -246,7 +246,6 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
         assert block == (max(pd.Timedelta("7D"), np.ceil(rows) * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
 
 
-@pytest.mark.filterwarnings(r"ignore:.*\[trend\]", "ignore:.*sudden-change")
 def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
     lasting = F * (1 + 0.01 * autoregressive(365, 0.9)[:, np.newaxis])
     blocks = [

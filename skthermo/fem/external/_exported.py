@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import add
 from os import PathLike
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import Matrix, check_names, check_path
-from skthermo._core.matrix_files import MASS_OF, read_half, read_named_matrices
 from skthermo._core.warnings import warn_each
 from skthermo.fem.affine import AffineModel
-from skthermo.fem.external._differences import SAME_ENTRIES, doubtful_matrices, read_differences, relative
+from skthermo.fem.external._differences import SAME_ENTRIES, Pairs, doubtful_matrices, read_differences, relative
+from skthermo.fem.external._files import MASS_OF, read_file, read_named_matrices
+from skthermo.fem.external._texts import Labelled
 
 
 def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
@@ -43,9 +43,9 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     FileNotFoundError
         If the path does not exist.
     ValueError
-        Names the file, and the line that does not hold three numbers; if rows or columns are not positive integers, an
-        entry is given twice, entries are on both sides of the diagonal but not in pairs, or the matrix would need too
-        much memory (see `load_affine`).
+        Names the file, and the line that does not hold three finite numbers; if rows or columns are not positive
+        integers, an entry is given twice, entries are on both sides of the diagonal but not in pairs, or rows are more
+        than twenty million and ten for each entry.
 
     See Also
     --------
@@ -70,9 +70,9 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
         raise FileNotFoundError(f"{file} does not exist; expected a text of row, column and value in each line")
     if not file.is_file():
         raise ValueError(f"{file} is a folder or a device; expected a text of row, column and value in each line")
-    matrix = read_half(file)
-    if not np.isfinite(matrix.data).all():
-        raise ValueError(f"{file} holds values that are not finite; expected finite ones")
+    matrix = read_file(file, "lines of entries")
+    if isinstance(matrix, Labelled):
+        raise ValueError(f"{file} holds labels of nodes; expected row, column and value in each line, or load_affine")
     return matrix
 
 
@@ -156,9 +156,6 @@ def load_affine(
     belong together, and the rules that decide the role of each matrix. Roles that were found and are doubtful, such as
     a total that is more than the sum of the terms, or a term proportional to the mass, give a warning.
 
-    Files are read in a process of their own, so that a damaged one can do no harm. It may take a minute, and a second
-    more for each MB, and ten times the memory of the files, or 256 MB.
-
     Examples
     --------
     >>> import tempfile
@@ -194,41 +191,9 @@ def load_affine(
         if one is not None and (not isinstance(one, str) or not one):
             raise ValueError(f"{what} is {one!r:.100}; expected the name of a matrix")
     keys = None if stiffness is None else _keys(stiffness)
-    usual = (MASS_NAMES if mass is None else ()) + (TOTAL_NAMES if total is None else ())
-
-    def is_used(name: str) -> bool:
-        is_named = keys is None or name in (*keys, mass, total)
-        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS_OF))
-
-    matrices, dofs = read_named_matrices(file, is_used)
-    exports = Exports(file, matrices)
-    doubts: list[str] = []
-    mass = mass or exports.mass()
-    mass_matrix = exports.matrix(mass)
-    others = exports.beside(mass, mass_matrix.shape) if keys is None else {}
-    says_total = total is not None
-    if total is None:
-        candidates = exports.unnamed((*keys, mass), mass_matrix.shape) if keys else others if len(others) > 1 else ()
-        total = exports.usual(candidates, TOTAL_NAMES, "total")
-        if total is None and factor is not None:
-            total = exports.usual(exports.square, TOTAL_NAMES, "total")
-    if keys is None:
-        changed = [name for name in others if name != total]
-        if factor is None:
-            changed, doubts = exports.terms(others, total, mass)
-        keys = _keys(changed)
-    if not keys:
-        raise ValueError(f"{file}: no stiffness matrix beside the mass {mass!r}; found {list(matrices)}")
-    terms = {name: exports.matrix(name, mass_matrix.shape) for name in keys}
-    pairs = [(keys[name], term) for name, term in terms.items()]
-    if total and factor is None and (rest := exports.rest(total, terms)) is not None:
-        pairs.append(((), rest))
-        doubts += [] if says_total else [more_than_the_sum(total, terms)]
-    nominal = None if factor is None else exports.nominal(total, mass_matrix.shape)
+    matrices, dofs = read_named_matrices(file, _used(keys, mass, total))
     try:
-        if nominal is not None and factor is not None:
-            differences, doubts = read_differences(nominal, terms, factor)
-            pairs = [(keys[key[0]] if key else (), term) for key, term in differences.items()]
+        pairs, mass_matrix, doubts = _roles(Exports(matrices), keys, mass, total, factor)
         model = AffineModel(
             pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track, dofs=dofs
         )
@@ -238,19 +203,56 @@ def load_affine(
     return model
 
 
-def more_than_the_sum(total: str, terms: Collection[str]) -> str:
-    """The doubt about a total that nobody has named."""
-    return (
-        f"{total!r} is more than the sum of {list(terms)}: the rest is used as a constant part of the stiffness. "
-        "Confirm it by total=..., or give total=False if the terms are all, or name the terms by stiffness=[...]"
-    )
+def _used(keys: Collection[str] | None, mass: str | None, total: Total) -> Callable[[str], bool]:
+    """Whether a matrix of a folder has to be read, by its name."""
+    usual = (MASS_NAMES if mass is None else ()) + (TOTAL_NAMES if total is None else ())
+
+    def is_used(name: str) -> bool:
+        is_named = keys is None or name in (*keys, mass, total)
+        return is_named or name.lower() in usual or (mass is None and name.endswith(MASS_OF))
+
+    return is_used
+
+
+def _roles(
+    exports: Exports,
+    keys: dict[str, Key] | None,
+    mass: str | None,
+    total: Total,
+    factor: float | Mapping[str, float] | None,
+) -> tuple[Pairs, Matrix, list[str]]:
+    """Stiffness terms, mass, and doubts about the roles of matrices that nobody has named."""
+    mass = mass or exports.mass_name()
+    mass_matrix = exports.matrix(mass)
+    found = exports.total_name(mass, keys, has_factor=factor is not None) if total is None else total
+    doubts: list[str] = []
+    if keys is None:
+        springs = {name: one for name, one in exports.beside(mass, mass_matrix.shape).items() if name != found}
+        if factor is None:
+            springs, doubts = exports.terms_beside(mass, springs, has_total=found is not None)
+        keys = {name: (name,) for name in springs}
+    if not keys:
+        raise ValueError(f"no stiffness matrix beside the mass {mass!r}; found {list(exports.matrices)}")
+    terms = {name: exports.matrix(name, mass_matrix.shape) for name in keys}
+    if factor is not None:
+        differences, doubts = read_differences(exports.nominal(found, mass_matrix.shape), terms, factor)
+        return [(keys[name[0]] if name else (), term) for name, term in differences.items()], mass_matrix, doubts
+    pairs = [(keys[name], term) for name, term in terms.items()]
+    if found and (rest := exports.rest(found, terms)) is not None:
+        pairs.append(((), rest))
+        if total is None:
+            doubts.append(
+                f"{found!r} is more than the sum of {list(terms)}: the rest is used as a constant part of the "
+                "stiffness. Confirm it by total=..., or give total=False if the terms are all, or name the terms by "
+                "stiffness=[...]"
+            )
+    return pairs, mass_matrix, doubts
 
 
 @dataclass(frozen=True)
 class Exports:
     """Matrices by name that a program has written to a file or a folder, None for what holds no numbers."""
 
-    file: Path
     matrices: Mapping[str, Matrix | None]
 
     @cached_property
@@ -263,8 +265,8 @@ class Exports:
     def matrix(self, name: str, shape: tuple[int, ...] = ()) -> Matrix:
         """A matrix of finite real numbers, of a shape if one is given."""
         if name not in self.matrices:
-            raise ValueError(f"{self.file}: no variable {name!r}; found {list(self.matrices)}")
-        matrix, what = self.matrices[name], f"{self.file}: variable {name!r}"
+            raise ValueError(f"no variable {name!r}; found {list(self.matrices)}")
+        matrix, what = self.matrices[name], f"variable {name!r}"
         if matrix is None:
             raise ValueError(f"{what} is not a matrix of real numbers")
         if np.iscomplexobj(matrix):
@@ -275,36 +277,32 @@ class Exports:
         if not _is_finite(matrix):
             raise ValueError(f"{what} holds values that are not finite")
         if shape and matrix.shape != shape:
-            raise ValueError(
-                f"{what} has shape {matrix.shape}; expected {shape} like the mass, or stiffness=[...] that names the "
-                "terms"
-            )
+            expected = f"{shape} like the mass, or stiffness=[...] that names the terms"
+            raise ValueError(f"{what} has shape {matrix.shape}; expected {expected}")
         return matrix
 
     def usual(self, names: Collection[str], usual: Collection[str], what: str) -> str | None:
         """The one name among the usual ones, if there is one."""
         found = [name for name in names if name.lower() in usual]
         if len(found) > 1:
-            raise ValueError(f"{self.file}: {found} could each be the {what}; say {what}=...")
+            raise ValueError(f"{found} could each be the {what}; say {what}=...")
         return found[0] if found else None
 
-    def mass(self) -> str:
+    def mass_name(self) -> str:
         """The mass matrix: the one with a usual name, or the mass of all exports."""
         found = self.usual(self.square, MASS_NAMES, "mass")
-        masses = [name for name in self.square if name.endswith(MASS_OF)]
-        if found is None and not masses:
-            raise ValueError(f"{self.file}: {self._no_mass()}; say mass=..., one of {self.square or [*self.matrices]}")
         if found is not None:
             return found
+        masses = [name for name in self.square if name.endswith(MASS_OF)]
+        if not masses:
+            raise ValueError(f"{self._no_mass()}; say mass=..., one of {self.square or [*self.matrices]}")
         nominal = [name for name in masses if name.removesuffix(MASS_OF).lower() in TOTAL_NAMES]
         chosen = (nominal or masses)[0]
         reference = self.matrix(chosen)
         for name in masses:
             if not _same(self.matrix(name, reference.shape), reference, SAME_ENTRIES):
                 both = f"{name.removesuffix(MASS_OF)!r} differs from that of {chosen.removesuffix(MASS_OF)!r}"
-                raise ValueError(
-                    f"{self.file}: the mass of {both}; expected exports of the same mass, or mass=..., one of them"
-                )
+                raise ValueError(f"the mass of {both}; expected exports of the same mass, or mass=..., one of them")
         return chosen
 
     def _no_mass(self) -> str:
@@ -316,6 +314,22 @@ class Exports:
                 return f"{name!r} is {shape}, {'complex' if is_complex else 'not square'}, and so not the mass"
         return f"no matrix is called {', '.join(MASS_NAMES)}"
 
+    def total_name(self, mass: str, keys: Collection[str] | None, *, has_factor: bool) -> str | None:
+        """The whole stiffness: a matrix with a usual name that is no term, beside others."""
+        shape = self.matrix(mass).shape
+        if keys:
+            others = [name for name in self.square if name not in (*keys, mass)]
+            candidates = [name for name in others if self._is_finite_of(name, shape)]
+        else:
+            candidates = list(self.beside(mass, shape)) if keys is None else []
+            candidates = candidates if len(candidates) > 1 else []
+        found = self.usual(candidates, TOTAL_NAMES, "total")
+        return self.usual(self.square, TOTAL_NAMES, "total") if found is None and has_factor else found
+
+    def _is_finite_of(self, name: str, shape: tuple[int, ...]) -> bool:
+        matrix = self.matrices[name]
+        return matrix is not None and matrix.shape == shape and _is_finite(matrix)
+
     def beside(self, mass: str, shape: tuple[int, ...]) -> dict[str, Matrix]:
         """All square matrices except masses."""
         return {
@@ -326,53 +340,47 @@ class Exports:
             and (name in self.square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
         }
 
-    def unnamed(self, named: Collection[str], shape: tuple[int, ...]) -> list[str]:
-        """Matrices that may be the total of terms that are named."""
-        found = {name: self.matrices[name] for name in self.square if name not in named}
-        return [name for name, one in found.items() if one is not None and one.shape == shape and _is_finite(one)]
-
-    def terms(self, others: Mapping[str, Matrix], total: Total, mass: str) -> tuple[list[str], list[str]]:
-        """Names of the stiffness terms, and doubts about matrices that look like a total or like mass."""
-        doubts = []
-        found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items() if name != total}
+    def terms_beside(
+        self, mass: str, others: Mapping[str, Matrix], *, has_total: bool
+    ) -> tuple[dict[str, Matrix], list[str]]:
+        """The stiffness terms among the matrices beside mass and total, and doubts about these."""
+        found = {name: scipy.sparse.csc_array(matrix) for name, matrix in others.items()}
         for name, term in found.items():
             if term.nnz and not (term + term.T).count_nonzero():
                 raise ValueError(
-                    f"{self.file}: variable {name!r} is skew-symmetric, as gyroscopic matrices are; expected symmetric "
-                    "ones, or stiffness=[...] that names the terms"
+                    f"variable {name!r} is skew-symmetric, as gyroscopic matrices are; expected symmetric ones, or "
+                    "stiffness=[...] that names the terms"
                 )
-        mass_matrix = self.matrix(mass)
+        mass_matrix, doubts = self.matrix(mass), list[str]()
         has_pattern = mass_matrix.shape[0] > 1
         like_mass = {name: _ratio(term, mass_matrix) for name, term in found.items()} if has_pattern else {}
         similar = {name: f"{ratio:.6g} times the mass {mass!r}" for name, ratio in like_mass.items() if ratio}
         springs = {name: term for name, term in found.items() if name not in similar}
-        if total is None and len(springs) > 2:
-            whole = reduce(add, springs.values())
-            sums = [name for name, term in springs.items() if _same(term, whole - term, 1e-8)]
-            if len(sums) == 1:
-                del springs[sums[0]], found[sums[0]]
-                doubts.append(
-                    f"{sums[0]!r} is the sum of {list(springs)} and used as the total, not as a term. Confirm it by "
-                    f"total={sums[0]!r}, or name the terms by stiffness=[...]"
-                )
-        if len(springs) > 1 and has_pattern:
-            whole = reduce(add, springs.values())
-            for name, term in springs.items():
-                if ratio := _ratio(term, whole - term):
-                    similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
-        for name, what in similar.items():
+        whole = reduce(add, springs.values(), 0 * mass_matrix)
+        sums = [name for name, term in springs.items() if _same(term, whole - term, 1e-8)]
+        if not has_total and len(springs) > 2 and len(sums) == 1:
+            whole = whole - springs.pop(sums[0])
+            del found[sums[0]]
             doubts.append(
-                f"{name!r} is {what}, and used as a stiffness term. If it is none, frequencies are wrong. Name the "
-                "terms by stiffness=[...]"
+                f"{sums[0]!r} is the sum of {list(springs)} and used as the total, not as a term. Confirm it by "
+                f"total={sums[0]!r}, or name the terms by stiffness=[...]"
             )
-        return list(found), doubts
+        for name, term in springs.items() if len(springs) > 1 and has_pattern else ():
+            if ratio := _ratio(term, whole - term):
+                similar[name] = f"{ratio:.6g} times the sum of {[other for other in springs if other != name]}"
+        doubts += [
+            f"{name!r} is {what}, and used as a stiffness term. If it is none, frequencies are wrong. Name the terms "
+            "by stiffness=[...]"
+            for name, what in similar.items()
+        ]
+        return found, doubts
 
     def nominal(self, total: Total, shape: tuple[int, ...]) -> Matrix:
         """The stiffness as built, beside those with one parameter multiplied."""
         if not total:
             raise ValueError(
-                f"{self.file}: factor is given, but no matrix is called {', '.join(TOTAL_NAMES)}; expected the "
-                f"stiffness as built, or total=..., one of {list(self.matrices)}"
+                f"factor is given, but no matrix is called {', '.join(TOTAL_NAMES)}; expected the stiffness as built, "
+                f"or total=..., one of {list(self.matrices)}"
             )
         return self.matrix(total, shape)
 
@@ -386,9 +394,9 @@ class Exports:
         if less.any():
             row = int(np.argmax(less))
             raise ValueError(
-                f"{self.file}: {total!r} is {whole.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of "
-                f"{list(terms)}; expected a total of the stiffness, factor=2.0 if each of these is the whole with one "
-                "modulus doubled, stiffness=... that says which matrices are terms, or total=False if none is the total"
+                f"{total!r} is {whole.diagonal()[row]:.6g} at ({row}, {row}), less than the sum of {list(terms)}; "
+                "expected a total of the stiffness, factor=2.0 if each of these is the whole with one modulus doubled, "
+                "stiffness=... that says which matrices are terms, or total=False if none is the total"
             )
         return rest
 

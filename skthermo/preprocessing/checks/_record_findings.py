@@ -4,35 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Iterator
 from dataclasses import dataclass, field
+from datetime import time
 from typing import Any, NamedTuple
 
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.frames import Table, midnight
+from skthermo._core.frames import Table
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing._find_memory import MemoryFindings
 
 WARNINGS = {
     "no-table": "the argument is no table of numbers: {}. Nothing can be learned from it. Give a DataFrame or a "
-    "two-dimensional array of numbers, a row for each record",
-    "no-numbers": "columns hold something other than numbers: {}. Nothing can be learned from them. Convert or drop "
-    "these columns",
-    "column-names": "column names are ambiguous: {}. Columns are matched by name, so that one would be read as "
-    "another. Give every column a name of its own, one text each",
+    "two-dimensional array of numbers, a row for each record, and each column a name of its own, one text each",
     "different-rows": "the tables have different rows: {}. Frequencies would be compared with the temperatures of "
     "other times. Join the tables by their times",
     "no-rows": "there are too few records: {}. Nothing can be learned from them. Give the records of a year, or at "
     "least of weeks",
-    "few-rows": "there are few records: {}. Outliers, shifts and trends cannot be distinguished from chance. Give the "
-    "records of a year, or at least of weeks",
-    "missing-stamps": "rows have no time: {}. Their place among the others is unknown. Drop these rows, or give their "
-    "times",
-    "equal-stamps": "all rows have the same time: {}. Order and duration of the records are unknown. Give each row "
-    "its own time",
-    "stamps-from-numbers": "times come from numbers that were read in the wrong unit: {}. Days would count as "
-    "fractions of a second. Convert them by pandas.to_datetime with format= or unit=",
+    "few-rows": "there are few records: {}. Outliers and shifts cannot be distinguished from chance. Give the records "
+    "of a year, or at least of weeks",
+    "wrong-stamps": "times are missing, all equal, or read in the wrong unit: {}. Order and duration of the records "
+    "are unknown. Drop rows without a time, and read the others by pandas.to_datetime with format= or unit=",
     "stamps-as-text": "the index holds times that are no DatetimeIndex: {}. Rows would count as equally spaced, in "
     "the given order. Convert the index by pandas.to_datetime",
     "repeated-stamps": "times occur more than once: {}. Lags and memory cannot know which of the rows was earlier. "
@@ -41,38 +33,26 @@ WARNINGS = {
     "sort_index()",
     "missing-column": "a column has no value: {}. Nothing can be learned from it. Leave it out, or check why it is "
     "empty",
-    "infinite-values": "values are infinite or too large to be squared: {}. They count as missing. Put NaN there",
-    "placeholders": "values stand for missing ones: {}. They count as missing. Put NaN there",
-    "isolated-level": "values far from all others repeat exactly: {}. They count as missing. Put NaN there",
-    "another-level": "values are far from all others: {}. They count as missing. Put NaN there",
-    "implausible-values": "values are implausible: {}. They count as missing. Put NaN there",
     "constant": "a column is constant: {}. It carries no information, and its spread of zero makes any change "
     "infinite. Leave it out",
+    "placeholders": "values stand for missing ones: {}. They count as missing. Put NaN there",
+    "another-level": "values are far from all others: {}. They count as missing. Put NaN there",
+    "implausible-values": "values are implausible: {}. They count as missing. Put NaN there",
+    "stuck": "values only repeat: {}. They count as missing. Put NaN where a sensor or a mode is stuck",
     "few-values": "a column has very few different values: {}. Its resolution hides the effect of the weather. Check "
     "rounding and the settings of the logger",
     "equal-columns": "columns are equal: {}. One channel counts twice, and another is missing. Keep one of them, and "
     "check where the other was read from",
-    "not-positive": "frequencies are zero or negative: {}. They count as missing. Put NaN where a mode was not "
-    "identified",
     "kelvin": "temperatures look like kelvin: {}. Bounds and reports are in degrees Celsius. Subtract 273.15",
-    "fahrenheit": "temperatures look like degrees Fahrenheit: {}. Frost and reports would be wrong by many degrees. "
-    "Convert them by (T - 32) / 1.8",
-    "scaled-temperatures": "temperatures look like fractions of a degree: {}. Frost and reports would be wrong by "
-    "that factor. Divide them by the factor",
-    "opposite-signs": "a sensor falls where the others rise: {}. Means of the sensors would cancel, and its summer "
-    "would count as frost. Check its sign",
-    "exchanged-tables": "temperatures and frequencies look exchanged: {}. Temperatures would be predicted from "
-    "frequencies. Exchange the two tables",
-    "temperatures-are-frequencies": "a column stands in both tables: {}. The frequency would predict itself and hide "
-    "all damage. Give temperatures only in the first table",
-    "number-of-modes": "frequencies and model have different numbers of modes: {}. A column would be read as another "
-    "mode. Give a column for each mode of the model, or model.with_modes of the modes that match_modes finds",
-    "unit-of-frequencies": "frequencies are in another unit than the model's: {}. Changes of the frequencies would be "
-    "wrong by that factor. Convert them to Hz",
+    "unit-of-temperatures": "temperatures have another unit or sign: {}. Frost and reports would be wrong by many "
+    "degrees. Convert them to degrees Celsius",
+    "exchanged-tables": "temperatures and frequencies look exchanged: {}. Frequencies would be predicted from "
+    "frequencies, which hides all damage. Give temperatures in the first table only, and frequencies in the second",
+    "unit-of-frequencies": "frequencies are not those of the model's modes: {}. Changes would be read as those of "
+    "another mode or by a wrong factor. Give Hz and a column for each mode of the model, or model.with_modes of the "
+    "modes that match_modes finds",
     "unit-of-a-mode": "a mode is far from the model's: {}. Its changes would be read as changes of another mode or "
     "unit. Convert it to Hz, or order the columns as the model's modes",
-    "stuck-sensor": "values of a sensor only repeat: {}. They count as missing. Put NaN where it is stuck",
-    "stuck-mode": "values of a mode only repeat: {}. They count as missing. Put NaN where it is stuck",
     "no-thermal-effect": "the temperatures explain nothing of the frequencies: {}. Nothing can be compensated by "
     "them. Check whether the rows of both tables belong together",
     "time-shift": "temperatures of other rows explain the frequencies better: {}. The weather of another time would "
@@ -82,34 +62,19 @@ WARNINGS = {
     "frequency-outliers": "frequencies are far from their neighbours in time and from a regression on the weather: {}. "
     "Impossible values are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
     "HampelFilter does",
-    "slow-temperatures": "frequencies follow the weather of weeks, as soil and large concrete do: {}. Seasons would be "
-    "taken for changes of the structure. Append these means to the inputs of the regression",
-    "sudden-change": "frequencies change at once, and the weather does not explain it: {}. Both levels would be "
-    "learned as healthy. Fit on records of one structure, in one state and by one way of identification",
-    "trend": "residuals of the frequencies beside the weather have a trend: {}. A detector takes a trend that goes on "
-    "for damage. Check whether the structure or a sensor drifts",
 }
 """By kind: the finding, with a place for details; its consequence; the remedy."""
 
 ARE_MEANINGLESS = frozenset(
     {
-        *("no-table", "no-numbers", "column-names", "different-rows", "no-rows", "missing-stamps", "equal-stamps"),
-        *("stamps-from-numbers", "missing-column", "constant", "kelvin", "exchanged-tables", "number-of-modes"),
-        *("temperatures-are-frequencies", "unit-of-frequencies"),
+        *("no-table", "different-rows", "no-rows", "wrong-stamps", "missing-column", "constant", "kelvin"),
+        *("exchanged-tables", "unit-of-frequencies"),
     }
 )
 """Kinds with which no result of a fit means anything."""
 
-ASIDE_KINDS = frozenset(
-    {
-        *("infinite-values", "placeholders", "isolated-level", "another-level", "implausible-values", "not-positive"),
-        *("stuck-sensor", "stuck-mode"),
-    }
-)
+ASIDE_KINDS = frozenset({"placeholders", "another-level", "implausible-values", "stuck"})
 """Kinds of values that cannot be measurements, which count as missing."""
-
-IMPOSSIBLE = frozenset({"infinite-values", "placeholders", "not-positive"})
-"""Kinds of values that are impossible in any state of a structure."""
 
 LEFT_OUT_KINDS = frozenset({"missing-column", "constant"})
 """Kinds of columns that say nothing."""
@@ -127,9 +92,9 @@ class RecordFinding(NamedTuple):
 
     @classmethod
     def in_rows(
-        cls, index: pd.Index, what: str, column: Hashable, rows: NDArray, detail: str, *, period: bool = False
+        cls, index: pd.Index, what: str, column: Hashable, rows: NDArray, detail: str, *, period: bool = True
     ) -> RecordFinding:
-        """A finding in some rows of an index, which the detail may end with."""
+        """A finding in some rows of an index, which the detail ends with."""
         if not len(rows):
             return cls(what, column, 0, None, None, detail)
         where = f", {period_of(index, rows)}" if period else ""
@@ -137,16 +102,14 @@ class RecordFinding(NamedTuple):
 
 
 def period_of(index: pd.Index, rows: NDArray) -> str:
-    """First and last of some rows, as a sentence names them."""
-    first, last = label_of(index[rows[0]]), label_of(index[rows[-1]])
-    return f"{first} to {last}" if len(rows) > 1 else first
-
-
-def label_of(label: Any) -> str:
-    """How a sentence names a row: by its date, by its time, or by its label."""
-    if not isinstance(label, pd.Timestamp) or label is pd.NaT:
-        return f"row {label}"
-    return f"{label:%Y-%m-%d}" if label == midnight(label) else f"{label:%Y-%m-%d %H:%M}"
+    """First and last of some rows, as a sentence names them: by dates, by times, or by labels."""
+    named = []
+    for label in (index[rows[0]], index[rows[-1]])[: len(rows)]:
+        if not isinstance(label, pd.Timestamp) or label is pd.NaT:
+            named.append(f"row {label}")
+        else:
+            named.append(f"{label:%Y-%m-%d}" if label.time() == time() else f"{label:%Y-%m-%d %H:%M}")
+    return " to ".join(named)
 
 
 def findings_table(findings: Iterable[RecordFinding]) -> pd.DataFrame:
@@ -174,8 +137,6 @@ class RecordFindings(SavesFrames):
         Number of records.
     outliers : DataFrame of bool of shape (n_records, n_modes), optional
         Which frequencies are outliers, on the records' index.
-    memory : MemoryFindings, optional
-        The result of `find_memory`; None where memory was not looked for.
     temperatures, frequencies : array-like or DataFrame, optional
         The tables as they were given, NaN in place of values that cannot be measurements, as `set_aside` gives them.
     left_out : dict, optional
@@ -189,14 +150,13 @@ class RecordFindings(SavesFrames):
     >>> year.temperatures.loc["2025-12":, "T1"] = 20.0
     >>> print(check_records(year.temperatures, year.frequencies))
     1 finding in 365 records.
-    stuck-sensor: 'T1' is 20 °C in 31 rows, 2025-12-01 to 2025-12-31
-        They count as missing. Put NaN where it is stuck
+    stuck: 'T1' is 20 °C in 31 of 365 rows, 2025-12-01 to 2025-12-31
+        They count as missing. Put NaN where a sensor or a mode is stuck
     """
 
     table: pd.DataFrame
     n_rows: int
     outliers: pd.DataFrame | None = None
-    memory: MemoryFindings | None = None
     temperatures: Table | None = None
     frequencies: Table | None = None
     left_out: dict[Hashable, str] = field(default_factory=dict)
@@ -221,7 +181,7 @@ class RecordFindings(SavesFrames):
         return self.summary()
 
     def warnings(self, *, exclude: Collection[str] = ()) -> Iterator[RecordsWarning]:
-        """One warning for each kind of finding.
+        """Warnings of values that count as missing, of columns that are left out, and of each other kind of finding.
 
         Parameters
         ----------
@@ -231,19 +191,36 @@ class RecordFindings(SavesFrames):
         Yields
         ------
         RecordsWarning
-            Its ``kind`` is that of the finding.
+            Of kind "set-aside", "left-out", or the kind of the finding. A small number of records gives none.
         """
+        aside = self.table["what"].isin(ASIDE_KINDS.difference(exclude)) & ~self.table["column"].isin([*self.left_out])
+        if aside.any():
+            n_values, details = self.table["n_rows"][aside].sum(), listed_details(self.table["detail"][aside])
+            count = f"{n_values:,} values cannot be measurements, and count"
+            yield RecordsWarning(
+                f"{'1 value cannot be a measurement, and counts' if n_values == 1 else count} as missing: {details}. "
+                "Repair these sensors, or put NaN there",
+                "set-aside",
+            )
+        if self.left_out:
+            yield RecordsWarning(
+                f"columns are left out, and nothing is said of them: {'; '.join(self.left_out.values())}. Repair these "
+                "sensors, or drop the columns",
+                "left-out",
+            )
         for kind, rows in self.table.groupby("what", sort=False):
-            if kind not in {*ASIDE_KINDS, "few-rows", *exclude}:  # estimators warn of these themselves
+            if kind not in {*ASIDE_KINDS, *LEFT_OUT_KINDS, "few-rows", *exclude}:
                 yield RecordsWarning(WARNINGS[kind].format(listed_details(rows["detail"])), kind)
 
-    def refuse_meaningless(self, *, exclude: Collection[str] = ()) -> None:
+    def refuse_meaningless(self, *, exclude: Collection[str] = (), needs_all: bool = False) -> None:
         """Raise an error that lists everything with which results of a fit would be meaningless.
 
         Parameters
         ----------
         exclude : collection of str, default=()
             Kinds of findings that do no harm to the use of these records.
+        needs_all : bool, default=False
+            Whether a column that is left out makes them meaningless.
 
         Raises
         ------
@@ -251,13 +228,59 @@ class RecordFindings(SavesFrames):
             If the severity of a finding is "meaningless".
         """
         severe = self.table[(self.table["severity"] == "meaningless") & ~self.table["what"].isin(list(exclude))]
-        if len(severe):
-            kinds = severe.groupby("what", sort=False)
-            texts = [WARNINGS[kind].format(listed_details(rows["detail"])) for kind, rows in kinds]
-            raise ValueError(". ".join(text[0].upper() + text[1:] if n else text for n, text in enumerate(texts)))
+        texts = []
+        for kind, rows in severe.groupby("what", sort=False):
+            text = WARNINGS[kind].format(listed_details(rows["detail"]))
+            texts.append(text[0].upper() + text[1:] if texts else text)
+        if needs_all and self.left_out and not texts:
+            texts = [f"columns cannot be used: {'; '.join(self.left_out.values())}; expected measurements in each"]
+        if texts:
+            raise ValueError(". ".join(texts))
 
 
-def listed_details(details: pd.Series) -> str:
+@dataclass(frozen=True)
+class SetAside(SavesFrames):
+    """Tables with NaN in place of values that cannot be measurements, and a table of these values.
+
+    Parameters
+    ----------
+    temperatures, frequencies : array-like or DataFrame, or None
+        The tables as they were given, NaN where a value was set aside.
+    table : DataFrame
+        A row for each finding, as in `RecordFindings`: which values count as missing, and why.
+    left_out : dict
+        Columns that cannot be used at all, each with the reason.
+    others : RecordFindings
+        What else was found, which is doubtful.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss_campaign
+    >>> from skthermo.preprocessing import set_aside
+    >>> year = make_truss_campaign(random_state=0)
+    >>> found = set_aside(year.temperatures, year.frequencies)
+    >>> len(found.table), found.left_out
+    (0, {})
+    """
+
+    temperatures: Table | None
+    frequencies: Table | None
+    table: pd.DataFrame
+    left_out: dict[Hashable, str]
+    others: RecordFindings
+
+    def warnings(self) -> Iterator[RecordsWarning]:
+        """One warning that counts and names the values, and one that names the columns that are left out.
+
+        Returns
+        -------
+        iterator of RecordsWarning
+            Of kind "set-aside" or "left-out".
+        """
+        return RecordFindings(self.table, 0, left_out=self.left_out).warnings()
+
+
+def listed_details(details: Any) -> str:
     """Details of at most a dozen findings one after the other."""
     rest = len(details) - 12
     return "; ".join([*details[:12], *([f"and {rest} more"] if rest > 0 else [])])

@@ -18,7 +18,7 @@ import pandas as pd
 
 from skthermo._core.files import write_when_complete
 from skthermo._core.frames import as_moment
-from skthermo.fleet import Fleet
+from skthermo.monitoring import Fleet
 from skthermo.reporting._settings import settings_of, versions
 from skthermo.reporting._templates import Row, rendered, rows_of
 from skthermo.reporting.fleet._bridge import FAILED, UNKNOWN_STATES, UNWATCHED, Bridge

@@ -10,7 +10,7 @@ import pandas as pd
 
 from skthermo._core.frames import midnight, midnights_between
 from skthermo.fem import Structure
-from skthermo.plotting import MonitorDisplay, StructureDisplay
+from skthermo.plotting import DamageIndexDisplay, PredictionDisplay, StructureDisplay
 from skthermo.reporting._chart import chart
 from skthermo.reporting._figures import draw, fold_legend
 from skthermo.reporting._html import Html
@@ -61,8 +61,14 @@ def draw_span(standing: Standing, span: Span, title: str, alt: str) -> Html:
     """Damage index of each record, or the highest and the median of each day."""
     what = "all of the service" if span.name == "service" else f"the last {span.name}"
     values = Values(f"damage index of {what}", span.table.rename_axis("date"))
-    options = {"by": "record"} if span.name == "month" else {}
-    return _drawn(standing, alt, title, values=values, start=span.start, parts=["index"], **options)
+    by = "record" if span.name == "month" else "day"
+
+    def make() -> DamageIndexDisplay:
+        display = DamageIndexDisplay.from_estimator(standing.monitor, start=span.start, by=by)
+        fold_legend(display.figure_, "outside lower center")
+        return display
+
+    return draw(make, alt, title, height=3.4, values=values)
 
 
 def losses_on(structure: Structure | None, losses: Mapping[str, float]) -> dict[str, float]:
@@ -105,17 +111,9 @@ def draw_drift(standing: Standing, alt: str) -> list[Html]:
     changes = 100 * days[columns].astype(float)
     changes = changes.set_axis([f"change of {str(name).removeprefix('drift ')} (%)" for name in columns], axis=1)
     values = Values("change of stiffness", changes.rename_axis("date"))
-    return [_drawn(standing, alt, parts=["drift"], height=3.0, values=values)]
+    shown = changes.set_axis([str(name).removeprefix("drift ") for name in columns], axis=1)
 
+    def make() -> PredictionDisplay:
+        return PredictionDisplay.from_predictions(shown, unit="%", kind="lines", quantity="change")
 
-def _drawn(
-    standing: Standing, alt: str, title: str = "", *, values: Values, height: float = 3.4, **options: object
-) -> Html:
-    """A display of the monitor, with its legend below."""
-
-    def make() -> MonitorDisplay:
-        display = MonitorDisplay.from_estimator(standing.monitor, **options)
-        fold_legend(display.figure_, "outside lower center")
-        return display
-
-    return draw(make, alt, title, height=height, values=values)
+    return [draw(make, alt, height=1.0 + 1.4 * len(columns), values=values)]

@@ -117,11 +117,6 @@ class Standing:
         return not len(self.opened("damage")) and bool(len(self.opened(SET_ASIDE)))
 
     @property
-    def hold(self) -> pd.Timedelta:
-        """Time for which the index stays low until an event ends."""
-        return pd.Timedelta(self.monitor.false_alarm_estimate_.rule.hold)
-
-    @property
     def doubt(self) -> Doubt:
         """Why it is not known whether the structure is healthy, and since when."""
         since, reason = self.last, ""

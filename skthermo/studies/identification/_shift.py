@@ -242,7 +242,7 @@ def _worth(noun: str, number: int, independent: float) -> str:
 
 def left_out_rows(fem: Any, T: Any, theta: Array, F: Array) -> dict[str, NDArray[np.bool_]]:
     """Rows that cannot be compared, by reason, each with the first reason that holds."""
-    excess = as_floats(fem.extrapolation_distance(T).drop(columns="from_fleet", errors="ignore"))
+    excess = as_floats(fem.extrapolation_distance(T))
     reasons = {
         "without a frequency": np.isnan(F).all(axis=1),
         "without all temperatures and lagged ones": np.isnan(theta).any(axis=1),

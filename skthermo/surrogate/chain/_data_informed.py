@@ -14,7 +14,6 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
 from skthermo._core.arrays import (
@@ -42,11 +41,10 @@ from skthermo._core.estimators import (
     check_takes_weights,
     inputs_of_last_step,
     last_step,
-    offers,
-    rows_from_fleet,
     seed_parts,
     seeded,
     validate_data,
+    with_means,
 )
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like, like_targets, row_weights
 from skthermo._core.saved_frames import SavesFrames
@@ -55,7 +53,8 @@ from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner
-from skthermo.residuals.weather import SensorRegression, TrainingRange
+from skthermo.residuals.sensors import SensorRegression
+from skthermo.residuals.weather import TrainingRange
 from skthermo.surrogate._regression import TemperatureMapper, fit_checked
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate.chain._fit_report import report_of
@@ -109,9 +108,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         M1. By default ``PosteriorInverse(model)``; ``InverseSurrogate()`` is the paper's. Either gets this model if it
         has none. Names such as ``inverse__noise`` in ``set_params`` and grids reach the default parts, too.
     mapper : regressor, optional
-        M2. By default ``TemperatureMapper()``, behind the means of earlier temperatures that
-        `~skthermo.preprocessing.find_memory` finds. With lags of hours, for example ``make_pipeline(LagFeatures(),
-        TemperatureMapper())``.
+        M2. By default ``TemperatureMapper()``. With lags of hours, for example ``make_pipeline(LagFeatures(),
+        TemperatureMapper(means=None))``. Means of earlier temperatures that a mapper chooses are those that explain the
+        frequencies, and ``mapper_`` is a pipeline that begins with them.
     aligner : transformer, "auto" or "passthrough", default="auto"
         Maps measured frequencies onto the model's and back. "auto" is ``BiasAligner(method="scale")``, and
         ``BiasAligner()`` the paper's shift. A `~skthermo.preprocessing.BiasAligner` without a reference gets this
@@ -126,8 +125,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Whether M1, predictions and simulations use a reduced model, as ``reduce`` of `PosteriorInverse` says, which
         gets this value if its own is "auto" (:doc:`/guide/costs`). ``report_`` says which model solved.
     memory : str or joblib.Memory, optional
-        Folder for the checks of the training records and, unless the inverse has a memory of its own, for all that
-        its ``memory`` stores.
+        Folder for the means of earlier temperatures that the records have and, unless the inverse has a memory of its
+        own, for all that its ``memory`` stores.
     n_jobs : int, optional
         Number of parallel jobs when the model is solved for many rows.
     random_state : int, RandomState or None, default=None
@@ -180,11 +179,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     deal with it in another way. If temperatures are a frame, results are frames. A row that cannot be computed, such as
     one without any temperature, is NaN; no row is dropped.
 
-    A mapper whose ``predict`` takes ``return_std``, such as ``TemperatureMapper(BayesianRidge())`` or one that has
-    learned from a fleet, makes standard deviations and intervals as wide as it is uncertain; errors of different
-    parameters count as independent. With ``reach_``, a range of weather, and ``from_fleet(X)``, a mask of rows, a
-    mapper says where it is based on records of others. See :doc:`/guide/records_theory`, :doc:`/guide/estimation` and
-    :doc:`/guide/uncertainty`.
+    A mapper whose ``predict`` takes ``return_std``, such as ``TemperatureMapper(BayesianRidge())`` or a `FleetMapper`,
+    makes standard deviations and intervals as wide as it is uncertain; errors of different parameters count as
+    independent. See :doc:`/guide/records_theory`, :doc:`/guide/estimation` and :doc:`/guide/uncertainty`.
 
     Examples
     --------
@@ -285,9 +282,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         F, self.y_is_vector_ = frequency_table(y)
-        records = checked_records(
-            T, frame_like(F, check_array(F, **options)), self.model, self.memory, uses_means=self.mapper is None
-        )
+        records = checked_records(T, frame_like(F, check_array(F, **options)), self.model)
         T, F, usable = records.temperatures, records.frequencies, records.usable
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
         self._clone_parts(records, has_shapes=shapes is not None)
@@ -298,6 +293,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with collected(), stages.stage("noise"):
             self.sensors_ = SensorRegression.fitted(T)
             filled = frame_like(T, self.sensors_.fill(T)[0])
+            self.mapper_ = mapper = with_means(mapper, filled, usable)
             self.noise_ = measurement_noise(mapper, filled, usable)
         with collected() as findings, stages.stage("inverse", inverse):
             complete = usable if self.imputer_ is None else imputed(self.imputer_, T, usable)
@@ -605,14 +601,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         -------
         DataFrame
             With X's index. A column for each input of M2, lags included: its distance outside the range of the training
-            rows, divided by that range (0 inside). Where the mapper has learned from a fleet, ``from_fleet`` is True in
-            weather that only the fleet has seen.
+            rows, divided by that range (0 inside).
         """
         weather = self.weather(X)
         excess = pd.DataFrame(self.training_range_.excess(weather.inputs), columns=self.training_range_.names)
         excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        if offers(self.mapper_, "from_fleet"):
-            return excess.assign(from_fleet=rows_from_fleet(self.mapper_, weather.filled))
         return excess
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
@@ -668,7 +661,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return self._default_part(name) if part is None or is_auto(part) else clone(part)
 
     def _clone_parts(self, records: CheckedRecords, *, has_shapes: bool) -> None:
-        """Clone inverse, mapper, aligner and imputer, with the model, means of earlier temperatures, and seeds."""
+        """Clone inverse, mapper, aligner and imputer, with the model, and seeds."""
         tolerance(self.model, self.reduce)
         self.inverse_, self.mapper_ = self._part("inverse"), self._part("mapper")
         self.aligner_ = with_reference(None if self.aligner == "passthrough" else self._part("aligner"), self.model)
@@ -678,8 +671,6 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
             if part is not None:
                 seed_parts(part, random_state)
-        if self.mapper is None and records.means is not None:
-            self.mapper_ = make_pipeline(records.means, self.mapper_)
 
     def _recorder(
         self, T: Table, F: Table, filled: Table, usable: Table, theta: Array, weights: Array | None
@@ -740,7 +731,7 @@ def imputed(imputer: BaseEstimator, T: Table, F: Table) -> Table:
 
 
 def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
-    """Parameters as a mapper learns them: a frame, as one that has learned from a fleet knows them by name."""
+    """Parameters as a mapper learns them: a frame, by whose names a `FleetMapper` knows them."""
     return pd.DataFrame(theta, T.index if isinstance(T, pd.DataFrame) else None, names, copy=False)
 
 

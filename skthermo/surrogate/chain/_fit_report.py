@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._core.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
-from skthermo._core.estimators import last_step, offers, reach_of
+from skthermo._core.estimators import last_step
 from skthermo._core.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import capital
@@ -21,7 +21,8 @@ from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning,
 from skthermo.fem import linearise
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
-from skthermo.residuals.weather import SensorRegression
+from skthermo.residuals.sensors import SensorRegression
+from skthermo.surrogate._fleet_mapper import FleetMapper
 from skthermo.surrogate.chain._records import TrainingRecords, mode_offsets
 from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior, unconverged
 
@@ -37,10 +38,14 @@ class FittedRows(SavesFrames):
     scored: int
     left_out: pd.Series
     filled: pd.DataFrame
+    expected: int
 
     @classmethod
-    def counted(cls, records: TrainingRecords, sensors: SensorRegression) -> FittedRows:
-        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found."""
+    def counted(cls, records: TrainingRecords, sensors: SensorRegression, expected: int) -> FittedRows:
+        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found.
+
+        With fewer than ``expected`` ones the fit is unreliable.
+        """
         T, trained = records.temperatures, records.trained
         inputs, F = as_floats(T), as_floats(records.frequencies)
         deviations, filled, missing = sensors.fill(T)[1], {}, {}
@@ -64,6 +69,7 @@ class FittedRows(SavesFrames):
             scored=min(n_trained, MOST_SCORED),
             left_out=pd.Series(left_out, dtype=int),
             filled=pd.DataFrame.from_dict(filled, orient="index", columns=["rows", "standard deviation", "when"]),
+            expected=expected,
         )
 
     def __repr__(self) -> str:
@@ -81,8 +87,8 @@ class FittedRows(SavesFrames):
         ]
         return lines
 
-    def warnings(self, n_parameters: int, *, knows_fleet: bool, per_parameter: int = 10) -> Iterator[SkthermoWarning]:
-        """Warnings that few rows train, fewer than so many ``per_parameter``, or that most have a filled sensor."""
+    def warnings(self) -> Iterator[SkthermoWarning]:
+        """Warnings that few rows train, or that most have a filled sensor."""
         if 2 * self.trained < self.given:
             yield FewRecordsWarning(
                 "most rows did not train the temperature mapper (report_.rows says why). The chain has learned little "
@@ -90,9 +96,9 @@ class FittedRows(SavesFrames):
                 "imputer=KNNGapImputer()",
                 "rows-left-out",
             )
-        if self.trained < per_parameter * n_parameters and not knows_fleet:
+        if self.trained < self.expected:
             yield FewRecordsWarning(
-                f"fewer than {per_parameter} complete rows for each parameter train the temperature mapper. The fit is "
+                "fewer than 10 complete rows for each parameter train the temperature mapper. The fit is "
                 "unreliable. Give a season or a year of records",
                 "few-rows",
             )
@@ -194,11 +200,6 @@ class FitReport(SavesFrames):
         Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
     findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
-    fleet : DataFrame or None
-        With a mapper that has learned from a fleet: lowest and highest value of each input in these records and in the
-        fleet's.
-    pooling_probability : mapping or None
-        Probability that the structure behaves as the fleet does, by family, where the mapper gives it.
     doubts : list of SkthermoWarning
         What `fit` has found doubtful in the records and by its parts, a finding of each kind.
 
@@ -220,8 +221,6 @@ class FitReport(SavesFrames):
     parameters: FittedParameters
     solved: str
     findings: RecordFindings
-    fleet: pd.DataFrame | None
-    pooling_probability: Mapping[Any, float] | None
     doubts: list[SkthermoWarning]
 
     def __repr__(self) -> str:
@@ -243,15 +242,6 @@ class FitReport(SavesFrames):
                 "of them."
             )
         lines += self.parameters.sentences
-        if self.fleet is not None:
-            lines.append(
-                f"Outside the weather of these records, predictions are based on the fleet: {self._listed_weather()}."
-            )
-        if self.pooling_probability is not None:
-            listed = ", ".join(f"{name!r} {share:.0%}" for name, share in self.pooling_probability.items())
-            lines.append(f"Probability that the structure behaves as the fleet does: {listed}.")
-        if getattr(self.findings.memory, "features", None) is not None:
-            lines.append(self.findings.memory.summary())
         if len(self.findings.table):
             lines.append(self.findings.summary())
         return [*lines, f"MAPE is in-sample, of {self.rows.scored} rows spread evenly over the training rows."]
@@ -265,16 +255,6 @@ class FitReport(SavesFrames):
         """Whether the aligner hides offsets between measurement and model that weather does not explain."""
         return self.unexplained_offset > 1
 
-    def _listed_weather(self) -> str:
-        """The inputs that the fleet has seen farthest beyond these records."""
-        own = self.fleet["highest"] - self.fleet["lowest"]
-        farther = (self.fleet["fleet highest"] - self.fleet["fleet lowest"]) / own.where(own > 0, 1.0)
-        widest = self.fleet.loc[farther.sort_values(ascending=False, kind="stable").index[:3]]
-        return ", ".join(
-            f"{name!r} from {lowest:.3g} to {highest:.3g}, here {own_lowest:.3g} to {own_highest:.3g}"
-            for name, own_lowest, own_highest, lowest, highest in widest.itertuples()
-        )
-
     def warnings(self) -> Iterator[SkthermoWarning]:
         """Warnings of `fit`, one of each kind: its doubts, and those about the rows, the modes and the outliers.
 
@@ -284,7 +264,7 @@ class FitReport(SavesFrames):
             Its text stands in the report, too.
         """
         yield from self.doubts
-        yield from self.rows.warnings(len(self.parameters.deviations), knows_fleet=self.fleet is not None)
+        yield from self.rows.warnings()
         modes, far = self.modes, self.findings.outliers.to_numpy()
         if modes["MAPE"].mean() > 1.2 * modes["MAPE of the mean"].mean():
             worst = (modes["MAPE"] / modes["MAPE of the mean"]).idxmax()
@@ -338,15 +318,14 @@ def named(columns: Iterable[Any]) -> str:
 def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequence[SkthermoWarning]) -> FitReport:
     """The report of a chain that is fitted otherwise; its inverse has ``found`` parameters of the records."""
     modes, unexplained = modes_of(chain)
+    expected = 0 if isinstance(last_step(chain.mapper_), FleetMapper) else 10 * len(chain.parameter_names_)
     return FitReport(
-        rows=FittedRows.counted(chain.records_, chain.sensors_),
+        rows=FittedRows.counted(chain.records_, chain.sensors_, expected),
         modes=modes,
         unexplained_offset=unexplained,
         parameters=FittedParameters.found(chain, found, modes["scatter"].to_numpy() / 100),
         solved=chain.simulator_.described,
         findings=findings,
-        fleet=weather_of_fleet(chain),
-        pooling_probability=getattr(last_step(chain.mapper_), "pooling_probability_", None),
         doubts=list({doubt.kind: doubt for doubt in doubts}.values()),
     )
 
@@ -376,15 +355,6 @@ def modes_of(chain: Any) -> tuple[pd.DataFrame, float]:
     errors = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
     unexplained = unexplained_offset(table["hidden offset"], of_model, records.temperatures, errors)
     return pd.DataFrame(table, index=chain.mode_names_), unexplained
-
-
-def weather_of_fleet(chain: Any) -> pd.DataFrame | None:
-    """Range of each input in the chain's own records, and in the records of the fleet that taught its mapper."""
-    if not offers(chain.mapper_, "from_fleet") or not offers(chain.mapper_, "reach_"):
-        return None
-    own, fleet = chain.training_range_, reach_of(chain.mapper_, chain.records_.temperatures)[0]
-    limits = np.column_stack([own.lowest, own.highest, fleet.lowest, fleet.highest])
-    return pd.DataFrame(limits, index=list(own.names), columns=["lowest", "highest", "fleet lowest", "fleet highest"])
 
 
 def periods(T: Table, rows: NDArray[np.bool_]) -> str:

@@ -8,20 +8,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from joblib import Memory
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import Array, as_columns, as_floats, median, refuse_no_table, robust_deviation, spread_evenly
-from skthermo._core.estimators import _safe_indexing, last_step, predict_with_std, reach_of
+from skthermo._core.estimators import _safe_indexing, last_step
 from skthermo._core.frames import Table, column_names, frame_like, row_times
-from skthermo._core.memory import remembered
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel, match_modes
-from skthermo.preprocessing import BlockedKFold, RecordFindings, check_records, set_aside
+from skthermo.preprocessing import BlockedKFold, RecordFindings, check_records
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import misplaced_columns, unseen_weather
@@ -110,7 +108,7 @@ class TrainingRecords(SavesFrames):
             rows = train[has_theta[train]]
             targets, own_weights = pd.DataFrame(theta[rows], columns=names), None if weights is None else weights[rows]
             fitted = fit_checked(clone(learner), inputs[rows], targets, own_weights)
-            return lambda test: stated_by(fitted, inputs[test])
+            return lambda test: as_columns(fitted.predict(inputs[test]))
 
         def learn_discrepancy(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
             # ratios to predictions that are out of fold themselves, so that the model is not solved for each fold
@@ -119,35 +117,15 @@ class TrainingRecords(SavesFrames):
             others = Discrepancy.fitted(model.discrepancy.regressor, inputs[rows], ratios[rows], own_weights)
             return lambda test: others.at(inputs[test])
 
-        found = out_of_fold(learn_parameters, fold_of)
-        predicted, deviations, beyond = np.split(found, [len(names), 2 * len(names)], axis=1)
+        predicted = out_of_fold(learn_parameters, fold_of)
         modelled = model.frequencies(predicted)
         ratios = self.usable[order] / modelled
         values = measured / (modelled * np.exp(out_of_fold(learn_discrepancy, fold_of))) - 1
         known = ~np.isnan(values).all(axis=1)
-        residuals = BaselineResiduals(
-            inputs[known], values[known], own[known], fold_of[known], order[known], (theta / predicted)[known]
-        )
-        reach = reach_of(learner, inputs)
-        if reach is None:
-            consequence = "Standard deviations, intervals and noise are unreliable there"
-            return replace(residuals, findings=tuple(unseen_weather(records, fold_of, consequence)))
-        errors = model.propagated(predicted, np.nan_to_num(deviations))[known]
-        return replace(residuals, errors=errors, reach=reach[0], beyond=beyond[known, 0])
-
-
-def stated_by(mapper: BaseEstimator, inputs: Array) -> Array:
-    """Predictions of a fitted mapper, standard deviations, and how far inputs are outside its weather, side by side.
-
-    Only a mapper with ``reach_``, the weather that it is based on, says the latter two.
-    """
-    reach = reach_of(mapper, inputs)
-    if reach is None:  # standard deviations of such a mapper are added to the scatter of all residuals
-        theta = as_columns(mapper.predict(inputs))
-        return np.column_stack([theta, np.full_like(theta, np.nan), np.zeros(len(inputs))])
-    theta, deviations = predict_with_std(mapper, inputs)
-    deviations = np.full_like(theta, np.nan) if deviations is None else deviations
-    return np.column_stack([theta, deviations, reach[0].excess(reach[1]).mean(axis=1)])
+        consequence = "Standard deviations, intervals and noise are unreliable there"
+        doubts = tuple(unseen_weather(records, fold_of, consequence))
+        ratios = (theta / predicted)[known]
+        return BaselineResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], ratios, doubts)
 
 
 def remembering_folds(records: Table, inputs: Array, own: Array) -> NDArray[np.intp]:
@@ -172,41 +150,30 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
 class CheckedRecords(NamedTuple):
     """Records that a chain learns, without values that cannot be; ``usable`` frequencies are without outliers.
 
-    ``findings`` is what `check_records` has found, ``means`` the transformer that gives means of earlier temperatures
-    which the frequencies remember, if they do, and ``doubts`` hold warnings.
+    ``findings`` is what `check_records` has found, and ``doubts`` hold warnings.
     """
 
     temperatures: Table
     frequencies: Table
     usable: Table
     findings: RecordFindings
-    means: BaseEstimator | None
     doubts: list[SkthermoWarning]
 
 
-def checked_records(
-    T: Table, F: Table, model: FEModel, memory: str | Memory | None, *, uses_means: bool
-) -> CheckedRecords:
-    """Check the records that a chain was given, once for all of its parts.
-
-    There is no warning of outliers, which train nothing, nor of slow temperatures for a chain that uses means of them.
-    """
-    with collected() as doubts:
-        found = set_aside(T, F, model=model, needs_all=True)
-    findings = remembered(memory, check_records, T, F)
-    T, F = found.temperatures, found.frequencies
-    mended = {"frequency-outliers"} | ({"slow-temperatures"} if uses_means else set())
-    doubts += [*findings.warnings(exclude=mended), *misplaced_columns(T, F), *doubts_of_modes(model, F)]
-    means = getattr(findings.memory, "features", None)
-    if means is not None and not set(means.sensors) <= set(column_names(T, "T")):
-        means = None
-    far = findings.outliers
-    if isinstance(F, pd.DataFrame) and far.index.is_unique:  # findings may be of longer tables
-        far = far.reindex(index=F.index, columns=F.columns, fill_value=False)
-    usable = F
-    if far.shape == F.shape and far.to_numpy().any():
+def checked_records(T: Table, F: Table, model: FEModel) -> CheckedRecords:
+    """Check the records that a chain was given, once for all of its parts; outliers train nothing."""
+    findings = check_records(T, F, model=model)
+    findings.refuse_meaningless(needs_all=True)
+    T, F = findings.temperatures, findings.frequencies
+    doubts = [
+        *findings.warnings(exclude={"frequency-outliers"}),
+        *misplaced_columns(T, F),
+        *doubts_of_modes(model, F),
+    ]
+    far, usable = findings.outliers.to_numpy(), F
+    if far.any():
         usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))
-    return CheckedRecords(T, F, usable, findings, means, doubts)
+    return CheckedRecords(T, F, usable, findings, doubts)
 
 
 def mode_offsets(model: FEModel, F: Table) -> pd.Series:

@@ -28,14 +28,13 @@ from skthermo._core.estimators import (
     inputs_of_last_step,
     last_step,
     predict_with_std,
-    reach_of,
-    rows_from_fleet,
 )
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
-from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
-from skthermo.residuals.weather import PredictionError, SensorRegression, TrainingRange, filled_text, unpredicted_text
+from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
+from skthermo.residuals.sensors import PredictionError, SensorRegression, filled_text
+from skthermo.residuals.weather import TrainingRange, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
 from skthermo.surrogate._simulator import Simulator
 
@@ -59,12 +58,13 @@ class LearnedRatios(NamedTuple):
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
-    Regressors have ``learned`` the ratios from inputs of the ``mapper``. It is 0 for modes with few records, and for
-    all without a ``regressor``.
+    Regressors have ``learned`` the ratios from inputs of the ``mapper``, within ``limits``, beyond which it stays as it
+    is there. It is 0 for modes with few records, and for all without a ``regressor``.
     """
 
     regressor: BaseEstimator | None
     learned: tuple[LearnedRatios, ...]
+    limits: Array
     n_modes: int
     sensors: SensorRegression | None = None
     mapper: Any = None
@@ -88,10 +88,11 @@ class Discrepancy:
         A mode with a ratio ``far`` from its median, in robust deviations of its logarithm, leaves out the row. Modes
         with the ``fewest`` rows learn, from at ``most`` so many, spread evenly.
         """
-        n_modes = ratios.shape[1]
-        if regressor is None:
-            return cls(None, (), n_modes, sensors, mapper)
+        n_modes, n_inputs = ratios.shape[1], inputs.shape[1]
         usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
+        if regressor is None or not usable.any():
+            return cls(None, (), np.zeros((2, n_inputs)), n_modes, sensors, mapper)
+        limits = np.stack([inputs[usable].min(axis=0), inputs[usable].max(axis=0)])
         logs, learned = np.log(np.where(usable[:, np.newaxis], ratios, np.nan)), []
         with np.errstate(invalid="ignore"):
             is_far = np.abs(logs - median(logs)) > far * robust_deviation(logs)
@@ -106,7 +107,7 @@ class Discrepancy:
             is_ours = isinstance(regressor, TemperatureMapper)
             known = (clone(regressor), inputs[rows], values, own)
             learned.append(LearnedRatios(modes, fit_checked(*known) if is_ours else fit_outputs(*known)))
-        return cls(regressor, tuple(learned), n_modes, sensors, mapper)
+        return cls(regressor, tuple(learned), limits, n_modes, sensors, mapper)
 
     def __call__(self, X: Table) -> Array:
         """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
@@ -120,7 +121,7 @@ class Discrepancy:
         delta = np.full((len(inputs), self.n_modes), np.nan)
         delta[known] = 0.0
         for modes, regressor in self.learned if known.any() else ():
-            delta[np.ix_(known, modes)] = np.log(as_columns(regressor.predict(inputs[known])))
+            delta[np.ix_(known, modes)] = np.log(as_columns(regressor.predict(np.clip(inputs[known], *self.limits))))
         return delta
 
 
@@ -186,16 +187,7 @@ class ThermalModel(SavesFrames):
         message = unpredicted_text(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled))
         if message:
             findings.append(UnevaluatedRowsWarning(message, "not-predicted"))
-        reach, inputs = reach_of(self.mapper, weather.filled) or (self.training_range, weather.inputs)
-        findings += reach.doubts(inputs)
-        if rows_from_fleet(self.mapper, weather.filled).any():
-            findings.append(
-                WeatherWarning(
-                    "rows are in weather outside the training records, and are predicted from the fleet. Standard "
-                    "deviations and intervals include that uncertainty. Fit again when there are such records",
-                    "rows-from-fleet",
-                )
-            )
+        findings += self.training_range.doubts(weather.inputs)
         if weather.impossible.any():
             findings.append(
                 ModelWarning(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from numbers import Integral, Real
-from typing import Any, Literal, overload
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 import pandas as pd
@@ -38,7 +38,6 @@ from skthermo._core.estimators import (
 )
 from skthermo._core.frames import column_names, frame_like, row_times
 from skthermo._core.memory import remembered
-from skthermo._core.parallel import with_progress
 from skthermo._core.text import listed, percent
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import FewRecordsWarning, ModelWarning
@@ -46,19 +45,12 @@ from skthermo.fem import FEModel, evaluate
 from skthermo.fem.affine import ResponseSurface, n_terms
 from skthermo.surrogate._regression import FrequencyInverse
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse._steps import (
-    Linearise,
-    Local,
-    Objective,
-    Refined,
-    ShapeInputs,
-    deviations,
-    information,
-    minimise,
-    refine,
-)
+from skthermo.surrogate.inverse._shapes import ShapeInputs, shape_misfit
 
 LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the relative noise that records teach
+Linearise = Callable[[Array], tuple[Array, ...]]
+"""Frequencies, (n_rows, n_modes), and d ln f / d ln theta, (n_rows, n_modes, n_parameters), at rows of theta; with
+sensors also shapes, (n_rows, n_sensors, n_modes), and d phi / d ln theta."""
 
 
 @dataclass(frozen=True)
@@ -108,11 +100,11 @@ class LinearRecords:
     slopes: Array
 
     @classmethod
-    def around(cls, local: Local, missing: NDArray[np.bool_]) -> LinearRecords:
-        """Records by the linear model of an objective at some ln theta."""
-        values = local.residual + np.einsum("smp,sp->sm", local.sensitivity, local.x)
-        usable = ~missing & np.isfinite(values) & np.isfinite(local.sensitivity).all(axis=2)
-        return cls(np.where(usable, values, np.nan), np.where(usable[:, :, np.newaxis], local.sensitivity, 0.0))
+    def around(cls, x: Array, residual: Array, slopes: Array, missing: NDArray[np.bool_]) -> LinearRecords:
+        """Records by the model linearised at ln theta = x, which leaves residuals of the observations there."""
+        usable = ~missing & np.isfinite(residual) & np.isfinite(slopes).all(axis=2)
+        values = residual + np.einsum("smp,sp->sm", slopes, x)
+        return cls(np.where(usable, values, np.nan), np.where(usable[:, :, np.newaxis], slopes, 0.0))
 
     def near(self, prior: ThermalPrior, noise: Array, *, far: float = 5.0) -> LinearRecords:
         """Records without observations that are ``far`` standard deviations from what prior and noise expect."""
@@ -196,11 +188,11 @@ def least_noise(log_frequencies: Array) -> Array:
 
 @dataclass(frozen=True)
 class ThermalPosterior:
-    """ThermalPosterior modes of records, by an FE model or by a surface in its place.
+    """Prior, noise and model, by which records have posterior modes of ln theta.
 
     ``noise`` holds standard deviations of all observations, frequencies and components of shapes, (n_observations,).
-    Rows start where the response ``surface`` has its posterior mode. A model without derivatives, ``is_program``, takes
-    no steps of its own, and was run ``n_runs`` times.
+    Steps start on the response ``surface``, which takes the place of a model without derivatives, a program: it was run
+    ``n_runs`` times.
     """
 
     simulator: Simulator
@@ -212,88 +204,220 @@ class ThermalPosterior:
     is_program: bool
     n_runs: int = 0
 
-    def linearise(self, simulator: Simulator, n_jobs: int | None) -> Linearise:
-        """Frequencies and, perhaps, shapes by a simulator, with their derivatives by ln theta."""
-        dofs = None if self.shapes is None else self.shapes.dofs
-        return partial(simulator.linearise, n_jobs=n_jobs, dofs=dofs, relative=True)
-
-    def objective(self, inputs: Array, n_jobs: int | None) -> Objective:
-        """The objective of rows of inputs, by the reduced model where there is one.
+    def observed(self, inputs: Array) -> Observed:
+        """What rows of inputs tell.
 
         Frequencies count as exact to 1e-6 at most. Where modes are missing, many parameters fit the others, and a noise
         of 1e-3 lets steps move along the curve of these parameters.
         """
         frequencies = inputs[:, : self.n_modes]
         units = np.empty((*frequencies.shape, 0)) if self.shapes is None else self.shapes.unit_shapes(inputs)
-        gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
         noise = np.tile(self.noise, (len(inputs), 1))
-        noise[:, : self.n_modes] = np.maximum(self.noise[: self.n_modes], np.where(gaps, 1e-3, 1e-6))
-        is_by_surface = self.is_program and self.surface is not None
-        linearise = self.surface.linearise if is_by_surface else self.linearise(self.simulator.approximate, n_jobs)
+        has_gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
+        noise[:, : self.n_modes] = np.maximum(noise[:, : self.n_modes], np.where(has_gaps, 1e-3, 1e-6))
         missing = np.isnan(np.hstack([frequencies, units.reshape(len(units), -1)]))
-        return Objective(linearise, np.log(frequencies), noise, self.prior.precision, units, missing)
+        return Observed(np.log(frequencies), units, np.where(missing, np.inf, noise))
 
-    def refined(self, objective: Objective, n_jobs: int | None) -> Refined:
-        """Refine rows, a few chunks of the model at a time, so that progress is visible."""
-        n_rows = len(objective.log_measured)
-        start = np.zeros((n_rows, len(self.prior.own)))
+    def linearised(self, theta: Array, n_jobs: int | None, *, exactly: bool = False) -> tuple[Array, ...]:
+        """The model at rows of theta, relative derivatives included; unless ``exactly``, the reduced one if there is
+        one, in any row."""
+        simulator = Simulator(self.simulator.model) if exactly else self.simulator.approximate
+        return simulator.linearise(theta, n_jobs, None if self.shapes is None else self.shapes.dofs, relative=True)
+
+    def modes(self, observed: Observed, n_jobs: int | None) -> PosteriorModes:
+        """Posterior modes of rows: by the surface, then by the model, and by the full one outside the reduced one's
+        box."""
+        precision, start = self.prior.precision, np.zeros((len(observed.noise), len(self.prior.own)))
         if self.surface is not None:
-            by_surface = replace(objective.without_shapes(), linearise=self.surface.linearise)
-            found = minimise(by_surface, start)
+            found = posterior_modes(self.surface.linearise, observed, precision, start)
             if self.is_program:
                 return found
-            start = found.local.x
-        size = 8 * getattr(self.simulator.approximate.model, "rows_per_chunk", 32)
-        blocks = map(slice, range(0, n_rows, size), range(size, n_rows + size, size))
-        refine_block = partial(self._refine_block, objective, start, n_jobs)
-        parts = with_progress(map(refine_block, blocks), n_rows, None, count=Refined.__len__, unit="records")
-        return Refined.together([*parts])
-
-    def _refine_block(self, objective: Objective, start: Array, n_jobs: int | None, rows: slice) -> Refined:
-        """Refine rows; where the steps of a reduced model end outside its box, the full model takes the last ones."""
-        some = objective.some(rows)
-        found = refine(some, start[rows], sorts=not getattr(self.simulator.model, "track", False))
-        if self.simulator.reduced is None:
-            return found
-        outside = np.flatnonzero(self.simulator.outside(np.exp(found.local.x)))
-        if outside.size:
-            full = self.linearise(Simulator(self.simulator.model), n_jobs)
-            last = minimise(replace(some.some(outside), linearise=full), found.local.x[outside])
-            last.full_solves += last.solves
-            last.solves += found.solves[outside]
-            found.put(outside, last)
+            start = found.x
+        model = partial(self.linearised, n_jobs=n_jobs)
+        found = posterior_modes(model, observed, precision, start)
+        if not getattr(self.simulator.model, "track", False):
+            found = beyond_crossings(model, observed, precision, found)
+        outside = self.simulator.outside(np.exp(found.x)) if self.simulator.reduced is not None else np.zeros(1, bool)
+        if (rows := np.flatnonzero(outside)).size:
+            exact = partial(self.linearised, n_jobs=n_jobs, exactly=True)
+            last = posterior_modes(exact, observed.some(rows), precision, found.x[rows])
+            last.full_solves[:] = last.solves
+            found.put(rows, last)
         return found
+
+
+class Observed(NamedTuple):
+    """Measured ln f, (n_rows, n_modes), mode shapes of unit length, (n_rows, n_modes, n_sensors), and standard
+    deviations of both, (n_rows, n_observations), infinite where one is missing."""
+
+    log_frequencies: Array
+    units: Array
+    noise: Array
+
+    def some(self, rows: NDArray[np.intp]) -> Observed:
+        """Some of the rows."""
+        return Observed(*(values[rows] for values in self))
+
+    def beside(self, frequencies: Array, slopes: Array, *shapes: Array) -> tuple[Array, Array]:
+        """Residuals beside a solved model, 0 where one is missing, and derivatives of the observations by ln theta.
+
+        A model that gives no shapes, such as a surface, is compared with the frequencies alone.
+        """
+        residual = self.log_frequencies - np.log(frequencies)
+        if shapes:
+            misfit, change = shape_misfit(self.units, *shapes)
+            residual, slopes = np.hstack([residual, misfit]), np.hstack([slopes, change])
+        return np.where(np.isinf(self.noise[:, : residual.shape[1]]), 0.0, residual), slopes
+
+
+class PosteriorModes(NamedTuple):
+    """Where the steps of each row end, ln theta = x, with objective, residuals and derivatives there; how they end."""
+
+    x: Array
+    value: Array
+    residual: Array
+    slopes: Array
+    converged: NDArray[np.bool_]
+    stalled: NDArray[np.bool_]
+    solves: NDArray[np.intp]
+    full_solves: NDArray[np.intp]
+
+    def put(self, rows: NDArray[np.intp], other: PosteriorModes) -> None:
+        """Put other ends of some rows in place; solves of both count."""
+        for name, values in zip(self._fields, other, strict=True):
+            mine = getattr(self, name)
+            mine[rows] = values + (mine[rows] if name.endswith("solves") else 0)
+
+
+def posterior_modes(
+    linearise: Linearise,
+    observed: Observed,
+    precision: Array,
+    start: Array,
+    *,
+    n_steps: int = 100,
+    share: float = 0.01,
+    least: float = 1e-6,
+    last_damping: float = 1e8,
+) -> PosteriorModes:
+    """Posterior modes of ln theta by Gauss-Newton steps, each damped more where one would raise the objective.
+
+    The objective is half of the squared residuals over the noise and of ln theta in its prior. A step is a row's last
+    one if it is less than a share of the posterior standard deviations and curvature along it is less than a tenth of
+    that share of the noise, or if it is less than ``least``, or would gain less than rounding hides. At
+    ``last_damping``, a share of the diagonal of the Hessian, a row stalls.
+    """
+
+    def objective(x: Array, residual: Array, noise: Array) -> Array:
+        value = 0.5 * (((residual / noise) ** 2).sum(axis=1) + ((x @ precision) * x).sum(axis=1))
+        return np.where(np.isfinite(value), value, np.inf)
+
+    x = start.copy()
+    residual, slopes = observed.beside(*linearise(np.exp(x)))
+    noise = observed.noise[:, : residual.shape[1]]
+    value, damping = objective(x, residual, noise), np.zeros(len(x))
+    converged, solves, active = np.zeros(len(x), dtype=bool), np.ones(len(x), dtype=np.intp), np.arange(len(x))
+    active = active[np.isfinite(value)]
+    for _ in range(n_steps):
+        hessian = information(slopes[active], noise[active], precision)
+        pull = np.einsum("smp,sm->sp", slopes[active], residual[active] / noise[active] ** 2) - x[active] @ precision
+        step = gauss_newton(hessian, pull, np.zeros(len(active)))
+        gain = 0.5 * (pull * step).sum(axis=1)
+        smallest = np.minimum(
+            share * deviations(hessian), np.sqrt(0.1 * share * noise[active].min(axis=1, keepdims=True))
+        )
+        is_last = (np.abs(step) <= np.maximum(least, smallest)).all(axis=1) | (gain <= 1e-10 * value[active])
+        ended = active[is_last]
+        x[ended] += step[is_last]
+        residual[ended] -= np.einsum("smp,sp->sm", slopes[ended], step[is_last]) * np.isfinite(noise[ended])
+        value[ended] -= gain[is_last]
+        converged[ended] = True
+        goes_on = ~is_last & (damping[active] < last_damping)
+        active, hessian, pull = active[goes_on], hessian[goes_on], pull[goes_on]
+        if not len(active):
+            break
+        tried = x[active] + gauss_newton(hessian, pull, damping[active])
+        there, slopes_there = observed.some(active).beside(*linearise(np.exp(tried)))
+        solves[active] += 1
+        value_there = objective(tried, there, noise[active])
+        is_lower = value_there < value[active]
+        damping[active] = np.where(is_lower, damping[active] / 30, np.maximum(1e-3, 5 * damping[active]))
+        damping[damping < 1e-4] = 0.0
+        rows = active[is_lower]
+        x[rows], residual[rows], slopes[rows] = tried[is_lower], there[is_lower], slopes_there[is_lower]
+        value[rows] = value_there[is_lower]
+    stalled = ~converged & ((damping > 0) | np.isinf(value))
+    return PosteriorModes(x, value, residual, slopes, converged, stalled, solves, np.zeros_like(solves))
+
+
+def beyond_crossings(
+    linearise: Linearise, observed: Observed, precision: Array, found: PosteriorModes, *, large: float = 3.0
+) -> PosteriorModes:
+    """Posterior modes of a model that sorts its modes, some of them beyond a crossing of two of these.
+
+    A row whose root mean square misfit is ``large``, in standard deviations of the noise, starts again where the two
+    modes fit in exchanged order, and ends there if that is better.
+    """
+    n_modes = observed.log_frequencies.shape[1]
+    for lower in range(n_modes - 1):
+        squares = (found.residual / observed.noise[:, : found.residual.shape[1]]) ** 2
+        rows = np.flatnonzero(~found.converged | (squares.mean(axis=1) > large**2))
+        if not rows.size:
+            break
+        order = np.arange(n_modes)
+        order[[lower, lower + 1]] = order[[lower + 1, lower]]
+        some, slopes = observed.some(rows), found.slopes[rows, :n_modes]
+        fitted = some.log_frequencies - found.residual[rows, :n_modes]
+        noise = some.noise[:, order]
+        residual = np.where(np.isinf(noise), 0.0, some.log_frequencies[:, order] - fitted)
+        pull = np.einsum("smp,sm->sp", slopes, residual / noise**2) - found.x[rows] @ precision
+        start = found.x[rows] + gauss_newton(information(slopes, noise, precision), pull, np.zeros(len(rows)))
+        again = posterior_modes(linearise, some, precision, start)
+        is_better = np.flatnonzero(again.value < found.value[rows])
+        found.put(rows[is_better], PosteriorModes(*(values[is_better] for values in again)))
+    return found
+
+
+def information(slopes: Array, noise: Array, precision: Array) -> Array:
+    """Precision of ln theta given derivatives of observations and their noise, infinite where one is missing."""
+    scaled = slopes / noise[:, :, np.newaxis]
+    return scaled.swapaxes(1, 2) @ scaled + precision
+
+
+def gauss_newton(hessian: Array, pull: Array, damping: Array, *, longest: float = 0.5) -> Array:
+    """Steps of rows, damped by a share of the diagonal, that change no ln theta by more than the ``longest``."""
+    diagonal = np.einsum("spp->sp", hessian) * np.maximum(damping, 1e-14)[:, np.newaxis]  # against rounding
+    step = np.linalg.solve(hessian + np.eye(pull.shape[1]) * diagonal[:, np.newaxis], pull[:, :, np.newaxis])[:, :, 0]
+    return step * np.minimum(1.0, longest / np.maximum(np.abs(step).max(axis=1, keepdims=True), longest))
+
+
+def deviations(hessian: Array) -> Array:
+    """Standard deviations, (n_rows, n_parameters), of Gaussians with these precision matrices."""
+    diagonal = np.einsum("spp->sp", hessian)
+    regular = hessian + 1e-14 * np.eye(diagonal.shape[1]) * diagonal[:, np.newaxis]  # rounding could make it singular
+    return np.sqrt(np.abs(np.einsum("spp->sp", np.linalg.inv(regular))))
 
 
 def inverted(taught_by: Any, inputs: Array, posterior: ThermalPosterior, n_jobs: int | None) -> Bunch:
     """What `PosteriorInverse.invert` gives, for rows of inputs; a memory knows a posterior by what has taught it."""
-    shape, some = (len(inputs), len(posterior.prior.own)), ~np.isnan(inputs).all(axis=1)
-    result = Bunch(
-        theta=np.full(shape, np.nan),
-        std=np.full(shape, np.nan),
-        residuals=np.full((len(inputs), posterior.n_modes), np.nan),
-        weight=np.zeros(len(inputs)),
-        converged=np.zeros(len(inputs), dtype=bool),
-        solves=np.zeros(len(inputs), dtype=np.intp),
-        full_solves=np.zeros(len(inputs), dtype=np.intp),
+    observed, precision = posterior.observed(inputs), posterior.prior.precision
+    found = posterior.modes(observed, n_jobs)
+    slopes = np.nan_to_num(found.slopes)
+    noise, stated = observed.noise[:, : slopes.shape[1]], posterior.noise[: slopes.shape[1]]
+    std = deviations(information(slopes, noise, precision))
+    at_best = deviations(information(slopes, np.where(np.isinf(noise), stated, noise), precision))
+    is_empty = np.isnan(inputs).all(axis=1)
+    unknown = (is_empty | found.stalled)[:, np.newaxis]
+    theta = np.where(unknown, np.nan, np.exp(found.x))
+    return Bunch(
+        theta=theta,
+        std=std * theta,
+        residuals=np.where(unknown | np.isinf(noise), np.nan, found.residual)[:, : posterior.n_modes],
+        weight=np.where(is_empty, 0.0, ((at_best / std) ** 2).mean(axis=1)),
+        converged=found.converged & ~is_empty,
+        solves=found.solves,
+        full_solves=found.full_solves,
     )
-    if not some.any():
-        return result
-    objective = posterior.objective(inputs[some], n_jobs)
-    found = posterior.refined(objective, n_jobs)
-    local, lost = found.local, found.stalled[:, np.newaxis]
-    sensitivity = np.nan_to_num(local.sensitivity)
-    noise, precision = objective.noise, posterior.prior.precision
-    std = deviations(information(sensitivity, np.where(objective.missing, np.inf, noise), precision))
-    at_best = deviations(information(sensitivity, noise, precision))
-    result.theta[some] = np.where(lost, np.nan, np.exp(local.x))
-    result.std[some] = np.where(lost, np.nan, std) * result.theta[some]
-    unknown = lost | np.isnan(objective.log_measured)
-    result.residuals[some] = np.where(unknown, np.nan, local.residual[:, : posterior.n_modes])
-    result.weight[some] = ((at_best / std) ** 2).mean(axis=1)
-    result.converged[some] = found.converged
-    result.solves[some], result.full_solves[some] = found.solves, found.full_solves
-    return result
 
 
 def taught(
@@ -305,7 +429,7 @@ def taught(
     n_jobs: int | None,
     *,
     n_teaching: int = 300,
-    n_passes: int = 4,
+    n_passes: int = 3,
 ) -> ThermalPosterior:
     """A posterior with prior and noise as records teach them, and a model or surface that suits these records.
 
@@ -315,33 +439,27 @@ def taught(
     rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), n_teaching)
     if not len(rows):
         return first
-    n_parameters = len(first.prior.own)
-    at_nominal = first.linearise(first.simulator, n_jobs)(np.ones((1, n_parameters)))
-    nominal = [*map(partial(np.repeat, repeats=len(rows), axis=0), at_nominal)]
-    now, x = first, np.zeros((len(rows), n_parameters))
-    objective = replace(first.objective(inputs[rows], n_jobs), linearise=lambda _: nominal)
+    now, observed, x = first, first.observed(inputs[rows]), np.zeros((len(rows), len(first.prior.own)))
+    solved = tuple(np.repeat(part, len(rows), axis=0) for part in first.linearised(np.exp(x[:1]), n_jobs))
     least = first.noise.copy()
     least[: first.n_modes] = least_noise(np.log(inputs[:, : first.n_modes]))
-    learns = {"learns_prior": learns_prior, "learns_noise": learns_noise}
     runs: list[tuple[Array, Array]] = []
     for number in range(n_passes):
-        records = LinearRecords.around(objective.at(x), objective.missing)
+        records = LinearRecords.around(x, *observed.beside(*solved), np.isinf(observed.noise))
         records = records.near(now.prior, now.noise) if number else records
-        prior, noise = records.learned(now.prior, now.noise, least, **learns)
+        prior, noise = records.learned(
+            now.prior, now.noise, least, learns_prior=learns_prior, learns_noise=learns_noise
+        )
         x = x + np.clip(records.posterior(prior, noise)[0] - x, -1.0, 1.0)
         now = replace(now, prior=prior, noise=noise)
         if now.is_program:
             now = with_runs(now, x, runs, n_jobs) if number < 2 else now
-        elif number == 0:
-            around = Simulator.around(now.simulator.model, np.exp(x), reduce, n_rows=len(inputs))
-            now = replace(now, simulator=around)
+            solved = now.surface.linearise(np.exp(x))
         else:
-            now = replace(now, simulator=now.simulator.extended(np.exp(x)))
-        objective = now.objective(inputs[rows], n_jobs)
-    if now.is_program:
-        return now
-    solved = now.simulator.approximate.linearise(np.exp(x), n_jobs, relative=True)
-    return replace(now, surface=ResponseSurface.fitted(x, *solved))
+            around = Simulator.around(now.simulator.model, np.exp(x), reduce, now.simulator, n_rows=len(inputs))
+            now = replace(now, simulator=around)
+            solved = now.linearised(np.exp(x), n_jobs)
+    return now if now.is_program else replace(now, surface=ResponseSurface.fitted(x, *solved[:2]))
 
 
 def with_runs(

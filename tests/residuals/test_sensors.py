@@ -9,7 +9,7 @@ from sklearn.linear_model import LinearRegression
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning
-from skthermo.residuals.weather import SensorRegression
+from skthermo.residuals.sensors import SensorRegression
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 

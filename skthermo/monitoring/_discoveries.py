@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.stats import false_discovery_control, genpareto
+from scipy.stats import false_discovery_control
 
 from skthermo._core.arrays import Array, check_size
 from skthermo._core.text import counted_number, listed, percent, significant
-from skthermo.monitoring import Monitor
+from skthermo.monitoring._monitor import Monitor
 
-FEWEST_EXCESSES = 80  # of other bridges, from which the shape of the tail is learned
-HEAVIEST = 0.9  # shape of a tail: from 1 on it has no mean
-LONGEST = 100_000  # days
-MOST_TAILS = 100  # that are learned, each from all bridges but one or, of more bridges, but one in a hundred
-COLUMNS = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged"]
+THREE_DAYS = 3 / 365.25  # of each peak of a baseline, in years
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,8 +26,8 @@ class Discoveries:
         False discovery rate: share of healthy ones among the bridges with a significant event, on average.
     table : DataFrame
         Damage events that are open or recent, and were not acknowledged as harmless: ``bridge``, ``event`` (its number
-        in the monitor's ``events_``), ``start``, ``end``, ``peak``, ``modes``, ``p_value`` (`Monitor.event_p_values`),
-        ``acknowledged``, and ``is_discovery``: it is open, and its bridge is significant.
+        in the monitor's ``events_``), ``start``, ``end``, ``peak``, ``modes``, ``p_value``, ``acknowledged``, and
+        ``is_discovery``: it is open, and its bridge is significant.
     p_values : Series
         By bridge that was evaluated: that of its highest open event, 1 without one.
     level : float
@@ -46,8 +41,9 @@ class Discoveries:
 
     Notes
     -----
-    Benjamini and Hochberg's procedure on the bridges' p values, each with the tail that the baselines of the other
-    bridges show: they allow for outliers, but not for weather that no baseline shows (:ref:`how-events-are-tested`).
+    The p value of an event is the probability that a healthy bridge has so high a peak of its damage index in the time
+    in which it was watched: from the rank of the peak among the highest indices of three days each of its baseline.
+    The squares of higher ones are taken as exponential. Benjamini and Hochberg's procedure compares the bridges.
 
     References
     ----------
@@ -107,65 +103,67 @@ class Discoveries:
 
 
 def discover(
-    monitors: Mapping[Hashable, Monitor], standings: Mapping[Hashable, Mapping[str, Any]], fdr: float, days: float
+    monitors: Mapping[Hashable, Monitor], blind: set[Hashable], last: pd.Timestamp, fdr: float, days: float
 ) -> Discoveries:
-    """Compare the events of all monitors that were open within so many days before the newest record of all."""
+    """Compare the events of all monitors that were open within so many days before the ``last`` record of all."""
     fdr = check_size(fdr, "fdr", 0, 1, "a number between 0 and 1, such as 0.1")
-    window = pd.Timedelta(days=check_size(days, "days", 0, LONGEST, f"a number of days up to {LONGEST}, such as 365"))
-    last = [without_zone(standing["last"]) for standing in standings.values() if not pd.isna(standing["last"])]
-    begin = max(last, default=pd.NaT) - window
-    excesses, expected, watched, not_evaluated = {}, 0.0, {}, []
+    most = 100_000
+    begin = last - pd.Timedelta(days=check_size(days, "days", 0, most, f"a number of days up to {most}, such as 365"))
+    tables, p_values, years, expected, not_evaluated = [], {}, {}, 0.0, []
     for name in monitors:
         try:
             monitor = monitors[name]
-            estimate = monitor.false_alarm_estimate_
-            excesses[name], expected = np.array(estimate.tail.excesses), expected + estimate.expected
-            watched[name] = _events_since(monitor, begin)
+            expected += monitor.false_alarms_per_year
+            table, n_years = _events_since(monitor, begin)
         except Exception:  # damaged files raise errors of every type, which are in the table of errors
             not_evaluated.append(name)
-            watched.pop(name, None)
-    tables, p_values, years, shapes = [], {}, {}, {}
-    parts = {name: number % MOST_TAILS for number, name in enumerate(excesses)}
-    for name, (table, since, n_years) in watched.items():
-        if len(table):
-            part = parts[name]
-            if part not in shapes:
-                shapes[part] = tail_shape([one for other, one in excesses.items() if parts[other] != part])
-            p = monitors[name].event_p_values(since, tail_shape=shapes[part])
-            table = table.assign(p_value=p.reindex(table.index)).reset_index().assign(bridge=name)[COLUMNS]
-        is_blind = standings[name]["state"] == "not evaluated" or not n_years
-        if (is_blind and not len(table)) or (len(table) and table["p_value"].isna().any()):
+            continue
+        if not len(table) and (name in blind or not n_years):
             not_evaluated.append(name)
             continue
-        is_open = table["end"].isna() if len(table) else []
-        p_values[name] = table.loc[is_open, "p_value"].min() if np.any(is_open) else 1.0
-        years[name] = n_years
-        tables += [table] if len(table) else []
-    p = pd.Series(p_values, dtype=float)
+        table = table.assign(p_value=[event_p_value(monitor, peak, n_years) for peak in table["peak"]])
+        p_values[name], years[name] = table.loc[table["end"].isna(), "p_value"].min(), n_years
+        tables += [table.reset_index().assign(bridge=name)] if len(table) else []
+    p = pd.Series(p_values, dtype=float).fillna(1.0)
     is_significant, level = significant_bridges(p.to_numpy(), fdr)
-    table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=COLUMNS)
+    columns = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged"]
+    table = pd.concat(tables, ignore_index=True)[columns] if tables else pd.DataFrame(columns=columns)
     table["is_discovery"] = table["end"].isna() & table["bridge"].isin(p.index[is_significant])
-    false = float((-np.log1p(-level) / np.array(list(years.values()), dtype=float)).sum()) if len(p) else 0.0
+    false = float(np.sum(-np.log1p(-level) / np.array(list(years.values()))))
     return Discoveries(fdr, table, p, level, not_evaluated, false, expected)
 
 
-def _events_since(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, pd.Timestamp, float]:
-    """Events that are open or have ended since a time, that time in their zone, and years evaluated since then."""
+def event_p_value(monitor: Monitor, peak: float, n_years: float) -> float:
+    """Probability that a healthy bridge has so high a peak in so many years."""
+    peaks = np.asarray(monitor.baseline_peaks_, dtype=float)
+    per_year = times_exceeded(peaks, peak) / (len(peaks) * THREE_DAYS)
+    return float(-np.expm1(-per_year * n_years))
+
+
+def times_exceeded(peaks: Array, level: float) -> float:
+    """How often a healthy structure exceeds a level in as long a time as that of its independent peaks, on average.
+
+    That is its rank among the peaks. Beyond the highest one, squares are taken as exponential, like the k highest ones
+    over the next one, b: with s, the sum of their excesses, (k + 1) (1 + (level^2 - b) / s)^-k.
+    """
+    peaks = np.sort(peaks)[::-1]
+    if level <= peaks[0]:
+        return float(np.interp(-level, -peaks, np.arange(1, len(peaks) + 1)))
+    k = min(16, len(peaks) - 1)
+    excesses = peaks[:k] ** 2 - peaks[k] ** 2
+    beyond = (k + 1) * (1 + (level**2 - peaks[k] ** 2) / max(excesses.sum(), np.finfo(float).tiny)) ** -k
+    return float(min(beyond, 1.0))
+
+
+def _events_since(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:
+    """Events that are open or have ended since a time, and years in which records were evaluated since their begin."""
     events = monitor.events_
     events = events[(events["kind"] == "damage") & ~events["harmless"].astype(bool)]
     if not len(monitor.days_) or pd.isna(begin):
-        return events.iloc[:0], begin, 0.0
+        return events.iloc[:0], 0.0
     since = begin.tz_localize("UTC").tz_convert(monitor.last_.tz) if monitor.last_.tz else begin
     events = events[events["end"].isna() | (events["end"] >= since)]
-    return events, since, monitor.years_watched(min([since, *events.loc[events["end"].isna(), "start"]]))
-
-
-def tail_shape(excesses: Sequence[Array]) -> float | None:
-    """Shape of the generalised Pareto tail of excesses of baselines, each over its mean; None if they are few."""
-    if sum(map(len, excesses)) < FEWEST_EXCESSES:
-        return None
-    pooled = np.concatenate([one / one.mean() for one in excesses])
-    return float(np.clip(genpareto.fit(pooled, floc=0)[0], 0.0, HEAVIEST))
+    return events, monitor.years_watched(min([since, *events.loc[events["end"].isna(), "start"]]))
 
 
 def significant_bridges(p_values: Array, fdr: float) -> tuple[Array, float]:

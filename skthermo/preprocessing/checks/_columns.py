@@ -1,0 +1,242 @@
+"""Checks of the columns of one table: values that cannot be, columns without information, other units and signs."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skthermo._core.arrays import Array, median, spread_evenly
+from skthermo._core.frames import MISSING_CODES, columns_by_sensor
+from skthermo.preprocessing.checks._reading import Reading, texts_of
+
+LOGGED = (*MISSING_CODES, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
+COLDEST, HOTTEST = -90.0, 100.0  # degrees Celsius that a structure in the open may have
+OTHER_UNITS = (1.8, 32.0, "degrees Fahrenheit"), (10.0, 0.0, "tenths of a degree"), (-1.0, 0.0, "another sign")
+"""How many of them are a degree Celsius, what they are at 0 degrees Celsius, and their name."""
+
+
+def look_at_temperatures(T: Reading) -> None:
+    """Put aside values that no thermometer in the open shows, and name columns in another unit or with another sign."""
+    varying = []
+    for places in columns_by_sensor(T).values():  # lags repeat what a sensor shows
+        place, column = places[0], T.values[:, places[0]]
+        known = np.sort(column[~np.isnan(column)])
+        if known.size and known[0] > COLDEST + 273.15 and known[-1] < HOTTEST + 273.15:
+            T.found_in("kelvin", place, f"lies between {known[0]:.6g} and {known[-1]:.6g}")
+            continue
+        wrong = np.isin(column, marker_levels(known, 30.0, COLDEST, HOTTEST))
+        is_changed = T.put_aside("kelvin", place, wrong & (column > COLDEST + 273.15) & (column < HOTTEST + 273.15))
+        if T.put_aside("placeholders", place, wrong) or is_changed:
+            known = np.sort(column[~np.isnan(column)])
+        low, high = usual_range(known, 10.0)  # a structure passes gaps while records are left out
+        T.put_aside("another-level", place, (column < low) | (column > high))
+        if has_levels(T, place, known[(known >= low) & (known <= high)]):
+            varying.append(place)
+    for place in in_degrees(T, varying):
+        T.put_aside("implausible-values", place, (T.values[:, place] < COLDEST) | (T.values[:, place] > HOTTEST))
+
+
+def look_at_responses(F: Reading, *, in_hertz: bool, beside_weather: bool) -> None:
+    """Put aside values that are no frequencies, or no responses of another kind.
+
+    Beside the weather, single values far from others are left to the search for exchanged modes and outliers.
+    """
+    for place, column in enumerate(F.values.T):
+        known = np.sort(column[~np.isnan(column)])
+        rest = known[~np.isin(known, LOGGED) & ((known > 0) | (not in_hertz))]
+        low, middle, high = np.quantile(rest, [0.1, 0.5, 0.9]) if rest.size else (0.0, 0.0, 0.0)
+        levels = marker_levels(known, 3 * (high - low)) if high > low or not rest.size else known[:0]
+        is_apart = (column > 2 * middle) | (column < middle / 2) if in_hertz else np.ones(len(column), dtype=bool)
+        wrong = np.isin(column, levels) & (is_apart | np.isin(column, LOGGED)) | (in_hertz & (column <= 0))
+        if F.put_aside("placeholders", place, wrong):
+            known = np.sort(column[~np.isnan(column)])
+        if not has_levels(F, place, known):
+            continue
+        low, high = usual_range(known)
+        is_far = is_apart & ((column < low) | (column > high))
+        if not beside_weather:
+            low, middle, high = np.quantile(known, [0.25, 0.5, 0.75])
+            is_far |= (high > low) & (np.abs(column - middle) > 20 * 0.74 * (high - low))
+        F.put_aside("another-level", place, is_far)
+
+
+def marker_levels(known: Array, jump: float, coldest: float = -np.inf, hottest: float = np.inf) -> Array:
+    """Values among those in order that stand for missing ones.
+
+    These are numbers that loggers write, once if negative, farther than a jump from all others; at most three values at
+    either end that repeat exactly, farther than a jump from the next; and values beyond the coldest and the hottest
+    possible, 50 away from the next.
+    """
+    first, counts = equal_runs(known)
+    levels = known[first]
+    gaps, is_logged, marked = np.diff(levels), np.isin(levels, LOGGED), np.zeros(len(levels), dtype=bool)
+    for place in np.flatnonzero(is_logged & ((counts > 1) | (levels < 0))):
+        marked[place] = np.abs(levels[~is_logged] - levels[place]).min(initial=np.inf) > jump
+    for number in (1, 2, 3) if len(levels) > 8 else ():
+        marked[:number] |= (gaps[number - 1] > jump) & (counts[:number] > 1).all()
+        marked[-number:] |= (gaps[-number] > jump) & (counts[-number:] > 1).all()
+    above, below = (
+        np.flatnonzero((gaps > 50) & (levels[1:] > hottest)),
+        np.flatnonzero((gaps > 50) & (levels[:-1] < coldest)),
+    )
+    if above.size:
+        marked[above[0] + 1 :] = True
+    if below.size:
+        marked[: below[-1] + 1] = True
+    return levels[marked]
+
+
+def usual_range(known: Array, least: float = 0.0) -> tuple[float, float]:
+    """Lowest and highest of the values in order that are not at another level.
+
+    Another level begins where, beyond the narrowest 40 % of the values, the distance from their middle at least doubles
+    from one value to the next, to eight standard deviations or more, by a gap of five and of ``least``. The narrowest
+    40 % of normal values span 1.049 standard deviations. Where they are equal, or fewer than 50 values are known, no
+    value is at another level.
+    """
+    n_usual = int(0.4 * len(known))
+    if len(known) < 50:
+        return -np.inf, np.inf
+    widths = known[n_usual:] - known[: len(known) - n_usual]
+    first = int(widths.argmin())
+    middle, scatter = known[first : first + n_usual + 1].mean(), widths[first] / 1.049
+    distances, gaps = np.abs(known - middle), np.diff(known)
+    inner, outer = np.minimum(distances[:-1], distances[1:]), np.maximum(distances[:-1], distances[1:])
+    ends = np.flatnonzero((gaps >= np.maximum(inner, max(least, 5 * scatter))) & (outer >= 8 * scatter) & (scatter > 0))
+    below, above = ends[ends < first], ends[ends >= first + n_usual]
+    return known[below[-1] + 1] if below.size else -np.inf, known[above[0]] if above.size else np.inf
+
+
+def has_levels(table: Reading, place: int, known: Array) -> bool:
+    """Whether a column has more than one value; name it where it has few, one or none."""
+    levels, n_known, name = known[equal_runs(known)[0]], len(known), table.columns[place]
+    is_coarse = len(levels) <= 4 and n_known >= 50
+    if not n_known and not any(found.column == name for found in table.findings):
+        rows = np.ones(len(table.values), dtype=bool)
+        table.found("missing-column", name, rows, f"{name!r} is NaN in all {len(rows)} rows")
+    elif len(levels) == 1 < n_known:
+        table.found_in("constant", place, f"is {levels[0]:.6g}{table.unit}")
+    elif n_known and is_coarse:
+        table.found_in("few-values", place, f"has the {len(levels)} values {texts_of(levels)}{table.unit}")
+    if len(levels) < 2 or is_coarse:
+        table.useless.add(place)
+    return len(levels) > 1
+
+
+def in_degrees(T: Reading, places: list[int]) -> list[int]:
+    """The sensors in degrees Celsius; those in degrees Fahrenheit, in parts of a degree or with another sign are named.
+
+    A sensor has another unit if it lies much nearer to most of the others in this unit, and varies as they do. All
+    sensors together, or one alone, have another unit if no bridge in the open is as warm, or if their values span more
+    than the open does, smoothly. Of two sensors, either may be the one with another sign.
+    """
+    values, n_sensors, hints = T.values[:, places], len(places), {}
+    if not n_sensors:
+        return []
+    lowest, low, middles, high, warmest, highest = np.nanquantile(values, [0, 0.05, 0.5, 0.95, 0.99, 1], axis=0)
+    typical = np.median(middles)  # a bridge has 45 to 85, or a warmest percent of 70, in degrees Fahrenheit only
+    is_warm = 45 < typical < 85 or (typical < 45 and np.median(warmest) > 70)
+    together = spread_evenly(np.flatnonzero(~np.isnan(values).any(axis=1)), 1000)
+    if is_warm and middles.min() > 16 and lowest.min() > -60 and highest.max() < 170:
+        hints = dict.fromkeys(range(n_sensors), "as in degrees Fahrenheit")
+    elif len(together) >= 50 and n_sensors > 1:
+        some = values[together]
+        with np.errstate(invalid="ignore", divide="ignore"):  # of a column that is constant there
+            correlations = np.corrcoef(some.T)
+        widths = np.maximum(np.ptp(np.quantile(some, [0.05, 0.95], axis=0), axis=0), 1e-300)
+        for number, (factor, zero, unit) in product(range(n_sensors), OTHER_UNITS):
+            others, own = np.arange(n_sensors) != number, some[:, [number]]
+            before = np.median(np.abs(own - some[:, others]), axis=0)
+            after = np.median(np.abs((own - zero) / factor - some[:, others]), axis=0)
+            ratios = widths[number] / widths[others] / abs(factor)
+            is_so = (before > 10) & (after < 0.4 * before) & (ratios > 0.3) & (ratios < 3)
+            is_so &= correlations[number, others] * np.sign(factor) > 0.6
+            if is_so.mean() > 0.5 and (n_sensors > 2 or not hints):
+                hints.setdefault(number, f"as in {unit} beside the others")
+    for number in range(n_sensors):
+        series = values[~np.isnan(values[:, number]), number]
+        steps = np.abs(np.diff(series))[(series[1:] > HOTTEST) | (series[1:] < COLDEST)]
+        is_open = low[number] >= COLDEST and high[number] <= HOTTEST and highest[number] - lowest[number] < 180
+        is_smooth = steps.size and high[number] - low[number] > 4 * np.median(steps)  # of temperatures, not of errors
+        largest = max(highest[number] / HOTTEST, lowest[number] / COLDEST)
+        if not is_open and is_smooth and largest < 1000:
+            hints.setdefault(number, f"as in degrees times {10 if largest < 10 else 100 if largest < 100 else 1000}")
+    is_rule, celsius = 2 * len(hints) > n_sensors, []
+    for number, place in enumerate(places):
+        hint = hints.get(number, "beside others in such a unit" if is_rule else "")
+        if hint:
+            span = f"lies between {lowest[number]:.6g} and {highest[number]:.6g}"
+            T.found_in("unit-of-temperatures", place, f"{span}, {hint},")
+        else:
+            celsius.append(place)
+    return celsius
+
+
+def put_stuck_aside(table: Reading) -> None:
+    """Put aside the runs in which a column only repeats a value; a column that begins as another one is its lag."""
+    for place, column in enumerate(table.values.T):
+        rows = np.flatnonzero(~np.isnan(column))
+        values = column[rows]
+        first, lengths = equal_runs(values)
+        if place in table.useless or len(values) < 20 or lengths.max() < 5 or len(lengths) < 3:
+            continue
+        longest = np.argsort(-lengths, kind="stable")[:20]
+        for run in np.sort(longest[lengths[longest] >= 5]):
+            stuck = rows[first[run] : first[run] + lengths[run]]
+            if stuck[0] == 0 and np.count_nonzero(table.values[0] == column[0]) > 1:
+                continue
+            if is_outstanding(values[first], lengths, run):
+                wrong = np.zeros(len(column), dtype=bool)
+                wrong[stuck] = True
+                table.put_aside("stuck", place, wrong)
+
+
+def equal_runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First place and length of each run of equal values; without NaN."""
+    first = np.flatnonzero(np.append(True, values[1:] != values[:-1])[: len(values)])
+    return first, np.diff(np.append(first, len(values)))
+
+
+def is_outstanding(levels: Array, lengths: NDArray[np.intp], run: np.intp) -> bool:
+    """Whether a run of equal values is four times as long as a usual one at its value and, where values are equal by
+    rounding, as a usual one; and whether chance would give less than a hundredth of such a run in the whole column.
+
+    The usual run is the fourth longest. Rain, and the sun at night, are zero again and again.
+    """
+    length, n_values = lengths[run], lengths.sum()
+    for others in (lengths[levels == levels[run]], lengths if ((lengths > 1) & (lengths < 5)).any() else lengths[:0]):
+        if len(others) > 3 and length < 4 * np.sort(others)[-4]:
+            return False
+    share = (lengths[lengths <= length] - 1).sum() - length + 1
+    return bool(n_values * (share / n_values) ** (length - 1) <= 0.01)
+
+
+def compare_with_model(F: Reading, model: Any) -> None:
+    """Name frequencies in another unit than a model's nominal ones, and frequencies of another mode."""
+    nominal = np.ravel(model.frequencies(np.ones((1, len(model.parameter_names)))))
+    everywhere = np.ones(len(F.values), dtype=bool)
+    if len(nominal) != len(F.columns):
+        F.found("unit-of-frequencies", "", everywhere, f"{len(F.columns)} columns for {len(nominal)} modes")
+        return
+    middles = median(F.values)
+    units = {"rad/s": 2 * np.pi, "kHz": 1e-3, "mHz": 1e3, "cycles per minute": 60.0}  # how many of them are 1 Hz
+    with np.errstate(divide="ignore", invalid="ignore"):
+        expected = np.array([nominal, *np.outer([*units.values()], nominal), 1 / nominal])
+        off = np.abs(np.log(middles / expected))
+    if np.isnan(off[0]).all():
+        return
+    names = ["Hz", *units, "seconds, the periods"]
+    typical = np.nanmedian(off, axis=1)
+    best = 1 + int(np.argmin(typical[1:]))
+    if typical[best] < 0.2 and typical[0] > 0.5:
+        detail = f"the medians {texts_of(middles)} beside {texts_of(nominal)} Hz of the model are about those in"
+        F.found("unit-of-frequencies", "", everywhere, f"{detail} {names[best]}; {len(everywhere)} rows")
+        return
+    for place in np.flatnonzero(off[0] > 0.5):
+        fits = np.flatnonzero(off[1:, place] < 0.2)
+        hint = f", as in {names[1 + fits[0]]}," if len(fits) else ""
+        detail = f"has the median {middles[place]:.4g}, the model {nominal[place]:.4g} Hz{hint}"
+        F.found_in("unit-of-a-mode", place, detail)

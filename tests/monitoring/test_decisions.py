@@ -1,0 +1,87 @@
+"""Events and states of damage indices by the rule of persistence, release and hold."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import BaseEstimator
+
+from skthermo.monitoring import Monitor
+
+RECORDED = Path(__file__).parent / "decisions"
+LEVELS = {  # threshold, release and number of events of monitors of version 0.2.0
+    "truss": (3.097216097929494, 2.698081871551195, 4),
+    "girder": (2.68614313780444, 2.5081548920083763, 7),
+    "z24": (4.46787049870998, 3.5971570058729503, 2),
+    "kw51": (1.7780440805530546, 1.676511560763697, 2),
+}
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*(blind-detector|missing-seasons|extrapolated-threshold|baseline-peak|undetected-changes|not-evaluated)"
+)
+
+
+class GivenIndex(BaseEstimator):
+    """A detector of records that are damage indices."""
+
+    def fit(self, X, y=None):
+        self.baseline_index_ = X["f"].to_numpy()
+        return self
+
+    def score_samples(self, X):
+        return -X["f"].to_numpy()
+
+
+def monitor_of(stamps, threshold=3.0, release=2.0, persistence=3):
+    """A monitor of damage indices with given levels, before the first of some stamps."""
+    step, rng = stamps[1] - stamps[0], np.random.default_rng(0)
+    n = max(100, int(pd.Timedelta("14D") / step))
+    before = pd.DataFrame({"f": rng.uniform(1, 2, n)}, pd.date_range(end=stamps[0] - step, periods=n, freq=step))
+    monitor = Monitor(GivenIndex(), targets=["f"], sensors=False, persistence=persistence).fit(before)
+    monitor.threshold_, monitor.clear_threshold_ = threshold, release
+    return monitor
+
+
+@pytest.mark.parametrize("name", LEVELS)
+def test_the_same_indices_give_the_states_and_events_of_version_0_2(name):
+    recorded = pd.read_csv(RECORDED / f"{name}.csv.gz", index_col="time", parse_dates=True)
+    threshold, release, n_events = LEVELS[name]
+    monitor = monitor_of(recorded.index, threshold, release)
+    for _, part in recorded.groupby(np.arange(len(recorded)) // 500):
+        monitor.update(part[["index"]].set_axis(["f"], axis=1))
+    assert (monitor.evaluations_["state"] == recorded["state"]).mean() > 0.999
+    assert len(monitor.events_) == n_events
+
+
+def answers_to(indices, freq="6h", **levels):
+    stamps = pd.date_range("2026-01-01", periods=len(indices), freq=freq)
+    monitor = monitor_of(stamps, **levels)
+    return monitor, monitor.update(pd.DataFrame({"f": np.asarray(indices, dtype=float)}, stamps))
+
+
+def test_three_of_five_records_above_the_threshold_open_an_event_and_two_do_not():
+    quiet = [1.0] * 8
+    for above, n_events in (([5, 1, 5, 1, 1], 0), ([5, 1, 5, 1, 5], 1), ([5, 5, 5], 1), ([9, np.nan, 9, np.nan, 9], 1)):
+        monitor, answers = answers_to([*quiet, *above, *quiet])
+        assert len(monitor.events_) == n_events
+        if n_events:
+            first = answers.index[len(quiet) + len(above) - 1]
+            assert monitor.events_["start"].tolist() == [first]
+    monitor, _ = answers_to([*quiet, 5, *quiet], persistence=1)
+    assert len(monitor.events_) == 1
+
+
+def test_an_event_closes_a_day_after_its_levels_have_come_within_the_release():
+    monitor, answers = answers_to([1, 1, 1, 5, 5, 5, *[2.5] * 20, *[1] * 10])
+    event = monitor.events_.loc[1]
+    within = answers.index[26 + 2]  # the third of five records
+    assert event["end"] == within + pd.Timedelta("1D")
+    assert event["n_alarms"] == (answers["state"] == "alarm").sum()
+    assert (event["peak"], event["peak_time"]) == (5.0, answers.index[5])
+
+
+def test_records_without_an_index_neither_open_nor_close_an_event():
+    monitor, answers = answers_to([1, 1, 5, 5, 5, *[np.nan] * 40])
+    assert set(answers["state"][5:]) == {"not evaluated"}
+    assert monitor.events_["end"].isna().all()
+    assert monitor.status(monitor.last_).state == "alarm"
