@@ -470,8 +470,8 @@ class SensorWatch:
     def _with_runs(self, state: WatchState) -> WatchState:
         """Columns that are dead, stuck or implausible from now on, or no longer."""
         n_sensors, out = len(self.sensors), state.left_out()
-        told = ~np.isnan(state.values).all(axis=1)  # records without any value tell nothing of a single column
-        values, stamps, today = state.values[told], state.stamps[told], self._midnight(state.days[-1])
+        is_given = ~np.isnan(state.values).all(axis=1)  # records without any value tell nothing of a single column
+        values, stamps, today = state.values[is_given], state.stamps[is_given], self._midnight(state.days[-1])
         values = np.hstack([values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)])
         far = self._evaluated(values)[0]
         for column, series in enumerate(values.T):
