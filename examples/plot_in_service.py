@@ -110,7 +110,7 @@ print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB")
 trusted = records[:"2027-11"]
 for _, fault in monitor.faults_.iterrows():
     trusted = trusted.drop(trusted[fault["since"] : fault["until"]].index)
-history = track_parameters(fem, trusted[list(campaign.temperatures)], trusted[modes], random_state=0)
+history = track_parameters(fem, trusted[list(campaign.temperatures)], trusted[modes])
 print(history.summary())
 print(history.rates[["per_year", "standard_error", "drifts"]].round(4).to_string())
 change = 100 * (history.table - 1)

@@ -46,13 +46,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "commands": {"preprocessing.loggers"},
     "surrogate.inverse": {"fem.affine"},  # polynomials of ln f
     "surrogate.chain": {"surrogate.inverse"},
-    "monitoring": {
-        "monitoring.drift",
-        "monitoring.sensors",
-        "preprocessing.checks",
-    },  # the monitor joins them
-    "monitoring.drift": set(),
-    "monitoring.sensors": {"preprocessing.checks"},
+    "monitoring": {"preprocessing.checks"},
     "reporting": {"reporting.fleet", "reporting.service"},
     "reporting.fleet": {"reporting.service"},
     "reporting.service": set(),

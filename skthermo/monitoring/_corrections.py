@@ -13,8 +13,8 @@ import pandas as pd
 from skthermo._core.arrays import Array
 from skthermo._core.frames import MISSING_CODES, midnights
 from skthermo._core.saved_frames import SavesFrames
-from skthermo.monitoring.drift import DriftFollower
-from skthermo.monitoring.sensors import SensorWatch
+from skthermo.monitoring._drift import DriftFollower
+from skthermo.monitoring._sensors import SensorWatch
 from skthermo.preprocessing.checks import Plausible
 
 
@@ -67,8 +67,8 @@ class Corrections:
         plausible = Plausible.learned(baseline, targets)
         cleaned = baseline.mask(plausible.implausible(baseline.to_numpy()))
         T, F = cleaned.drop(columns=targets), cleaned[targets]
-        watch = SensorWatch.of(T, F, reference=reference, units=units) if sensors else None
-        follower = None if fem is None else DriftFollower.of(fem, T.drop(columns=reference), F)
+        watch = SensorWatch.fitted(T, F, reference=reference, units=units) if sensors else None
+        follower = None if fem is None else DriftFollower.fitted(fem, T.drop(columns=reference), F)
         return cls(list(targets), list(reference), dict(units), plausible, watch, follower)
 
     def start(self, day: pd.Timestamp) -> DayState:

@@ -817,7 +817,8 @@ class Monitor(SavesFrames, Estimator):
         Returns
         -------
         Retraining
-            Whether it took over, why not, how both compare, and what was left out. If refused, nothing has changed.
+            Whether it took over, why not, how the modes have changed, and what was left out. If refused, nothing has
+            changed.
 
         Raises
         ------
@@ -851,7 +852,7 @@ class Monitor(SavesFrames, Estimator):
         Returns
         -------
         Retraining
-            The change of each mode's level, and how large a change the new detector finds beside the old one.
+            The change of each mode's level, and what was left out.
 
         Raises
         ------

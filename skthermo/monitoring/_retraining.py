@@ -1,35 +1,26 @@
-"""A detector in service that learns anew: from more records, or after an intervention; compared with the old one."""
+"""A detector in service that learns anew: from more records, or after an intervention."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 from sklearn.base import BaseEstimator, clone
 from sklearn.utils import check_random_state
 
 from skthermo._core.arrays import Array
-from skthermo._core.estimators import last_step
-from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correlation_time, usual_step
-from skthermo._core.text import capital, counted
+from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correlation_times, usual_step
+from skthermo._core.text import capital, counted, listed, probability_text
 from skthermo._core.warnings import without_warnings
+from skthermo.detection import CompensatedDetector, TemperatureCompensator
+from skthermo.monitoring._drift import DailyWeather, ModeTrends, daily_means, regressed
 from skthermo.monitoring._events import WATCH
-from skthermo.monitoring._records import Lookback
-from skthermo.monitoring._shift import ShiftsTried, WeatherFree, block_mean
-from skthermo.monitoring._threshold import WEEK, blocks_of, crossing, levels, lowered, whole_weeks
-from skthermo.residuals.weather import BEYOND, TrainingRange
 
-MARGIN = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
-FEWEST_WEEKS = 3  # of new records, from which a comparison has standard errors
-
-MOST_PROBED = 2000  # records whose frequencies are lowered, whole weeks of them
-STEPS = (0.0, 2.0, 5.0)  # standard deviations by which they are lowered
-CLEAR = 3.0  # standard errors from which a difference is one
-WORSE = np.log(1.1)  # of the smallest detected change, from which it counts
-FALSE, SMALLEST = "records in alarm", "smallest detected change"  # rows that decide
+WEEK = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
 
 
 @dataclass(frozen=True)
@@ -49,13 +40,9 @@ class Retraining:
     notes : tuple of str
         What the engineer should know besides.
     table : DataFrame
-        For a refit, the old and the new detector on the records that the old one has not learned from, with columns
-        ``old``, ``new``, ``difference``, ``standard_error`` (of the difference, from weeks) and ``worse``: records
-        above the threshold (share), median index over threshold, smallest detected change (relative change of one mode
-        by which half of the records come above the threshold; differences are of logarithms), records in unknown
-        weather (share), and peaks of past events over the threshold. For a new baseline, by mode: ``change`` of the
-        level (relative; of responses that are not positive, in their unit), its ``standard_error``, ``n_records``
-        since, and the smallest detected change, ``old`` and ``new``.
+        By mode, what weather does not explain: ``change`` between the baseline and the new records (relative; of
+        responses that are not positive, in their unit) and its ``standard_error``. For a refit also ``per_year`` and
+        ``per_year_error``, of a steady change over all records; for a new baseline ``n_records`` since.
     excluded : DataFrame
         What did not train: ``start``, ``end`` (NaT: up to the last record), ``columns``, ``n_records`` and ``reason``.
     baseline : DataFrame or None
@@ -66,9 +53,6 @@ class Retraining:
         When the intervention was complete.
     detector : estimator or None
         The new detector, fitted.
-    shift : DataFrame or None
-        For a refit, by mode: ``change`` of frequencies, relative, that weather does not explain between the baseline
-        and the new records, its ``standard_error``, and the same ``per_year`` and ``per_year_error`` over all of them.
 
     See Also
     --------
@@ -105,7 +89,6 @@ class Retraining:
     prior: pd.DataFrame | None = field(default=None, repr=False)
     since: pd.Timestamp | None = None
     detector: BaseEstimator | None = field(default=None, repr=False)
-    shift: pd.DataFrame | None = field(default=None, repr=False)
 
     def summary(self) -> str:
         """What was learned from, what was left out, and why the new detector takes over or not.
@@ -129,167 +112,269 @@ class Retraining:
 
 
 def retrained(monitor: Any, records: pd.DataFrame | None, *, until: Any = None, force: bool = False) -> Retraining:
-    """A detector that has learned from the baseline and what came since, compared with the one in charge."""
-    kept, margin = _until(_kept(monitor, records), until), margin_of(monitor.lookback_, monitor.trained_)
-    harvest = Harvest.of(kept, monitor.events_, monitor.faults_, margin, are_put_back=records is None)
-    refused = _too_few(harvest.records)
-    if refused:
-        return _none("refit", refused, harvest.excluded)
-    old, targets = monitor, list(monitor.targets_)
-    prior, since = monitor.prior_, monitor.since_
-    baseline = pd.concat([old.trained_, harvest.records])
+    """A detector that has learned from the baseline and what came since, unless these differ from it."""
+    targets, since, prior = list(monitor.targets_), monitor.since_, monitor.prior_
+    margin = max(WEEK, monitor.lookback_.duration(usual_step(monitor.trained_.index)))
+    kept = _until(_kept(monitor, records), until)
+    new, excluded = may_train(kept, monitor.events_, monitor.faults_, margin, is_in_place=records is None)
+    n_weeks = len(np.unique((new.index - new.index.min()) // WEEK))
+    if n_weeks < 3:
+        come = f"{counted(len(new), 'new record')} in {counted(n_weeks, 'week')}; expected 3 weeks or more"
+        return _none("refit", come if len(new) else "there are no records since the baseline that may train", excluded)
+    baseline = pd.concat([monitor.trained_, new])
     if prior is not None:
         own = baseline[baseline.index >= since]
-        _, moved = _at_new_level(monitor, prior, own)
+        moved = at_new_level(monitor, prior, own)[1]
         baseline, prior = pd.concat([moved, own]), prior if len(moved) else None
-    new = _candidate(monitor, baseline)
-    free = WeatherFree.of(monitor.detector_, baseline, targets)
-    changes = _changes(free, baseline, monitor, harvest.records.index[0])
-    spread = free.residuals.std() * free.scale
-    table = comparison(old, new, harvest.records, targets, spread, _past_events(monitor))
-    reasons = [
-        *changes.objections(),
-        *(f"the new detector is significantly worse in {name!r}" for name in worse_measures(table)),
-    ]
-    notes, shift = changes.notes(), changes.table((baseline.index[-1] - baseline.index[0]) / YEAR)
-    accepted = force or not reasons
-    learned = {"baseline": baseline, "prior": prior, "since": since, "detector": new.detector_, "shift": shift}
-    return Retraining("refit", accepted, tuple(reasons), tuple(notes), table, harvest.excluded, **learned)
+    is_harmless, events = np.zeros(len(baseline), dtype=bool), monitor.events_
+    for event in events[events["harmless"]].itertuples():
+        is_harmless |= (baseline.index >= event.start) & (pd.isna(event.end) | (baseline.index <= event.end))
+    changes = level_changes(baseline[~is_harmless], targets, new.index[0])
+    reasons, step, steady = [*objections(changes)], changes[0], changes[-1]
+    years = (baseline.index[-1] - baseline.index[0]) / YEAR
+    table = pd.DataFrame(
+        {
+            "change": step.change,
+            "standard_error": step.standard_error,
+            "per_year": steady.change / years,
+            "per_year_error": steady.standard_error / years,
+        }
+    )
+    learned = {"baseline": baseline, "prior": prior, "since": since, "detector": _fitted(monitor, baseline)}
+    notes = tuple(notes_of(changes))
+    return Retraining("refit", force or not reasons, tuple(reasons), notes, table, excluded, **learned)
 
 
 def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
     """A detector for the structure after an intervention: old records, moved to the new level, beside the new ones."""
     since = check_stamp(since, monitor.trained_.index, "since")
-    old, targets, prior = monitor, list(monitor.targets_), monitor.prior_
+    trained, prior = monitor.trained_, monitor.prior_
     first = since if monitor.since_ is None else max(since, monitor.since_)
     if monitor.since_ is None or since > monitor.since_:  # what is now the baseline is that before the intervention
-        prior = old.trained_
+        prior = trained
     if prior is None:
         raise ValueError(f"the baseline since {monitor.since_} needs no older records any more; expected refit")
     prior = prior[prior.index < since]
     if not len(prior):
-        raise ValueError(f"since is {since}, but the baseline begins at {old.trained_.index[0]}; expected a later time")
-    events = monitor.events_
+        raise ValueError(f"since is {since}, but the baseline begins at {trained.index[0]}; expected a later time")
+    events, kept = monitor.events_, monitor.corrected_
     damage = events[events["acknowledged"] & ~events["harmless"] & (events["start"] >= since)]
-    trained, kept = old.trained_[old.trained_.index >= first], monitor.corrected_
+    trained = trained[trained.index >= first]
     known = pd.concat([trained, kept[~kept.index.isin(trained.index)]]).sort_index()
-    harvest = Harvest.of(_until(known[known.index >= since], until), damage, monitor.faults_, are_put_back=True)
-    own = harvest.records
-    missing = [str(name) for name in targets if not len(own) or own[name].notna().sum() < 2]
+    own, excluded = may_train(_until(known[known.index >= since], until), damage, monitor.faults_, is_in_place=True)
+    missing = [str(name) for name in monitor.targets_ if not len(own) or own[name].notna().sum() < 2]
     if missing:
-        return _none("new baseline", f"fewer than two records of {', '.join(missing)} since {since}", harvest.excluded)
-    level, moved = _at_new_level(monitor, prior, own)
+        return _none("new baseline", f"fewer than two records of {listed(missing)} since {since}", excluded)
+    table, moved = at_new_level(monitor, prior, own)
     baseline = pd.concat([moved, own])
-    new = _candidate(monitor, baseline)
-    spread = level.old.residuals.std() * level.old.scale
-    found = [smallest_changes(one, one.trained_, targets, spread)[:, -1] for one in (old, new)]
-    table = level.table.assign(old=found[0], new=found[1])
     notes = [
-        f"{counted(level.span.days, 'day')} and {counted(len(own), 'record')} since {since:%Y-%m-%d %H:%M}; "
-        f"{counted(len(moved), 'older record')}, moved to the new level, stand for weather not met since"
+        f"{counted((own.index[-1] - own.index[0]).days + 1, 'day')} and {counted(len(own), 'record')} since "
+        f"{since:%Y-%m-%d %H:%M}; {counted(len(moved), 'older record')}, moved to the new level, stand for weather not "
+        "met since"
     ]
-    ratio = float(np.exp(np.nanmean(np.log(found[1] / found[0])))) if np.isfinite(found).any() else np.nan
-    notes.append(f"the smallest detected change is {ratio:.2f} times that with the baseline before")
-    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since, "detector": new.detector_}
-    return Retraining("new baseline", True, (), tuple(notes), table, harvest.excluded, **learned)
+    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since}
+    learned["detector"] = _fitted(monitor, baseline)
+    return Retraining("new baseline", True, (), tuple(notes), table, excluded, **learned)
+
+
+def may_train(
+    records: pd.DataFrame,
+    events: pd.DataFrame,
+    faults: pd.DataFrame,
+    margin: pd.Timedelta = WEEK,
+    *,
+    is_in_place: bool = False,
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Records without events that nobody called harmless and values of faulty sensors, and what was left out and why.
+
+    Modes that were exchanged for a time stand in their place already with ``is_in_place``.
+    """
+    kept, masked, rows = np.ones(len(records), dtype=bool), records.copy(), []
+    for start, end, reason in _spans(events, margin):
+        inside = (records.index >= start) & (pd.isna(end) | (records.index <= end))
+        kept &= ~inside
+        rows.append((start, end, "all", int(inside.sum()), reason))
+    for fault in faults.itertuples():
+        if (is_in_place and fault.kind == "swapped") or fault.column not in records:  # or the sensor is a reference
+            continue
+        inside = (records.index >= fault.since) & (pd.isna(fault.until) | (records.index < fault.until))
+        masked.loc[inside, fault.column] = np.nan
+        rows.append((fault.since, fault.until, fault.column, int((inside & kept).sum()), f"sensor: {fault.kind}"))
+    empty = kept & masked.isna().all(axis=1).to_numpy()
+    if empty.any():
+        rows.append((masked.index[empty][0], masked.index[empty][-1], "all", int(empty.sum()), "without a value"))
+    excluded = pd.DataFrame(rows, columns=["start", "end", "columns", "n_records", "reason"])
+    return masked[kept & ~empty], excluded[excluded["n_records"] > 0].reset_index(drop=True)
+
+
+@dataclass(frozen=True)
+class LevelChange:
+    """A change of the responses that follows a profile in time, from 0 to 1, and that weather does not explain.
+
+    Changes are relative, or in the unit of a response that is not positive. ``size`` is their length in standard
+    deviations of a day's noise, ``p_value`` the probability of one as large by chance, allowing for ``what`` else was
+    tried.
+    """
+
+    what: str
+    change: pd.Series
+    standard_error: pd.Series
+    scatter: pd.Series
+    size: float
+    p_value: float
+
+    def sentence(self) -> str:
+        worst = (self.change / self.standard_error).abs().idxmax()
+        change = f"{self.change[worst]:+.2g} +- {self.standard_error[worst]:.1g}"
+        return (
+            f"{self.what}, with the weather taken out, {worst} changes by {change} (of its level, or in its unit), all "
+            f"modes together by {self.size:.2g} standard deviations of a day (p value {probability_text(self.p_value)})"
+        )
+
+
+def level_changes(records: pd.DataFrame, targets: list[Any], since: pd.Timestamp) -> list[LevelChange]:
+    """Steps each 30 days from the first new record on, and lines over the new and over all records, beside the weather.
+
+    Daily means are regressed on the weather and on one profile at a time, as for drift, but slow means of the weather
+    and noise that lasts for months would hide a step: a refit is refused rather than that; Hotelling's law, times the
+    number of profiles, tells chance.
+    """
+    F = records[targets]
+    is_positive = F.min() > 0
+    scale = F.std().where(~is_positive, 0.01) * 100  # others vary by about 0.01 then, as logarithms do
+    y = np.log(F.where(is_positive, 1.0)).where(is_positive, (F - F.mean()) / scale)
+    daily_T, daily_y = daily_means(records.drop(columns=targets), y)
+    T, y, days = daily_T.to_numpy(), daily_y.to_numpy(), daily_y.index
+    X = DailyWeather.fitted(T, half_lives=(5.0,)).of_days(T)[0] if T.shape[1] else np.ones((len(y), 1))
+    first = days.searchsorted(since, side="right") - 1
+    places = np.arange(len(days))
+    profiles = {
+        f"from {days[start]:%Y-%m-%d} on": (places >= start).astype(float)
+        for start in range(first, max(len(days) - 20, first + 1), 30)
+    }
+    for what, start in (("steadily over the new records", first), ("steadily over all records", 0)):
+        profiles[what] = np.maximum((places - start) / max(len(days) - 1 - start, 1), 0.0)
+    found = []
+    for what, profile in profiles.items():
+        equations, noise = regressed(np.column_stack([X, profile]), y, 1, lasts_for_months=False)
+        freedom = noise.independent((~np.isnan(y)).sum(axis=0).max()) - X.shape[1]
+        trend = ModeTrends.fitted(equations, noise, np.eye(y.shape[1]), 1, freedom)
+        day = noise.covariance / (1 - noise.correlation**2)
+        size = float(np.sqrt(trend.mean @ np.linalg.solve(day, trend.mean)))
+        errors = (trend.mean, np.sqrt(np.diag(trend.covariance)), np.sqrt(np.diag(day)))
+        named = (pd.Series(one, pd.Index(targets)) * scale for one in errors)
+        found.append(LevelChange(what, *named, size, min(_hotelling(trend) * len(profiles), 1.0)))
+    return found
+
+
+def _hotelling(trend: ModeTrends) -> float:
+    """Probability of changes of all modes that are together as far from zero by chance."""
+    size, freedom = len(trend.mean), max(trend.freedom - len(trend.mean) + 1, 1.0)
+    squared = float(trend.mean @ np.linalg.solve(trend.covariance, trend.mean))
+    return float(stats.f.sf(squared * freedom / (size * max(trend.freedom, size)), size, freedom))
+
+
+def objections(changes: list[LevelChange], chance: float = 1e-3, matters: float = 0.2) -> Iterator[str]:
+    """What speaks against learning from new records: a change beyond chance that moves a detector's rates."""
+    clearest = min(changes, key=lambda one: one.p_value)
+    if clearest.p_value < chance and clearest.size > matters:
+        what = f"the new records are not those of the baseline's structure: {clearest.sentence()}"
+        yield f"{what}; a detector fitted to them would not detect that change"
+
+
+def notes_of(changes: list[LevelChange]) -> Iterator[str]:
+    """What the engineer should know besides."""
+    clearest, step = min(changes, key=lambda one: one.p_value), changes[0]
+    if clearest.p_value < 0.01 and not [*objections(changes)]:
+        yield f"small but significant change: {clearest.sentence()}"
+    if (step.standard_error / step.scatter).median() > 0.5:
+        yield (
+            "the new records have hardly any weather in common with the baseline: a change between the two of up "
+            f"to {2 * step.standard_error.median():.2g} could not be distinguished from weather"
+        )
+
+
+def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Change of each mode's level since an intervention, and older records moved to it.
+
+    The change is the mean of what the old regression on the weather leaves of the new records. Few days do not tell it
+    well: each week of old records is moved by an error of its own as large, so that what a detector learns of the
+    scatter holds for records to come. Weeks of a season that the new records have are left out.
+    """
+    targets = list(monitor.targets_)
+    old, new, is_relative = residuals_of(monitor.detector_, prior, own, targets)
+    counts = new.notna().sum()
+    lasting = pd.Series(correlation_times(old.to_numpy()), old.columns)
+    n_independent = (counts / lasting).clip(lower=1.0)
+    table = pd.DataFrame({"change": new.mean(), "standard_error": old.std() / np.sqrt(n_independent)})
+    week = np.asarray((prior.index - prior.index[0]) // WEEK)
+    errors = old.cov().fillna(0.0).to_numpy() / np.sqrt(np.outer(n_independent, n_independent))
+    random = check_random_state(monitor.random_state)
+    missed = random.multivariate_normal(np.zeros(len(targets)), errors, week.max() + 1)[week]
+    values, change, moved = prior[targets].to_numpy(), table["change"].to_numpy(), prior.copy()
+    moved[targets] = np.where(is_relative, values * np.exp(change - missed), values + change - missed)
+    table["change"] = np.where(is_relative, np.expm1(change), change)
+    return table.assign(n_records=counts), moved[_season_is_missing(prior.index, own.index)]
+
+
+def residuals_of(
+    detector: BaseEstimator, baseline: pd.DataFrame, new: pd.DataFrame, targets: list[Any]
+) -> tuple[pd.DataFrame, pd.DataFrame, Array]:
+    """Residuals of a baseline, out of fold, and of new records, by the regression within a detector.
+
+    Also which are relative, ln f - ln f expected. Without weather, they are departures from the mean.
+    """
+    if len(baseline.columns) == len(targets):
+        level, is_relative = baseline[targets].mean(), (baseline[targets].min() > 0).to_numpy()
+        old, own = (
+            np.log((one / level).where(is_relative, 1.0)).where(is_relative, one - level)
+            for one in (baseline[targets], new[targets])
+        )
+        return old, own, is_relative
+    plain = TemperatureCompensator(targets=targets)
+    for part in (detector, *detector.get_params().values()):
+        if isinstance(part, TemperatureCompensator):
+            plain = clone(part)
+        if isinstance(part, CompensatedDetector):
+            plain = TemperatureCompensator(part.regressor, targets=part.targets, cv=part.cv)
+    with without_warnings():
+        left = np.asarray(plain.fit_transform(baseline)), np.asarray(plain.transform(new))
+    names = list(plain.get_feature_names_out())
+    old, own = (
+        pd.DataFrame(one, table.index, names)[targets] for one, table in zip(left, (baseline, new), strict=True)
+    )
+    return old, own, pd.Series(plain.relative_, names)[targets].to_numpy()
+
+
+def _season_is_missing(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
+    """Which old records are of a week of the year that no new record is near, within half a week."""
+    week = np.asarray((old - old[0]) // WEEK)
+    middle = pd.Series(old).groupby(week).transform(lambda some: some.iloc[len(some) // 2]).dt.day_of_year.to_numpy()
+    distance = np.abs(middle[:, np.newaxis] - np.unique(new.day_of_year))
+    return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2
+
+
+def _fitted(monitor: Any, baseline: pd.DataFrame) -> BaseEstimator:
+    with without_warnings():
+        return clone(monitor.detector_).fit(baseline[monitor.features_])
 
 
 def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
     """Given records, or those that the monitor keeps as its detector saw them, that are not in the baseline."""
     if records is None:
-        records = monitor.corrected_[
-            monitor.corrected_.index >= monitor.last_ - check_duration(monitor.retention, "retention")
-        ]
+        start = monitor.last_ - check_duration(monitor.retention, "retention")
+        records = monitor.corrected_[monitor.corrected_.index >= start]
     records = records[list(monitor.trained_.columns)].sort_index()
-    known = records.index.isin(monitor.trained_.index)
-    return records[~known if monitor.since_ is None else ~known & (records.index >= monitor.since_)]
+    is_new = ~records.index.isin(monitor.trained_.index)
+    return records[is_new if monitor.since_ is None else is_new & (records.index >= monitor.since_)]
 
 
 def _until(records: pd.DataFrame, until: Any) -> pd.DataFrame:
     return records if until is None else records[records.index <= check_stamp(until, records.index, "until")]
 
 
-def _too_few(records: pd.DataFrame) -> str:
-    """Why records cannot be compared, else an empty string."""
-    if not len(records):
-        return "there are no records since the baseline that may train"
-    n_weeks = blocks_of(records.index).max() + 1
-    if n_weeks < FEWEST_WEEKS:
-        come = f"{counted(len(records), 'new record')} in {counted(n_weeks, 'week')}"
-        return f"{come}; expected {FEWEST_WEEKS} weeks or more"
-    return ""
-
-
 def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
     return Retraining(kind, False, (reason,), (), pd.DataFrame(), excluded)
-
-
-def _candidate(monitor: Any, baseline: pd.DataFrame) -> Any:
-    with without_warnings():
-        return monitor._with(clone(monitor.detector_).fit(baseline[monitor.features_]), baseline)
-
-
-def _changes(free: WeatherFree, baseline: pd.DataFrame, monitor: Any, since: pd.Timestamp) -> ShiftsTried:
-    """What weather does not explain of the records, events left out that were acknowledged as harmless."""
-    events, known = monitor.events_, np.zeros(len(baseline), dtype=bool)
-    for event in events[events["harmless"]].itertuples():
-        known |= (baseline.index >= event.start) & (pd.isna(event.end) | (baseline.index <= event.end))
-    rest = replace(free, residuals=free.residuals[~known])
-    return ShiftsTried.of(rest, baseline[~known].drop(columns=list(monitor.targets_)), since)
-
-
-def _past_events(monitor: Any) -> dict[Any, pd.DataFrame]:
-    records, events, found = monitor.corrected_, monitor.events_, {}
-    margin = margin_of(monitor.lookback_, monitor.trained_)  # which windows reach back into
-    for number, event in zip(events.index, events.itertuples(), strict=True):
-        inside = records[(records.index >= event.start - margin) & (pd.isna(event.end) | (records.index <= event.end))]
-        if not event.harmless and event.kind != WATCH and len(inside):
-            found[number] = inside
-    return found
-
-
-@dataclass(frozen=True)
-class Harvest:
-    """Records that may train, and a table of what was left out and why.
-
-    ``excluded`` has a row for each reason: ``start``, ``end`` (NaT: until the last record), ``columns`` (all, or the
-    one whose values alone are left out), ``n_records`` and ``reason``.
-    """
-
-    records: pd.DataFrame
-    excluded: pd.DataFrame
-
-    @classmethod
-    def of(
-        cls,
-        records: pd.DataFrame,
-        events: pd.DataFrame,
-        faults: pd.DataFrame | None,
-        margin: pd.Timedelta = MARGIN,
-        are_put_back: bool = False,
-    ) -> Harvest:
-        """Leave out events that were not acknowledged as harmless, and values of faulty sensors.
-
-        Modes that were swapped for a time stand in their place already with ``are_put_back``.
-        """
-        kept, rows = np.ones(len(records), dtype=bool), []
-        for start, end, reason in _spans(events, margin):
-            inside = (records.index >= start) & (pd.isna(end) | (records.index <= end))
-            kept &= ~inside
-            rows.append((start, end, "all", int(inside.sum()), reason))
-        masked = records.copy()
-        for fault in (pd.DataFrame() if faults is None else faults).itertuples():
-            is_kept = fault.kind == "disagree" or (are_put_back and fault.kind == "swapped")
-            if is_kept or fault.column not in records:  # nothing is left out, or the sensor is a reference
-                continue
-            inside = (records.index >= fault.since) & (pd.isna(fault.until) | (records.index < fault.until))
-            masked.loc[inside, fault.column] = np.nan
-            rows.append((fault.since, fault.until, fault.column, int((inside & kept).sum()), f"sensor: {fault.kind}"))
-        empty = kept & masked.isna().all(axis=1).to_numpy()
-        if empty.any():
-            rows.append((masked.index[empty][0], masked.index[empty][-1], "all", int(empty.sum()), "without a value"))
-        excluded = pd.DataFrame(rows, columns=["start", "end", "columns", "n_records", "reason"])
-        return cls(masked[kept & ~empty], excluded[excluded["n_records"] > 0].reset_index(drop=True))
 
 
 def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, Any, str]]:
@@ -300,198 +385,3 @@ def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, An
         state = "acknowledged, but not as harmless" if event.acknowledged else "not acknowledged"
         still = ", and still open: nothing after its start may train" if is_open else ""
         yield event.start - margin, event.end, f"event {number} ({event.kind}), {state}{still}"
-
-
-def margin_of(memory: Lookback, records: pd.DataFrame) -> pd.Timedelta:
-    """How long before an event's first alarm records do not train: a week, or as long as the detector looks back."""
-    return max(MARGIN, memory.duration(usual_step(records.index)))
-
-
-@dataclass(frozen=True)
-class NewLevel:
-    """Relative change of each mode's level, and what days as many as the new ones tell of a level.
-
-    ``table`` has a row for each mode: ``change`` (relative), ``standard_error``, ``n_records``. ``span`` is the time
-    that the new records cover.
-    """
-
-    table: pd.DataFrame
-    span: pd.Timedelta
-    old: WeatherFree
-
-    @classmethod
-    def of(cls, old: WeatherFree, new: pd.DataFrame) -> NewLevel:
-        """From new records, by what the old regression leaves of them."""
-        left = old.of_new(new)
-        span = new.index[-1] - new.index[0] + usual_step(new.index)
-        counts = left.notna().sum()
-        deviations = old.residuals.std()
-        times = pd.Series([correlation_time(column) for column in old.residuals.to_numpy().T], left.columns)
-        error = deviations * np.sqrt(np.minimum(times / counts.where(counts > 0), 1.0))
-        table = pd.DataFrame({"change": left.mean(), "standard_error": error, "n_records": counts})
-        return cls(table, span, old)
-
-    def prior(self, records: pd.DataFrame, new: pd.DataFrame, random_state: int | None = None) -> pd.DataFrame:
-        """Old records at the new level, without those of a time of the year that new records cover.
-
-        The level is known only as well as a few days tell it. Each week of old records is therefore moved by what
-        another stretch of the old baseline, as long as the new one, misses its level by: what a detector learns of the
-        scatter then holds for records to come.
-        """
-        blocks = blocks_of(records.index)
-        kept = _season_not_covered(records.index, new.index)[blocks]
-        missed = self._missed(blocks.max() + 1, random_state)[blocks]
-        change, is_relative = self.table["change"].to_numpy(), self.old.is_relative.to_numpy()
-        moved, targets = records.copy(), list(self.table.index)
-        values = records[targets].to_numpy()
-        moved[targets] = np.where(is_relative, values * (1 + change) / (1 + missed), values + change - missed)
-        return moved[kept]
-
-    def _missed(self, n_blocks: int, random_state: int | None) -> Array:
-        """Mean residuals of stretches of the old baseline by chance, (n_blocks, n_modes)."""
-        values = self.old.residuals - self.old.residuals.mean()
-        times = values.index
-        latest = times[-1] - self.span
-        if latest <= times[0]:
-            return np.zeros((n_blocks, values.shape[1]))
-        random = check_random_state(random_state)
-        starts = times[0] + (latest - times[0]) * random.uniform(size=n_blocks)
-        first, last = times.searchsorted(starts), times.searchsorted(starts + self.span)
-        known = values.notna().to_numpy()
-        sums, counts = (
-            np.vstack([np.zeros(values.shape[1]), np.cumsum(part, axis=0)])
-            for part in (np.nan_to_num(values.to_numpy()), known)
-        )
-        number = counts[last] - counts[first]
-        return np.where(number > 0, (sums[last] - sums[first]) / np.maximum(number, 1), 0.0)
-
-
-def _at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[NewLevel, pd.DataFrame]:
-    """The level of records since an intervention, and older ones moved to it."""
-    level = NewLevel.of(WeatherFree.of(monitor.detector_, prior, list(monitor.targets_)), own)
-    return level, level.prior(prior, own, monitor.random_state)
-
-
-def _season_not_covered(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
-    """Which weeks of old records have a time of the year that no new record has within half a week."""
-    blocks = blocks_of(old)
-    middle = pd.Series(old).groupby(blocks).agg(lambda some: some.iloc[len(some) // 2])
-    covered = np.unique(new.day_of_year)
-    distance = np.abs(middle.dt.day_of_year.to_numpy()[:, np.newaxis] - covered)
-    return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2
-
-
-def comparison(
-    old: Any,
-    new: Any,
-    overlap: pd.DataFrame,
-    targets: list[Any],
-    spread: pd.Series,
-    events: dict[Any, pd.DataFrame],
-) -> pd.DataFrame:
-    """The old detector and the one that may follow it, on the records that the old one has not learned from.
-
-    False alarms, scatter, the smallest changes found, weather, and records of past events. A row for each measure:
-    ``old``, ``new``, ``difference`` (of logarithms for the smallest changes), its ``standard_error`` from blocks of
-    time, and ``worse``: whether the new one is significantly worse in it. ``spread`` holds standard deviations of the
-    responses, weather taken out, in their units.
-    """
-    blocks = blocks_of(overlap.index)
-    own = pd.Series(last_step(new.detector_).baseline_index_, new.trained_.index)
-    rates = [_ratio(old, overlap), (own / new.threshold_).reindex(overlap.index).to_numpy()]
-    persistence = old.persistence
-    rows = {
-        FALSE: _compared(*(_above(levels(one, persistence)) for one in rates), blocks),
-        "median index over threshold": _medians(*rates),
-        **dict(_rows_of_changes(*(smallest_changes(one, overlap, targets, spread) for one in (old, new)), targets)),
-        "records in unknown weather": _unknown(old, new, overlap, targets),
-        **dict(_found(old, new, events)),
-    }
-    table = pd.DataFrame(rows, index=["old", "new", "difference", "standard_error", "worse"]).T
-    return table.astype(dict.fromkeys(table.columns[:4], float) | {"worse": bool})
-
-
-def worse_measures(table: pd.DataFrame) -> list[str]:
-    """Measures in which the new detector is significantly worse, and which count."""
-    false = table.loc[FALSE]
-    has_fewer_false = bool(false["difference"] < -CLEAR * false["standard_error"])
-    # A threshold that gives no false alarms any more is worth a somewhat larger smallest change.
-    return [name for name in table.index[table["worse"]] if not (name == SMALLEST and has_fewer_false)]
-
-
-def _ratio(monitor: Any, records: pd.DataFrame) -> Array:
-    return monitor._index(records) / monitor.threshold_
-
-
-def _above(ratio: Array) -> Array:
-    return np.where(np.isnan(ratio), np.nan, (ratio > 1).astype(float))
-
-
-def _compared(old: Array, new: Array, blocks: Array) -> list[Any]:
-    """Means of both, of their difference where both evaluate, and whether it is clearly positive."""
-    difference, error = block_mean(new - old, blocks)
-    return [np.nanmean(old), np.nanmean(new), difference, error, bool(difference > CLEAR * error)]
-
-
-def _medians(old: Array, new: Array) -> list[Any]:
-    medians = [float(np.nanmedian(one)) for one in (old, new)]
-    return [*medians, medians[1] - medians[0], np.nan, False]
-
-
-def smallest_changes(active: Any, records: pd.DataFrame, targets: list[Any], spread: pd.Series) -> Array:
-    """By how much each mode has to be lowered, relatively, until half of the records are above the threshold.
-
-    For each week and, last, for all records, (n_modes, n_weeks + 1); at most some number of whole weeks are taken.
-    """
-    records = whole_weeks(records, MOST_PROBED)
-    blocks = blocks_of(records.index)
-    found, start = np.full((len(targets), blocks.max() + 2), np.nan), _ratio(active, records)
-    for mode, target in enumerate(targets):
-        fallen = (lowered(records, {target: step * spread[target]}) for step in STEPS[1:])
-        steps = np.array(STEPS) * (spread[target] / (records[target].mean() if records[target].min() > 0 else 1.0))
-        ratios = [_ratio(active, one) for one in fallen]
-        curve = np.array([start, *ratios])
-        found[mode, -1] = _crossing(steps, curve)
-        for block in range(blocks.max() + 1):
-            found[mode, block] = _crossing(steps, curve[:, blocks == block])
-    return found
-
-
-def _rows_of_changes(old: Array, new: Array, targets: list[Any]) -> Iterator[tuple[str, list[Any]]]:
-    """A row for their geometric mean over the modes, which decides, and one for each mode."""
-    logs = np.log(np.array([old, new]))
-    known = np.isfinite(logs).all(axis=0)
-    together = np.where(known, logs, 0.0).sum(axis=1) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
-    for name, values in [(SMALLEST, together), *zip(targets, logs.transpose(1, 0, 2), strict=True)]:
-        change = values[1] - values[0]
-        error = block_mean(change[:-1], np.arange(len(change) - 1))[1]
-        row = [*np.exp(values[:, -1]), change[-1], error]
-        if name == SMALLEST:
-            yield name, [*row, bool(change[-1] - CLEAR * error > WORSE)]
-        else:
-            yield f"{SMALLEST}, {name}", [*row, False]
-
-
-def _crossing(steps: Array, curve: Array) -> float:
-    """The step at which the median of the records' ratios exceeds 1; NaN if it does so without any."""
-    curve = curve[:, ~np.isnan(curve).any(axis=0)]
-    return crossing(steps, np.median(curve, axis=1)) if curve.size else np.nan
-
-
-def _unknown(old: Any, new: Any, overlap: pd.DataFrame, targets: list[Any]) -> list[Any]:
-    """Shares of records outside the weather of each baseline."""
-    weather = [name for name in overlap.columns if name not in targets]
-    if not weather:
-        return [0.0, 0.0, 0.0, np.nan, False]
-    shares = []
-    for active in (old, new):
-        known = TrainingRange.spanned(active.trained_[weather], np.ones(len(active.trained_), dtype=bool))
-        shares.append(float((np.nan_to_num(known.excess(overlap[weather])) > BEYOND).any(axis=1).mean()))
-    return [*shares, shares[1] - shares[0], np.nan, shares[1] > shares[0]]
-
-
-def _found(old: Any, new: Any, events: dict[Any, pd.DataFrame]) -> Iterator[tuple[str, list[Any]]]:
-    """Peaks of past events over the threshold: what was found has to be found again."""
-    for number, records in events.items():
-        peaks = [float(np.nanmax(_ratio(active, records), initial=0.0)) for active in (old, new)]
-        yield f"event {number}, peak over threshold", [*peaks, peaks[1] - peaks[0], np.nan, peaks[1] <= 1 < peaks[0]]

@@ -99,11 +99,10 @@ use(
     lambda path: monitoring.load_monitor(path).summary(),
     path=(FOLDER / "monitor.joblib", PATHS),
 )
-HISTORY = monitoring.track_parameters(CHAIN, T, F, ["top"], random_state=0)
+HISTORY = monitoring.track_parameters(CHAIN, T, F, ["top"])
 use(
     "monitoring.track_parameters",
     lambda **a: monitoring.track_parameters(**a).rates,
-    usual="random_state",
     fem=(CHAIN, instead()),
     T=(T, weather(T, rows=True)),
     F=(F, frequencies(F, rows=True)),

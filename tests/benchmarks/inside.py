@@ -6,13 +6,12 @@ PLACES = {
     "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
     "fem.external._files": ["form_of", "read_file"],
-    "monitoring._active": ["ActiveDetector"],
     "monitoring._fleet_bridge": ["KnownBridge"],
     "monitoring._events": ["find_events", "followed"],
     "monitoring._records": ["Lookback", "Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
+    "monitoring._sensors": ["SensorWatch"],
     "monitoring._threshold": ["EventLevels", "estimate_false_alarms"],
-    "monitoring.drift._observations": ["GroupEffects"],
     "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }
 

@@ -17,14 +17,13 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 from harness import DATA, arguments, compensated, is_missed, joined, modes_of, shown
-from inside import ActiveDetector, Memory, begun_again, retrained
+from inside import begun_again, retrained
 from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
-from skthermo.monitoring import Monitor
 from skthermo.preprocessing import HingeFeatures
 
 ASKED = 0.02  # share of healthy records above the threshold
@@ -38,22 +37,6 @@ def limit(detector):
     return float(np.nanquantile(detector.baseline_index_, 1 - ASKED))
 
 
-class ByRecords(ActiveDetector):
-    """A detector in charge whose threshold is that of records, so that few years tell rates."""
-
-    @property
-    def threshold(self):
-        return limit(self.detector)
-
-    @property
-    def estimate(self):
-        return SimpleNamespace(rule=SimpleNamespace(persistence=Monitor().persistence))
-
-    @classmethod
-    def of(cls, detector, trained):
-        return cls(detector, trained, None, list(detector.feature_names_in_), *[None] * 7)
-
-
 def no_events():
     columns = {"kind": object, "start": "M8[ns]", "end": "M8[ns]", "acknowledged": bool, "harmless": bool}
     return pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in columns.items()})
@@ -62,20 +45,20 @@ def no_events():
 def in_service(detector, baseline, kept, targets):
     """What a retraining reads of a monitor."""
     fitted = clone(detector).fit(baseline)
-    active = ByRecords.of(fitted, baseline)
     return SimpleNamespace(
-        active_=active,
-        detector=detector,
         detector_=fitted,
         trained_=baseline,
         since_=None,
         prior_=None,
         corrected_=kept,
+        last_=kept.index[-1],
+        retention="9999D",
         events_=no_events(),
-        faults_=None,
+        faults_=pd.DataFrame(),
         targets_=targets,
-        threshold_=active.threshold,
-        lookback_=Memory.of(fitted),
+        features_=list(fitted.feature_names_in_),
+        threshold_=limit(fitted),
+        lookback_=SimpleNamespace(duration=lambda step: step),
         random_state=0,
     )
 
@@ -113,7 +96,7 @@ def refit(seeds):
         targets = list(make_truss_campaign(n_years=1, samples_per_year=20, random_state=0).frequencies)
         for kind, records in kinds.items():
             monitor = in_service(lines(targets), records[:182], records[182:365], targets)
-            found = retrained(monitor, None, ByRecords.of)
+            found = retrained(monitor, None)
             threshold = limit(found.detector)
             row = {"the new half year": kind, "refits refused, %": 100 * (not found.accepted)}
             row["false alarms, old detector, %"] = above(monitor.detector_, monitor.threshold_, healthy[365:])
@@ -146,7 +129,7 @@ def after_intervention(detector, before, after, damaged, targets):
         end = after.index[0] + pd.Timedelta(days=n_days)
         own, healthy, bad = after[after.index < end], after[after.index >= end], damaged[damaged.index >= end]
         monitor = in_service(detector, before, own, targets)
-        found, shares = begun_again(monitor, own.index[0], ByRecords.of), {}
+        found, shares = begun_again(monitor, own.index[0]), {}
         if found.accepted:
             level = limit(found.detector)
             shares["rebaseline"] = above(found.detector, level, healthy), above(found.detector, level, bad)

@@ -24,13 +24,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from harness import arguments, compensated, is_missed, joined, shown, z24_records
+from inside import SensorWatch
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
 from skthermo.monitoring import Monitor
-from skthermo.monitoring.sensors import SensorWatch
 from skthermo.residuals.sensors import SensorRegression
 
 WEEK, PATIENCE = 7, 91  # days in which a fault and a drift are to be named
@@ -60,7 +60,7 @@ class Service:
         self.name, self.columns, self.can_compare = name, columns or list(T), len(T.columns) > 1
         self.T, self.F = T.iloc[n_baseline:], F.iloc[n_baseline:]
         self.baseline = T.iloc[:n_baseline], F.iloc[:n_baseline]
-        self.watch = SensorWatch.of(*self.baseline, reference=reference)
+        self.watch = SensorWatch.fitted(*self.baseline, reference=reference)
         self.days = days_of(self.T)
         self.states = [self.watch.start()]
         for _, rows in self.days:

@@ -22,7 +22,6 @@ import sys
 import numpy as np
 import pandas as pd
 from harness import arguments, compensated, is_missed, shown, split
-from inside import GroupEffects
 from scipy import stats
 from structures import AgeingTruss
 
@@ -53,7 +52,7 @@ def truth(times, rate, begin, zero):
 
 def tracked(fem, T, F):
     """Daily estimates and errors of ln stiffness by group, whether a drift is found, and which groups come first."""
-    history = track_parameters(fem, T, F, random_state=0)
+    history = track_parameters(fem, T, F)
     table = history.table
     estimates = np.log(table.xs("estimate", axis=1, level=1))
     errors = np.log(table.xs("ci_high", axis=1, level=1)).sub(estimates) / BAND
@@ -84,9 +83,8 @@ def regression(fem, T, F):
     trends = residual_trend(pd.DataFrame(residuals, both.index, F.columns))
     change, errors = trends["change"], trends["standard_error"]  # relative, as the residuals
     found = stats.chi2.sf(((change / errors) ** 2).sum(), len(change)) <= LEVEL
-    effects = GroupEffects.of(fem, T, F, None)
     groups = list(AgeingTruss.groups)  # the others hardly move these frequencies
-    slopes = effects.slopes[:, [effects.names.index(group) for group in groups]]
+    slopes = -fem.damage_directions(groups).to_numpy().T
     inverse = np.linalg.pinv(slopes / errors.to_numpy()[:, np.newaxis])
     at_end, deviations = inverse @ (change / errors).to_numpy(), np.sqrt((inverse**2).sum(axis=1))
     share = np.linspace(0, 1, len(both))[:, np.newaxis]

@@ -119,7 +119,7 @@ def callables(T, F):
         "MahalanobisDetector.fit": lambda T, F: MahalanobisDetector().fit(F).score_samples(healthy_F),
         "Monitor.fit": lambda T, F: monitor().fit(T.join(F)).update(healthy[months])["index"],
         "Monitor.update": updated,
-        "track_parameters": lambda T, F: track_parameters(chain, T, F, random_state=0).rates["per_year"],
+        "track_parameters": lambda T, F: track_parameters(chain, T, F).rates["per_year"],
         "FleetMapper.fit": lambda T, F: FleetMapper(others).fit(T, F).predict(healthy_T),
     }
 

@@ -136,7 +136,7 @@ def results_of_monitoring(fem, year, later):
     yield "monitoring.Monitor.transitions", monitor.transitions()
     yield "monitoring.Retraining", monitor.refit(force=True)
     both = pd.concat([records, new])
-    history = track_parameters(fem, both.filter(regex="^T"), both[fem.mode_names_], random_state=0)
+    history = track_parameters(fem, both.filter(regex="^T"), both[fem.mode_names_])
     yield "monitoring.ParameterHistory", history
     yield "monitoring.ParameterHistory.reaches", history.reaches()
 

@@ -81,7 +81,7 @@ def test_a_healthy_year_joins_the_baseline(monitor, records):
     assert not found.reasons
     assert len(found.excluded) == 0
     pd.testing.assert_frame_equal(monitor.trained_, healthy[: 2 * YEAR], **SAME)
-    assert (found.table.loc["smallest detected change", ["old", "new"]] > 0).all()
+    assert (found.table["change"].abs() < 4 * found.table["standard_error"]).all()
     assert found.summary().startswith("Refit: accepted")
 
 
@@ -104,7 +104,6 @@ def test_rows_of_an_event_never_train(with_event):
     left_out = found.excluded.iloc[0]
     assert left_out["n_records"] >= 57
     assert "not acknowledged" in left_out["reason"]
-    assert found.table.loc["event 1, peak over threshold", "new"] > 1
 
 
 @pytest.mark.nightly
@@ -118,7 +117,7 @@ def test_a_change_without_an_alarm_is_not_learned(monitor, records):
     assert "would not detect that change" in found.reasons[0]
     assert monitor.detector_ is detector
     pd.testing.assert_frame_equal(decisions(monitor, changed[720:]), before, check_exact=True)
-    assert (found.shift["change"] < 0).all()
+    assert (found.table["change"] < 0).all()
     assert quietly(monitor.refit, until=changed.index[495], force=True).baseline.index[-1] == changed.index[495]
 
 

@@ -10,7 +10,7 @@ found = {}
 for name, one in {"ageing": years, "healthy": healthy}.items():
     T, F = one.temperatures, one.frequencies
     fem = DataInformedFEM(make_truss(), random_state=0).fit(T[:365], F[:365])
-    found[name] = track_parameters(fem, T, F, freq="7D", random_state=0)
+    found[name] = track_parameters(fem, T, F, freq="7D")
 RESULTS = {
     "drifts": {name: bool(one.has_drift) for name, one in found.items()},
     "rate": float(found["ageing"].rates.loc["bottom", "per_year"]),

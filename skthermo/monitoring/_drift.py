@@ -1,0 +1,555 @@
+"""Slow change of stiffness in daily means of frequencies: a line that may bend once a year, beside the weather."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from skthermo._core.arrays import Array, as_floats, means_of_known
+from skthermo._core.estimators import check_is_fitted
+from skthermo._core.frames import DAY, YEAR, days_later, midnights, midnights_between
+from skthermo._core.saved_frames import SavesFrames
+from skthermo.fem.damage import ALL_GROUPS, read_groups
+from skthermo.residuals.gaussian import Gaussian
+
+
+def read_slopes(fem: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> tuple[list[str], Array]:
+    """Names of damage groups, last "all groups" alike, and d ln f / d ln stiffness, (n_modes, n_groups)."""
+    members = read_groups(fem.model, groups)
+    if len(members) > 1:
+        members[ALL_GROUPS] = list(dict.fromkeys(name for joined in members.values() for name in joined))
+    directions = fem.damage_directions(list(dict.fromkeys(name for joined in members.values() for name in joined)))
+    slopes = [-directions.reindex(joined).fillna(0.0).sum().to_numpy() for joined in members.values()]
+    return list(members), np.column_stack(slopes)
+
+
+def daily_means(T: pd.DataFrame, y: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Means of two tables over each calendar day from the first record to the last, NaN without any."""
+    days, calendar = midnights(y.index), midnights_between(y.index.min(), y.index.max())
+    return T.groupby(days).mean().reindex(calendar), y.groupby(days).mean().reindex(calendar)
+
+
+@dataclass(frozen=True)
+class DailyWeather:
+    """Columns of a regression on daily mean temperatures: a cubic of their principal components, and exponential
+    means of the first one, which stand for what follows the weather slowly.
+
+    ``usual`` is the distribution of daily means, by which a missing thermometer is filled from the others.
+    """
+
+    usual: Gaussian
+    axes: Array
+    half_lives: tuple[float, ...]
+
+    @classmethod
+    def fitted(
+        cls, T: Array, most: int = 3, share: float = 0.02, half_lives: tuple[float, ...] = (5.0, 30.0)
+    ) -> DailyWeather:
+        """Axes with more than a share of the largest one's variance, ``most`` of them or fewer."""
+        usual = Gaussian.fitted(T[~np.isnan(T).all(axis=1)])
+        scale = np.sqrt(np.maximum(np.diag(usual.covariance), 1e-6))
+        sizes, axes = np.linalg.eigh(usual.covariance / np.outer(scale, scale))
+        kept = np.flatnonzero(sizes > share * sizes[-1])[-most:][::-1]
+        own = np.diag(1e-9 * scale**2)  # so that a thermometer may repeat another one
+        usual = replace(usual, covariance=usual.covariance + own)
+        return cls(usual, axes[:, kept] / scale[:, np.newaxis] / np.sqrt(sizes[kept]), half_lives)
+
+    def coordinates(self, T: Array) -> Array:
+        return (self.usual.completed(T)[0] - self.usual.mean) @ self.axes
+
+    def later(self, earlier: Array, coordinates: Array) -> Array:
+        """Exponential means a day later; they stay where the day is not known."""
+        share = 1 - 0.5 ** (1 / np.array(self.half_lives))
+        return earlier if np.isnan(coordinates[0]) else earlier + share * (coordinates[0] - earlier)
+
+    def columns(self, coordinates: Array, earlier: Array) -> Array:
+        first, second = np.triu_indices(coordinates.shape[1])
+        products, constant = coordinates[:, first] * coordinates[:, second], 1 + 0 * coordinates[:, :1]
+        return np.hstack([constant, coordinates, products, coordinates**3, earlier])
+
+    def of_days(self, T: Array, start: Array | None = None) -> tuple[Array, Array]:
+        """Columns of successive days, and the exponential means on the last one."""
+        coordinates, earlier = self.coordinates(T), []
+        known = coordinates[~np.isnan(coordinates).any(axis=1), 0]
+        last = np.full(len(self.half_lives), known[:10].mean() if len(known) else 0.0) if start is None else start
+        for day in coordinates:
+            last = self.later(last, day)
+            earlier.append(last)
+        return self.columns(coordinates, np.array(earlier)), last
+
+
+def whitened(X: Array, y: Array, correlation: float) -> tuple[Array, Array]:
+    """Rows of one mode less their prediction from the day before; those after gaps are scaled to equal variances."""
+    days = np.flatnonzero(~np.isnan(y) & ~np.isnan(X).any(axis=1))
+    kept = np.r_[0.0, correlation ** np.diff(days).astype(float)][: len(days)]
+    scale = np.sqrt((1 - correlation**2) / (1 - kept**2))
+    table = np.column_stack([X, y])[days]
+    before = np.vstack([0 * table[:1], table[:-1]])
+    rows = scale[:, np.newaxis] * (table - kept[:, np.newaxis] * before)
+    return rows[:, :-1], rows[:, -1]
+
+
+def lasting_covariance(rows: Array, lags: int) -> Array:
+    """Sum of products of rows, and of those up to so many lags apart with weights that fall to zero (Newey, West)."""
+    total = rows.T @ rows
+    for lag in range(1, lags + 1):
+        product = rows[lag:].T @ rows[:-lag]
+        total += (1 - lag / (lags + 1)) * (product + product.T)
+    return total
+
+
+def slow_squares(rows: Array, n_waves: int = 12, n_fitted: int = 4) -> Array:
+    """Squares that each column would sum up to if it were as large at all frequencies as at the lowest.
+
+    From its products with some waves over all rows, as many as half of their number; a regression on the season and on
+    time has taken a few of these.
+    """
+    share = (np.arange(len(rows)) + 0.5) / len(rows)
+    waves = np.sqrt(2) * np.cos(np.pi * np.outer(np.arange(1, n_waves + 1), share))
+    return ((waves @ rows) ** 2).sum(axis=0) / (n_waves - n_fitted)
+
+
+@dataclass(frozen=True)
+class DailyNoise:
+    """Correlation of residuals of neighbouring days, and covariance of what each day adds to them.
+
+    The covariance is that of a day times the number of days for which additions last.
+    """
+
+    correlation: float
+    covariance: Array
+
+    @classmethod
+    def fitted(cls, residuals: Array, n_columns: int, lags: int = 10, *, lasts_for_months: bool = True) -> DailyNoise:
+        """From residuals by day, NaN where a mode is missing, of a regression on so many columns.
+
+        Additions that last for some days show in their products; those that last for months, such as moisture, in
+        waves over all days. The larger variance counts.
+        """
+        known = ~np.isnan(residuals)
+        pairs, rest = known[1:] & known[:-1], np.nan_to_num(residuals)
+        products, squares = np.where(pairs, rest[1:] * rest[:-1], 0).sum(), np.where(pairs, rest[1:] ** 2, 0).sum()
+        correlation = float(np.clip(products / max(squares, 1e-300), 1e-6, 0.98))
+        added, n_days = np.zeros(residuals.shape), known.sum(axis=0)
+        for mode, column in enumerate(residuals.T):
+            added[known[:, mode], mode] = whitened(np.zeros((len(column), 0)), column, correlation)[1]
+        total = lasting_covariance(added, min(lags, len(added) // 5))
+        larger = np.ones(len(total))
+        if lasts_for_months:
+            larger = np.sqrt(np.fmax(slow_squares(added) / np.maximum(np.diag(total), 1e-300), 1.0))
+        lost = n_days.max() / max(n_days.max() - n_columns, 1)
+        covariance = lost * total * np.outer(larger, larger) / np.sqrt(np.outer(n_days, n_days)).clip(1)
+        return cls(correlation, covariance + 1e-16 * np.eye(len(covariance)))
+
+    @property
+    def deviations(self) -> Array:
+        return np.sqrt(np.diag(self.covariance))
+
+    def independent(self, n_days: float) -> float:
+        """As how many independent days so many count."""
+        return n_days * (1 - self.correlation) / (1 + self.correlation)
+
+
+def bending_line(years: Array, bends: Array) -> Array:
+    """A line through zero, and ramps from each bend on, (n_days, 1 + n_bends)."""
+    return np.column_stack([years, np.maximum(years[:, np.newaxis] - bends, 0.0)])
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Those of a regression of each mode on the same columns, of days that have the mode."""
+
+    information: Array
+    moments: Array
+
+    @classmethod
+    def summed(cls, X: Array, y: Array, correlation: float) -> NormalEquations:
+        """Those of successive days, whose noise is correlated."""
+        parts = [whitened(X, column, correlation) for column in y.T]
+        return cls(np.array([rows.T @ rows for rows, _ in parts]), np.array([rows.T @ own for rows, own in parts]))
+
+    def first(self, size: int) -> NormalEquations:
+        """Without later columns."""
+        return NormalEquations(self.information[:, :size, :size], self.moments[:, :size])
+
+    def widened(self, size: int) -> NormalEquations:
+        """With columns that have been zero so far."""
+        more = size - self.moments.shape[1]
+        return NormalEquations(
+            np.pad(self.information, [(0, 0), (0, more), (0, more)]), np.pad(self.moments, [(0, 0), (0, more)])
+        )
+
+    def solved(self, noise: Array, deviations: Array) -> tuple[Array, Array]:
+        """Coefficients, (n_modes, n_columns), and roots of their covariances.
+
+        ``noise`` are standard deviations by mode, ``deviations`` those that the coefficients have beforehand.
+        """
+        weight = noise[:, np.newaxis, np.newaxis] ** -2.0
+        covariance = np.linalg.inv(self.information * weight + np.diag(deviations**-2.0))
+        coefficients = np.einsum("mpq,mq->mp", covariance, self.moments * weight[:, 0])
+        return coefficients, np.linalg.cholesky((covariance + covariance.swapaxes(1, 2)) / 2)
+
+
+def prior_deviations(n_weather: int, n_times: int, mislearned: float = 0.3, trend: float = 0.3) -> Array:
+    """Prior standard deviations of the coefficients of ln f: a wide one of the constant, then weather and time."""
+    return np.r_[10.0, np.full(n_weather - 1, mislearned), np.full(n_times, trend)]
+
+
+@dataclass(frozen=True)
+class ModeTrends:
+    """Coefficients of the bending line of each mode, mode by mode, and their covariance, and what groups move them.
+
+    ``freedom`` is that of the noise's covariance.
+    """
+
+    mean: Array
+    covariance: Array
+    slopes: Array
+    freedom: float
+
+    @classmethod
+    def fitted(
+        cls, equations: NormalEquations, noise: DailyNoise, slopes: Array, n_times: int, freedom: float
+    ) -> ModeTrends:
+        size = equations.moments.shape[1]
+        coefficients, roots = equations.solved(noise.deviations, prior_deviations(size - n_times, n_times))
+        rows, correlation = roots[:, -n_times:], noise.covariance / np.outer(noise.deviations, noise.deviations)
+        covariance = np.einsum("mn,mip,njp->minj", correlation, rows, rows, optimize=True)
+        covariance = covariance.reshape(2 * [rows.shape[0] * n_times])
+        covariance += 1e-9 * np.diag(np.diag(covariance))  # of modes that are copies of each other
+        return cls(coefficients[:, -n_times:].ravel(), covariance, slopes, freedom)
+
+    @property
+    def n_times(self) -> int:
+        return len(self.mean) // len(self.slopes)
+
+    def p_value(self) -> float:
+        """Probability that one of the groups would seem to change as clearly by chance, of a line that does not bend.
+
+        Student's law of the largest change in its standard errors, times the number of groups (Bonferroni).
+        """
+        weighted = np.linalg.solve(self.covariance, np.column_stack([self.slopes, self.mean]))
+        products = self.slopes.T @ weighted
+        scores = np.abs(products[:, -1]) / np.sqrt(np.maximum(np.diag(products), 1e-300))
+        return float(min(2 * len(scores) * stats.t.sf(scores.max(), max(self.freedom, 3.0)), 1.0))
+
+    def design(self, groups: Sequence[int]) -> Array:
+        return np.kron(self.slopes[:, list(groups)], np.eye(self.n_times))
+
+    def evidence(self, groups: Sequence[int], deviations: Array) -> float:
+        """Logarithm of how many times likelier these are with drift of some groups than without any."""
+        design = self.design(groups) * np.tile(deviations, len(groups))
+        laws = (self.covariance, self.covariance + design @ design.T)
+        none, drift = (stats.multivariate_normal.logpdf(self.mean, cov=law, allow_singular=True) for law in laws)
+        return float(drift - none)
+
+    def of_groups(self, groups: Sequence[int], deviations: Array) -> tuple[Array, Array]:
+        """Coefficients of ln stiffness, group by group, if no others drift, and their covariance."""
+        design = self.design(groups)
+        weighted = np.linalg.solve(self.covariance, design)
+        prior = np.tile(np.maximum(deviations, 1e-7) ** -2.0, len(groups))
+        covariance = np.linalg.inv(design.T @ weighted + np.diag(prior))
+        return covariance @ weighted.T @ self.mean, covariance
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Sets of groups that may drift, by decreasing evidence, beside the trends of the modes.
+
+    ``bend`` is the standard deviation of a yearly bend by which the best set explains the trends.
+    """
+
+    trends: ModeTrends
+    names: list[str]
+    sets: list[tuple[int, ...]]
+    evidence: Array
+    bend: float
+
+    @classmethod
+    def weighed(cls, trends: ModeTrends, names: list[str], rate: float = 0.03) -> Explanation:
+        """All sets of one or two groups, and a change of all alike; most often one group drifts, and steadily."""
+        apart = [place for place, name in enumerate(names) if name != ALL_GROUPS]
+        sets = [*((place,) for place in range(len(names))), *combinations(apart, 2)]
+        shares = {1: 0.8 / len(names), 2: 0.2 / max(len(sets) - len(names), 1)}
+        bends = (0.0, 0.005, 0.02)[: trends.n_times + 1 if trends.n_times > 1 else 1]
+        table = [
+            [
+                trends.evidence(one, np.r_[rate, np.full(trends.n_times - 1, bend)]) + np.log(shares[len(one)])
+                for bend in bends
+            ]
+            for one in sets
+        ]
+        evidence = np.logaddexp.reduce(table, axis=1) - np.log(len(bends))
+        order = np.argsort(-evidence, kind="stable")
+        bend = bends[int(np.argmax(table[order[0]]))]
+        return cls(trends, names, [sets[place] for place in order], evidence[order], bend)
+
+    @property
+    def probabilities(self) -> Array:
+        weights = np.exp(self.evidence - self.evidence[0])
+        return weights / weights.sum()
+
+    def alternatives(self, as_likely: float = 3.0) -> dict[str, list[str]]:
+        """For each group of the best set, those that explain the trends about as well in its place."""
+        best = set(self.sets[0])
+        likely = [set(one) for one in np.array(self.sets, dtype=object)[self.evidence[0] - self.evidence <= as_likely]]
+        found = {}
+        for group in sorted(best):
+            others = best - {group}
+            rivals = {place for one in likely if len(one) == len(best) and others < one for place in one - others}
+            found[self.names[group]] = [self.names[place] for place in sorted(rivals)]
+        return found
+
+    def change(self, group: int, beside: Sequence[int], line: Array) -> tuple[Array, Array]:
+        """Ln stiffness of a group by day, and its standard deviation, if some others drift as well.
+
+        Three per cent of it may be an error of the FE model's effects.
+        """
+        deviations = np.r_[0.1, np.full(self.trends.n_times - 1, self.bend)]
+        coefficients, covariance = self.trends.of_groups([group, *beside], deviations)
+        size = self.trends.n_times
+        mean = line @ coefficients[:size]
+        spread = np.sqrt(np.einsum("ti,ij,tj->t", line, covariance[:size, :size], line))
+        return mean, np.hypot(spread, 0.03 * mean)
+
+
+def regressed(X: Array, y: Array, n_times: int, **noise_options: bool) -> tuple[NormalEquations, DailyNoise]:
+    """Normal equations of the modes on columns of which the last are of time, and the noise beside them."""
+    size, noise = X.shape[1], DailyNoise(1e-6, np.diag(np.nanvar(y, axis=0)))
+    prior = prior_deviations(size - n_times, n_times)
+    for _ in range(2):  # the first time as if days were independent
+        equations = NormalEquations.summed(X, y, noise.correlation)
+        rest = y - X @ equations.solved(noise.deviations, prior)[0].T
+        noise = DailyNoise.fitted(rest, size, **noise_options)
+    return NormalEquations.summed(X, y, noise.correlation), noise
+
+
+def rate_errors(steady: ModeTrends) -> Array:
+    """Standard error of the yearly change of each group if no other drifts; infinite where no mode moves."""
+    information = steady.slopes.T @ np.linalg.solve(steady.covariance, steady.slopes)
+    with np.errstate(divide="ignore"):
+        return 1 / np.sqrt(np.diag(information))
+
+
+@dataclass(frozen=True)
+class DriftState(SavesFrames):
+    """What a `DriftFollower` knows at the end of a day.
+
+    ``equations`` are those of days that are learned. ``waiting`` are the days since, a row each: columns that explain
+    ln f, then the modes. ``sudden`` says which of these are in a time that departs from what was predicted; none of
+    these is learned, ``n_left_out`` of such in a row. ``number`` counts days from the end of the baseline to the last
+    one, ``before`` and ``numbers_before`` are the row and the number of the last day that each mode was learned from.
+    """
+
+    day: pd.Timestamp
+    number: int
+    equations: NormalEquations
+    before: Array
+    numbers_before: Array
+    earlier: Array
+    waiting: Array
+    sudden: Array
+    n_left_out: int = 0
+
+
+@dataclass(frozen=True)
+class DriftFollower:
+    """Takes slow drift out of measured frequencies, and leaves sudden changes in.
+
+    The regression of `track_parameters` grows day by day, a month behind: a day is learned when it has waited for
+    ``delay`` days, and only if the mean of no such time that holds it departs from what was predicted. So a sudden
+    change is never learned as drift, however long it lasts; one that the mean of a month does not show is learned in
+    time, and reported as the drift that it looks like. What is taken out is the drift found since the middle of the
+    baseline, times a share that is 0 as long as it may be chance and goes to 1 as it becomes clear.
+    """
+
+    temperatures: list[Any]
+    modes: list[Any]
+    groups: list[str]
+    slopes: Array
+    weather: DailyWeather
+    noise: DailyNoise
+    years: float
+    start_: DriftState
+    delay: int = 30
+    chance: float = 1e-3
+
+    @classmethod
+    def fitted(cls, fem: Any, T: pd.DataFrame, F: pd.DataFrame, groups: Any = None) -> DriftFollower:
+        """Learn from the temperatures and frequencies of a baseline, for a fitted chain; by default for all groups."""
+        check_is_fitted(fem)
+        inputs = list(getattr(fem, "feature_names_in_", ["named temperatures"]))
+        missing = [one for one in inputs if one not in T] + [one for one in fem.mode_names_ if one not in F]
+        if missing:
+            raise ValueError(
+                f"the chain fem was fitted on temperatures and modes of which the baseline lacks {missing}; expected "
+                f"their names among the temperatures {list(T.columns)} and the frequencies {list(F.columns)}"
+            )
+        names, slopes = read_slopes(fem, groups)
+        daily_T, daily_F = daily_means(T[inputs], np.log(F[list(fem.mode_names_)]))
+        weather, y = DailyWeather.fitted(daily_T.to_numpy()), daily_F.to_numpy()
+        columns, earlier = weather.of_days(daily_T.to_numpy())
+        years = len(y) * (DAY / YEAR)
+        X = np.hstack([columns, bending_line((np.arange(len(y)) + 1) * (DAY / YEAR) - years / 2, np.empty(0))])
+        equations, noise = regressed(X, y, 1)
+        known = ~np.isnan(y) & ~np.isnan(X).any(axis=1, keepdims=True)
+        last = np.where(known.any(axis=0), len(y) - 1 - known[::-1].argmax(axis=0), 0)
+        before = np.nan_to_num(np.hstack([X[last], y[last, np.arange(y.shape[1])][:, np.newaxis]]))
+        waiting = np.empty((0, columns.shape[1] + y.shape[1]))
+        state = (daily_F.index[-1], 0, equations, before, last - len(y) + 1, earlier, waiting, np.empty(0, dtype=bool))
+        return cls(inputs, list(fem.mode_names_), names, slopes, weather, noise, years, DriftState(*state))
+
+    def start(self) -> DriftState:
+        return self.start_
+
+    def advance(self, state: DriftState, T: pd.DataFrame, F: pd.DataFrame) -> DriftState:
+        """The state at the end of one complete day; as it is without records, or if that day is known already."""
+        if not len(F) or F.index[-1] < days_later(state.day, 1):
+            return state
+        for _ in midnights_between(state.day, F.index[-1])[1:-1]:
+            state = self._with_day(state, np.full(len(self.temperatures), np.nan), np.full(len(self.modes), np.nan))
+        means = (means_of_known(as_floats(one)) for one in (T[self.temperatures], np.log(F[self.modes])))
+        return self._with_day(state, *means)
+
+    def corrected(self, state: DriftState, F: pd.DataFrame) -> pd.DataFrame:
+        """Measured frequencies of the day after a state without the drift that is taken out."""
+        shift = dict(zip(self.modes, self.slopes @ self.taken_out_logarithms(state), strict=True))
+        return F * np.exp([-shift.get(mode, 0.0) for mode in F])
+
+    def taken_out(self, state: DriftState) -> pd.Series:
+        """Relative change of each group's stiffness that is taken out of the frequencies."""
+        found = pd.Series(
+            np.expm1(self.taken_out_logarithms(state)), pd.Index(self.groups, name="group"), name="change"
+        )
+        return found.drop(ALL_GROUPS, errors="ignore")
+
+    def taken_out_logarithms(self, state: DriftState, rate: float = 0.02, bend: float = 0.01) -> Array:
+        """Ln stiffness of each group that is taken out; 0 for all groups alike, whose change is that of each."""
+        trends, line = self._trends(state)
+        apart = [place for place, name in enumerate(self.groups) if name != ALL_GROUPS]
+        deviations = np.r_[rate, np.full(trends.n_times - 1, bend)]
+        coefficients, covariance = trends.of_groups(apart, deviations)
+        at_day = np.kron(np.eye(len(apart)), line)
+        change, spread = at_day @ coefficients, at_day @ covariance @ at_day.T
+        shift, spread = self.slopes[:, apart] @ change, self.slopes[:, apart] @ spread @ self.slopes[:, apart].T
+        sizes, axes = np.linalg.eigh(spread)
+        clear = sizes > 1e-8 * sizes[-1]
+        distance = float(((shift @ axes[:, clear]) ** 2 / sizes[clear]).sum())
+        by_chance = float(stats.chi2.isf(0.05, clear.sum()))
+        found = np.zeros(len(self.groups))
+        found[apart] = max(1 - (by_chance / distance) ** 2, 0.0) * change if distance > 0 else 0.0
+        return found
+
+    def report(self, state: DriftState, significance: float = 0.01, limit: float = 0.05) -> pd.DataFrame:
+        """Drift of each group since the middle of the baseline, as `track_parameters` finds it.
+
+        Of its stiffness: relative ``change`` and ``standard_error``, the same a year (``per_year``,
+        ``per_year_error``), the ``p_value`` of the structure's drift, by which groups it is explained best
+        (``significant``, none if that may be chance), and whether such a change is ``beyond_limit``.
+        """
+        trends, line = self._trends(state)
+        p_value = self._trends(state, is_straight=True)[0].p_value()
+        explanation = Explanation.weighed(trends, self.groups)
+        best = explanation.sets[0] if p_value <= significance else ()
+        years, rows = self.years / 2 + state.number * (DAY / YEAR), {}
+        for group, name in enumerate(self.groups):
+            if name == ALL_GROUPS and group not in best:
+                continue
+            beside = [one for one in best if one != group]
+            (mean,), (deviation,) = explanation.change(group, beside, line[np.newaxis])
+            change, error = np.expm1(mean), np.exp(mean) * deviation
+            is_clear = group in best
+            rows[name] = [
+                change,
+                error,
+                change / years,
+                error / years,
+                p_value,
+                is_clear,
+                is_clear and abs(change) > limit,
+            ]
+        columns = ["change", "standard_error", "per_year", "per_year_error", "p_value", "significant", "beyond_limit"]
+        return pd.DataFrame.from_dict(rows, "index", columns=columns).rename_axis("group")
+
+    def _line(self, number: int, n_bends: int) -> Array:
+        """The bending line on a day of service: zero in the middle of the baseline, which bends as each year begins."""
+        since = number * (DAY / YEAR)
+        return bending_line(np.array([since + self.years / 2]), np.arange(n_bends) + self.years / 2)[0]
+
+    def _trends(self, state: DriftState, *, is_straight: bool = False) -> tuple[ModeTrends, Array]:
+        """Trends of the modes by the days that are learned, and the line on the last day."""
+        n_weather = self.start_.equations.moments.shape[1] - 1
+        n_times = 1 if is_straight else state.equations.moments.shape[1] - n_weather
+        n_days = self.years * (YEAR / DAY) + state.number - len(state.sudden)
+        freedom = self.noise.independent(n_days) - n_weather
+        equations = state.equations.first(n_weather + n_times)
+        line = self._line(state.number, n_times - 1)
+        return ModeTrends.fitted(equations, self.noise, self.slopes, n_times, freedom), line
+
+    def _with_day(self, state: DriftState, T: Array, y: Array) -> DriftState:
+        """The state after one more day; the day that has waited longest is learned or left out."""
+        coordinates = self.weather.coordinates(T[np.newaxis])
+        earlier = self.weather.later(state.earlier, coordinates[0])
+        row = np.r_[self.weather.columns(coordinates, earlier[np.newaxis])[0], y]
+        waiting, number = np.vstack([state.waiting, row]), state.number + 1
+        sudden = np.append(state.sudden, False) | self._departs(state, waiting, number)
+        state = replace(
+            state, day=days_later(state.day, 1), number=number, earlier=earlier, waiting=waiting, sudden=sudden
+        )
+        if len(sudden) <= self.delay:
+            return state
+        if not sudden[0]:
+            state = self._learned(state, waiting[0], number - self.delay)
+        n_left_out = state.n_left_out + 1 if sudden[0] else 0
+        return replace(state, waiting=waiting[1:], sudden=sudden[1:], n_left_out=n_left_out)
+
+    def _learned(self, state: DriftState, row: Array, number: int) -> DriftState:
+        """With a day in the regression, in which a bend begins with each year of service."""
+        n_weather = len(row) - len(self.modes)
+        line = self._line(number, 1 + int(number * (DAY / YEAR)))
+        x, y = np.r_[row[:n_weather], line], row[n_weather:]
+        known = np.flatnonzero(~np.isnan(y) & ~np.isnan(x).any())
+        more = len(x) + 1 - state.before.shape[1]
+        before = np.insert(state.before, [state.before.shape[1] - 1] * more, 0.0, axis=1)
+        new = np.column_stack([np.tile(x, (len(known), 1)), y[known]])
+        kept = self.noise.correlation ** (number - state.numbers_before[known])[:, np.newaxis]
+        rows = np.sqrt((1 - self.noise.correlation**2) / (1 - kept**2)) * (new - kept * before[known])
+        equations = state.equations.widened(len(x))
+        information, moments = equations.information.copy(), equations.moments.copy()
+        information[known] += rows[:, :-1, np.newaxis] * rows[:, np.newaxis, :-1]
+        moments[known] += rows[:, :-1] * rows[:, -1:]
+        numbers = state.numbers_before.copy()
+        before[known], numbers[known] = new, number
+        return replace(state, equations=NormalEquations(information, moments), before=before, numbers_before=numbers)
+
+    def _departs(self, state: DriftState, waiting: Array, number: int, trend: float = 0.01) -> bool:
+        """Whether the mean of the days that wait is too far from what was predicted."""
+        n_modes = len(self.modes)
+        n_weather, size = waiting.shape[1] - n_modes, state.equations.moments.shape[1]
+        numbers = number - np.arange(len(waiting))[::-1]
+        lines = np.array([self._line(one, size - n_weather - 1) for one in numbers])
+        X, y = np.hstack([waiting[:, :n_weather], lines]), waiting[:, n_weather:]
+        known = ~np.isnan(y) & ~np.isnan(X).any(axis=1, keepdims=True)
+        modes = np.flatnonzero(known.any(axis=0))
+        if not len(modes):
+            return False
+        prior = prior_deviations(n_weather, size - n_weather, trend=trend)
+        coefficients, roots = state.equations.solved(self.noise.deviations, prior)
+        weights = known / np.maximum(known.sum(axis=0), 1)
+        usual = weights.T @ np.nan_to_num(X)
+        apart = np.einsum("tm,tm->m", weights, np.nan_to_num(y)) - np.einsum("mp,mp->m", usual, coefficients)
+        rows = np.einsum("mp,mpq->mq", usual, roots)
+        n_days = self.noise.independent(1.0) * known.sum(axis=0)
+        correlation = self.noise.covariance / np.outer(self.noise.deviations, self.noise.deviations)
+        own = self.noise.deviations / np.sqrt((1 - self.noise.correlation**2) * np.maximum(n_days, 1e-9))
+        spread = correlation * (rows @ rows.T + np.outer(own, own))
+        apart, spread = apart[modes], spread[np.ix_(modes, modes)]
+        freedom = max(self.noise.independent(self.years * (YEAR / DAY)) - n_weather, 4.0)
+        distance = float(apart @ np.linalg.solve(spread, apart))
+        return distance > len(modes) * stats.f.isf(self.chance, len(modes), freedom)

@@ -1,0 +1,627 @@
+"""Faults of sensors in service: dead, stuck, off or drifting thermometers, responses that no damage explains."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from skthermo._core.arrays import Array, as_floats, median, robust_deviation
+from skthermo._core.frames import DAY, DAY_NS, YEAR, as_index, columns_by_sensor, frame_like
+from skthermo.preprocessing.checks import Plausible, equal_runs
+from skthermo.preprocessing.folds import out_of_fold
+from skthermo.residuals.gaussian import Gaussian
+
+Counts = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Position of its column, the other one where two are exchanged (else -1), times in nanoseconds, None as it lasts.
+
+    ``size`` is the departure or the repeated value, ``rate`` that of a drift in a day.
+    """
+
+    kind: str
+    column: int
+    since: int
+    detected: int
+    other: int = -1
+    size: float = 0.0
+    rate: float = 0.0
+    until: int | None = None
+
+    def detail(self, other: Hashable, unit: str) -> str:
+        value, beside = quantity(self.size, unit, 6), "beside what the other thermometers predict; left out"
+        return {
+            "dead": "has had no value for longer than gaps of the baseline",
+            "stuck": f"repeats {value}; left out",
+            "implausible": f"shows implausible values, such as {value}; left out",
+            "offset": f"{self.size:+.1f} degrees {beside}",
+            "drift": f"{self.rate * YEAR.days / 12:+.2f} degrees a month, {self.size:+.1f} so far, {beside}",
+            "swapped": f"its values are in the column of {other!r}; put back in place",
+        }[self.kind]
+
+
+@dataclass(frozen=True)
+class WatchState:
+    """Records of the last days, and all faults in the order in which they were detected.
+
+    ``means`` are daily means of the thermometers over the last months, of ``days_of_means``.
+    """
+
+    stamps: Counts
+    days: Counts
+    values: Array
+    days_of_means: Counts
+    means: Array
+    faults: tuple[Fault, ...] = ()
+
+    def lasting(self, *kinds: str) -> list[Fault]:
+        return [fault for fault in self.faults if fault.until is None and fault.kind in kinds]
+
+    def left_out(self) -> dict[int, Fault]:
+        """By position of each column that is left out, the fault for which it is."""
+        return {fault.column: fault for fault in self.lasting("dead", "stuck", "implausible", "offset", "drift")}
+
+    def opened(self, fault: Fault) -> WatchState:
+        return replace(self, faults=(*self.faults, fault))
+
+    def changed(self, fault: Fault, **values: Any) -> WatchState:
+        return replace(self, faults=tuple(replace(one, **values) if one is fault else one for one in self.faults))
+
+    def in_place(self, responses: Array, n_sensors: int) -> Array:
+        """Responses with exchanged ones back in their columns."""
+        responses = responses.copy()
+        for fault in self.lasting("swapped"):
+            pair = np.array([fault.column, fault.other]) - n_sensors
+            responses[:, pair] = responses[:, pair[::-1]]
+        return responses
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Records without what sensors at fault show, and what became of their values.
+
+    ``held`` are responses that were set aside although the structure may have moved them, (n_records, n_responses).
+    ``notes`` say of each record what was left out, ``n_left_out`` how many of its values.
+    """
+
+    T: pd.DataFrame
+    F: pd.DataFrame
+    held: Mask
+    notes: list[str]
+    n_left_out: Counts
+
+
+@dataclass(frozen=True)
+class Thermometers:
+    """Daily means of thermometers, each predicted by the others.
+
+    ``usual`` are coefficients of the season, ``together`` is the distribution of anomalies beside it, ``known`` has the
+    lowest and highest ones, and ``limits``, (n_windows, n_thermometers), are medians of departures that are beyond
+    chance, of the `windows`.
+    """
+
+    usual: Array
+    together: Gaussian
+    known: Array
+    limits: Array = field(default_factory=lambda: np.empty((0, 0)))
+
+    @classmethod
+    def fitted(cls, days: Counts, means: Array, least: float = 1.0, sigmas: float = 5.0) -> Thermometers:
+        """Learn from the daily means of a baseline.
+
+        Limits are so many standard deviations of a median, as far as the baseline itself goes, and a degree.
+        """
+
+        def departures_by(train: NDArray[np.intp]) -> Any:
+            part = cls._learned(days[train], means[train], has_season)
+            return lambda test: part.departures(days[test], means[test])
+
+        has_season = bool(days[-1] - days[0] >= 330)
+        folds = days // 15 % 5 if has_season else np.arange(len(days)) * 5 // len(days)
+        rest = out_of_fold(departures_by, folds)
+        found = np.array([windows(rest[max(stop - 40, 0) : stop]) for stop in range(1, len(rest) + 1)])
+        spread = sigmas * robust_deviation(found.reshape(len(found), -1)).reshape(found.shape[1:])
+        largest = 1.2 * np.nanmax(np.abs(found), axis=0, initial=0.0)
+        limits = np.fmax(np.fmax(spread, largest), least)
+        return replace(cls._learned(days, means, has_season), limits=limits)
+
+    @classmethod
+    def _learned(cls, days: Counts, means: Array, has_season: bool) -> Thermometers:
+        waves = season(days)[:, : 5 if has_season else 1]
+        usual = np.zeros((5, means.shape[1]))
+        for sensor, column in enumerate(means.T):
+            known = ~np.isnan(column)
+            usual[: waves.shape[1], sensor] = np.linalg.lstsq(waves[known], column[known], rcond=1e-8)[0]
+        anomalies = means - season(days) @ usual
+        found = Gaussian.fitted(anomalies[~np.isnan(anomalies).all(axis=1)])
+        own = np.diag(1e-6 * np.diag(found.covariance) + 0.05**2)  # thermometers are not better than that
+        known = np.array([np.fmin.reduce(anomalies), np.fmax.reduce(anomalies)])
+        return cls(usual, Gaussian(found.mean, found.covariance + own), known)
+
+    def departures(self, days: Counts, means: Array, trusted: Mask | None = None) -> Array:
+        """Daily means less what the other trusted thermometers predict; NaN where either has no value.
+
+        In weather that the baseline does not have, only what goes beyond the prediction's own change by it counts.
+        """
+        anomalies, found = means - season(days) @ self.usual, np.full(means.shape, np.nan)
+        for sensor in range(means.shape[1]):
+            others = anomalies if trusted is None else np.where(trusted, anomalies, np.nan)
+            others = np.where(np.arange(means.shape[1]) == sensor, np.nan, others)
+            expected, within = (
+                self.together.completed(one)[0][:, sensor] for one in (others, np.clip(others, *self.known))
+            )
+            rest, beyond = anomalies[:, sensor] - expected, np.abs(expected - within) / 2
+            found[:, sensor] = np.sign(rest) * np.maximum(np.abs(rest) - beyond, 0.0)
+        return found
+
+
+def season(days: Counts) -> Array:
+    """A constant, and two harmonics of the year."""
+    angle = 2 * np.pi * days[:, np.newaxis] / (YEAR / DAY)
+    return np.hstack([np.ones_like(angle), np.sin(angle), np.cos(angle), np.sin(2 * angle), np.cos(2 * angle)])
+
+
+def windows(rest: Array) -> Array:
+    """Medians of the last days' departures, and what those of the last days differ by from those of the days before.
+
+    NaN where fewer than half of the days have a value, (n_windows, n_thermometers).
+    """
+    last = {n_days: median_of_most(rest[-n_days:], n_days) for n_days in (3, 7, 30)}
+    steps = [last[n_days] - median_of_most(rest[-30 - n_days : -n_days], 30) for n_days in (3, 7)]
+    return np.array([*last.values(), *steps])
+
+
+def median_of_most(rows: Array, n_days: int) -> Array:
+    known = (~np.isnan(rows)).sum(axis=0)
+    return np.where(known > n_days / 2, median(rows) if len(rows) else np.nan, np.nan)
+
+
+def start_of_change(days: Counts, rest: Array) -> tuple[int, float, float]:
+    """Day from which departures have an offset or drift, its size on the last day, and rate in a day.
+
+    The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
+    """
+    known = ~np.isnan(rest)
+    at, values = days[known].astype(float), rest[known]
+    slow = at[: max(len(at) - 6, 0)]
+    shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
+    shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
+    gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
+    best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
+    first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
+    return first, size, float(size / (at[-1] - first + 1)) if is_drift[best] else 0.0
+
+
+@dataclass(frozen=True)
+class Responses:
+    """Responses in their own units beside what the weather predicts.
+
+    ``limits`` are departures from which a value that moves alone is implausible: more than 25 robust deviations, a
+    quarter of its level, and three times what all but one in a thousand of the baseline depart by. ``deviations`` are
+    those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may be exchanged.
+    """
+
+    together: Gaussian
+    centre: Array
+    scatter: Array
+    lowest: Array
+    highest: Array
+    limits: Array
+    deviations: Array
+    pairs: list[tuple[int, int]]
+
+    @classmethod
+    def fitted(cls, temperatures: Array, values: Array, days: Counts, units: Sequence[str]) -> Responses:
+        centre, scatter = median(values), robust_deviation(values)
+        least = 1e-4 * np.fmax(np.where(scatter > 0, scatter, np.abs(centre)), 1e-8)
+        scatter = np.fmax(scatter, least)
+        rows = np.hstack([temperatures, (values - centre) / scatter])
+        together = Gaussian.fitted(rows[~np.isnan(rows).all(axis=1)])
+        own = np.diag(1e-6 * np.maximum(np.diag(together.covariance), 1e-8))
+        bare = cls(
+            Gaussian(together.mean, together.covariance + own),
+            centre,
+            scatter,
+            *(f.reduce(values) for f in (np.fmin, np.fmax)),
+            scatter,
+            scatter,
+            [],
+        )
+        rest = bare.residuals(temperatures, values)[0]
+        usual = np.fmax(25 * robust_deviation(rest), 0.25 * np.abs(centre))
+        reached = 3 * np.nanquantile(np.abs(rest), 0.999, axis=0)
+        by_day = pd.DataFrame(rest).groupby(days).median().to_numpy()
+        sizes = np.fmax(np.abs(centre), scatter), scatter
+        pairs = [
+            (a, b)
+            for a, b in combinations(range(len(centre)), 2)
+            if units[a] == units[b] and all(max(size[[a, b]]) <= 10 * min(size[[a, b]]) for size in sizes)
+        ]
+        limits, deviations = np.fmax(usual, reached), np.fmax(robust_deviation(by_day), least)
+        return replace(bare, limits=limits, deviations=deviations, pairs=pairs)
+
+    def residuals(self, temperatures: Array, values: Array) -> tuple[Array, Array]:
+        """Responses minus those that the weather predicts, and these."""
+        rows = np.hstack([temperatures, np.full(values.shape, np.nan)])
+        expected = self.centre + self.scatter * self.together.completed(rows)[0][:, temperatures.shape[1] :]
+        expected = np.clip(np.where(np.isnan(expected), self.centre, expected), self.lowest, self.highest)
+        return values - expected, expected
+
+    def implausible(self, values: Array, rest: Array) -> Mask:
+        """Values farther from the prediction than damage explains while the others of their record stay.
+
+        Whatever the others do, none is a thousand times as far, and none zero or below where the baseline is above.
+        """
+        size = np.abs(rest) / self.limits
+        with np.errstate(invalid="ignore"):
+            far, never = size > 1, (size > 1000) | ((values <= 0) & (self.lowest > 0))
+        alone = np.zeros(far.shape, dtype=bool)
+        rows = far.any(axis=1) & (rest.shape[1] >= 3)
+        alone[rows] = far[rows] & (median(size[rows].T) < 0.2)[:, np.newaxis]
+        return alone | never
+
+    def exchanged(
+        self, rest: Array, expected: Array, days: Counts, certain: float = 20.0
+    ) -> list[tuple[int, int, int]]:
+        """Pairs whose values of the last days are exchanged, and the first of these days.
+
+        Both come much nearer to their places by it: one has risen and the other one fallen, by about their distance. No
+        damage does that. A day adds at most 50 to the logarithm of the odds.
+        """
+        found = []
+        for first, second in self.pairs:
+            both, total = [first, second], 0.0
+            for day in np.unique(days)[::-1]:
+                today, places = (median(table[days == day][:, both]) for table in (rest, expected))
+                if np.isnan(today).any():
+                    continue
+                gap = places[1] - places[0]
+                here = today / self.deviations[both]
+                there = np.array([today[1] + gap, today[0] - gap]) / self.deviations[both]
+                if not (np.abs(there) < np.abs(here) / 2).all():
+                    break
+                total += min((here @ here - there @ there) / 2, 50.0)
+                if total > certain:
+                    found.append((first, second, int(day)))
+                    break
+        return found
+
+
+@dataclass(frozen=True)
+class SensorWatch:
+    """Watches thermometers and responses in service, and distinguishes faults of sensors from damage where data can.
+
+    Damage moves no thermometer: one that departs from what the others predict is at fault, if all is well without it,
+    and without it alone. A response that moves may be damaged: it is set aside only where no damage explains what it
+    shows. References check thermometers and fill their gaps.
+
+    The state is immutable, and what it says depends on complete days alone. ``runs``, (2, n_columns), are numbers of
+    records from which missing or equal values are a fault.
+    """
+
+    sensors: list[Hashable]
+    columns: list[list[int]]
+    is_reference: Mask
+    modes: list[Hashable]
+    units: list[str]
+    zone: str
+    weather: Plausible
+    runs: Counts
+    least: float
+    span: int
+    thermometers: Thermometers | None
+    filler: Gaussian
+    expected: Responses
+
+    @classmethod
+    def fitted(
+        cls,
+        T: pd.DataFrame,
+        F: pd.DataFrame,
+        *,
+        reference: Sequence[Hashable] = (),
+        units: Mapping[Hashable, str] | None = None,
+    ) -> SensorWatch:
+        """Learn from the baseline; lags of a sensor may have columns of their own.
+
+        ``reference`` names columns of T, ``units`` are texts by column.
+        """
+        by_sensor = columns_by_sensor(T)
+        order = np.argsort(T.index.asi8, kind="stable")
+        stamps, columns = T.index[order], list(by_sensor.values())
+        temperatures, responses = as_floats(T)[order][:, [own[0] for own in columns]], as_floats(F)[order]
+        texts = [dict(units or {}).get(name, "") for name in (*by_sensor, *F.columns)]
+        days = local_days(stamps)
+        n_days = len(np.unique(days))
+        per_day, n_sensors = len(stamps) / max(n_days, 1), len(columns)
+        least, thermometers = 0.3 * per_day, None
+        if n_sensors > 1 and n_days >= 3 * n_sensors + 5 and not np.isnan(temperatures).all(axis=0).any():
+            thermometers = Thermometers.fitted(*daily_means(days, temperatures, least))
+        known = temperatures[~np.isnan(temperatures).all(axis=1)] if n_sensors else np.empty((0, 0))
+        filler = Gaussian.fitted(known) if known.size else Gaussian(np.empty(0), np.empty((0, 0)))
+        runs = run_limits(np.hstack([temperatures, responses]), per_day)
+        return cls(
+            list(by_sensor),
+            columns,
+            np.array([sensor in set(reference) for sensor in by_sensor], dtype=bool),
+            list(F.columns),
+            texts,
+            "" if stamps.tz is None else str(stamps.tz),
+            Plausible.of_weather(temperatures),
+            runs,
+            least,
+            5 + int(np.ceil(runs.max(initial=0) / per_day)),
+            thermometers,
+            filler,
+            Responses.fitted(temperatures, responses, days, texts[n_sensors:]),
+        )
+
+    def start(self) -> WatchState:
+        none, n_sensors = np.empty(0, np.int64), len(self.sensors)
+        return WatchState(none, none, np.empty((0, n_sensors + len(self.modes))), none, np.empty((0, n_sensors)))
+
+    def faults(self, state: WatchState) -> pd.DataFrame:
+        """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``.
+
+        One row a fault, two where two columns are exchanged.
+        """
+        names = [*self.sensors, *self.modes]
+        rows = [
+            [names[own], one.kind, one.since, one.detected, one.until, one.detail(names[other], self.units[own])]
+            for one in state.faults
+            for own, other in [(one.column, one.other), (one.other, one.column)][: 1 if one.other < 0 else 2]
+        ]
+        columns = dict(zip(COLUMNS, zip(*rows, strict=True) if rows else [()] * len(COLUMNS), strict=True))
+        table = {name: pd.Series(list(values), dtype=object) for name, values in columns.items()}
+        return pd.DataFrame(
+            table | {name: as_index(columns[name], self.zone) for name in ("since", "detected", "until")}
+        )
+
+    def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Watched:
+        """Records without what sensors at fault show: NaN there, and exchanged responses back in place.
+
+        What has been ``acknowledged`` as a fault of a sensor, at times in nanoseconds, is not held afterwards.
+        """
+        n_sensors, own = len(self.sensors), [columns[0] for columns in self.columns]
+        temperatures, responses = as_floats(T).copy(), state.in_place(as_floats(F), n_sensors)
+        given = np.hstack([temperatures[:, own], responses])
+        is_far, _, expected = self._evaluated(given)
+        far = is_far[:, n_sensors:]
+        out = np.isin(np.arange(given.shape[1]), list(state.left_out()))
+        removed = (is_far | out) & ~np.isnan(given)
+        held, moments = far.copy(), T.index.as_unit("ns").asi8
+        for column, fault in state.left_out().items():
+            if column >= n_sensors and fault.kind in ("stuck", "implausible"):
+                said = [time for time in acknowledged if time >= fault.since]
+                held[:, column - n_sensors] = moments <= min(said) if said else True
+        notes = self._notes(state, given, is_far & ~out, expected)
+        for sensor, columns in enumerate(self.columns):
+            temperatures[removed[:, sensor], columns[0]] = np.nan
+            if out[sensor]:
+                temperatures[:, columns] = np.nan
+        if self.is_reference.any():
+            filled = self.filler.completed(temperatures[:, own])[0]
+            temperatures[:, own] = np.where(np.isnan(temperatures[:, own]), filled, temperatures[:, own])
+        kept = T.columns.delete(
+            [k for columns, is_one in zip(self.columns, self.is_reference, strict=True) if is_one for k in columns]
+        )
+        responses = np.where(removed[:, n_sensors:], np.nan, responses)
+        return Watched(frame_like(T, temperatures)[kept], frame_like(F, responses), held, notes, removed.sum(axis=1))
+
+    def advance(self, state: WatchState, T_day: pd.DataFrame, F_day: pd.DataFrame) -> WatchState:
+        """The state after one complete day with these records, if any."""
+        if not len(T_day):
+            return state
+        days, stamps = local_days(T_day.index), T_day.index.as_unit("ns").asi8
+        own = np.hstack([as_floats(T_day)[:, [columns[0] for columns in self.columns]], as_floats(F_day)])
+        kept, known = state.days > days[-1] - self.span, state.days_of_means > days[-1] - 120
+        temperatures = own[:, : len(self.sensors)]
+        means = daily_means(days, np.where(self.weather.implausible(temperatures), np.nan, temperatures), self.least)[1]
+        state = replace(
+            state,
+            stamps=np.r_[state.stamps[kept], stamps],
+            days=np.r_[state.days[kept], days],
+            values=np.vstack([state.values[kept], own]),
+            days_of_means=np.append(state.days_of_means[known], days[-1]),
+            means=np.vstack([state.means[known], means[-1:]]),
+        )
+        state = self._with_exchanges(state)
+        state = self._with_runs(state)
+        if self.thermometers is None:
+            return state
+        return self._with_departures(self._without_ended(state))
+
+    def _evaluated(self, values: Array) -> tuple[Mask, Array, Array]:
+        """Which values are implausible, responses minus the expected ones, and the expected ones."""
+        n_sensors = len(self.sensors)
+        temperatures, responses = values[:, :n_sensors], values[:, n_sensors:]
+        impossible = self.weather.implausible(temperatures)
+        rest, expected = self.expected.residuals(np.where(impossible, np.nan, temperatures), responses)
+        return np.hstack([impossible, self.expected.implausible(responses, rest)]), rest, expected
+
+    def _with_exchanges(self, state: WatchState) -> WatchState:
+        """Modes that are exchanged from now on, or no longer."""
+        n_sensors, recent = len(self.sensors), state.days > state.days[-1] - 5
+        recent &= state.stamps >= max((one.detected for one in state.faults if one.kind == "swapped"), default=0)
+        values = state.values[recent]
+        _, rest, expected = self._evaluated(
+            np.hstack([values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)])
+        )
+        for first, second, day in self.expected.exchanged(rest, expected, state.days[recent]):
+            pair, since = {n_sensors + first, n_sensors + second}, self._midnight(day)
+            known = [one for one in state.lasting("swapped") if pair == {one.column, one.other}]
+            if known:
+                state = state.changed(known[0], until=since)
+            else:
+                today = self._midnight(state.days[-1])
+                state = state.opened(Fault("swapped", n_sensors + first, since, today, n_sensors + second))
+        return state
+
+    def _with_runs(self, state: WatchState) -> WatchState:
+        """Columns that are dead, stuck or implausible from now on, or no longer."""
+        n_sensors, out = len(self.sensors), state.left_out()
+        is_given = ~np.isnan(state.values).all(axis=1)  # records without any value tell nothing of a single column
+        values, stamps, today = state.values[is_given], state.stamps[is_given], self._midnight(state.days[-1])
+        values = np.hstack([values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)])
+        far = self._evaluated(values)[0]
+        for column, series in enumerate(values.T):
+            kind, since, size = self._run(series, far[:, column], self.runs[:, column])
+            fault = out.get(column)
+            known = fault.kind if fault is not None and fault.kind in ("dead", "stuck", "implausible") else None
+            if known == kind:
+                continue
+            if fault is not None and (known or kind):
+                state = state.changed(fault, until=today)
+            if kind:
+                state = state.opened(Fault(kind, column, int(stamps[since]), today, size=size))
+        return state
+
+    def _run(self, series: Array, is_far: Mask, limits: Counts) -> tuple[str | None, int, float]:
+        """Kind of the run of values with which a column ends if it is a fault, its first place, and the last value."""
+        known = np.flatnonzero(~np.isnan(series))
+        last = known[-1] if len(known) else -1
+        if len(series) - 1 - last >= limits[0]:
+            return "dead", last + 1, 0.0
+        if not len(known):
+            return None, 0, 0.0
+        n_far = int(np.append(~is_far[known][::-1], True).argmax())
+        if n_far >= 3:
+            return "implausible", known[-n_far], float(series[last])
+        n_equal = int(np.append(series[known][::-1] != series[last], True).argmax())
+        return ("stuck" if n_equal >= limits[1] else None), known[-n_equal], float(series[last])
+
+    def _departures(self, state: WatchState, trusted: Mask) -> tuple[Counts, Array]:
+        """Days, and departures of thermometers from what the trusted ones predict, without values of other faults."""
+        means = state.means.copy()
+        for fault in state.faults:
+            if fault.column < len(self.sensors) and (fault.until is not None or fault.kind not in ("offset", "drift")):
+                is_later = state.days_of_means >= self._day(fault.since)
+                is_over = False if fault.until is None else state.days_of_means >= self._day(fault.until)
+                means[is_later & ~np.asarray(is_over), fault.column] = np.nan
+        return state.days_of_means, self.thermometers.departures(state.days_of_means, means, trusted)
+
+    def _without_ended(self, state: WatchState, n_days: int = 4) -> WatchState:
+        """Thermometers that have come back to less than half of their departure for some days are used again.
+
+        In its first two months, an offset that goes on may turn out to be a drift.
+        """
+        days, rest = self._departures(state, self._trusted(state))
+        for fault in state.lasting("offset", "drift"):
+            own = rest[:, fault.column]
+            known = np.flatnonzero(~np.isnan(own) & (days * DAY_NS > fault.detected - DAY_NS))[-n_days:]
+            if len(known) == n_days and (np.abs(own[known]) < abs(fault.size) / 2).all():
+                state = state.changed(fault, until=self._midnight(days[known[0]]))
+            elif (days[-1] - 60) * DAY_NS < fault.detected:
+                state = state.changed(fault, **self._described(days, own))
+        return state
+
+    def _described(self, days: Counts, own: Array) -> dict[str, Any]:
+        """What the departures of a thermometer that is at fault look like."""
+        first, size, rate = start_of_change(days, own)
+        kind = "drift" if rate else "offset"
+        return {"kind": kind, "since": self._midnight(first), "size": size, "rate": rate}
+
+    def _with_departures(self, state: WatchState) -> WatchState:
+        """The thermometer that departs from the others, if without it, and without no other one, none does."""
+        trusted = self._trusted(state)
+        days, rest = self._departures(state, trusted)
+        far = self._excess(rest, trusted)
+        if not (far > 1).any():
+            return state
+        resolved = []
+        for sensor in np.flatnonzero((far > far.max() / 2) & ~self.is_reference):
+            others = trusted & (np.arange(len(trusted)) != sensor)
+            if not (self._excess(self._departures(state, others)[1], others) > 1).any():
+                resolved.append(int(sensor))
+        if len(resolved) != 1 or 2 * (1 + len(state.lasting("offset", "drift"))) > len(self.sensors):
+            return state
+        found = self._described(days, rest[:, resolved[0]])
+        return state.opened(Fault(column=resolved[0], detected=self._midnight(state.days[-1]), **found))
+
+    def _excess(self, rest: Array, trusted: Mask) -> Array:
+        """The largest median departure of each trusted thermometer over its limit."""
+        return np.where(trusted, np.nan_to_num(np.abs(windows(rest)) / self.thermometers.limits).max(axis=0), 0.0)
+
+    def _trusted(self, state: WatchState) -> Mask:
+        return ~np.isin(np.arange(len(self.sensors)), list(state.left_out()))
+
+    def _notes(self, state: WatchState, given: Array, far: Mask, expected: Array) -> list[str]:
+        """What was left out of each record, and why."""
+        names, n_sensors = [str(name) for name in (*self.sensors, *self.modes)], len(self.sensors)
+        lasting = [
+            f"{names[fault.column]} and {names[fault.other]} are exchanged and were put back in place"
+            if fault.kind == "swapped"
+            else f"{names[fault.column]} is left out ({fault.kind} since {since:%Y-%m-%d})"
+            for fault in (*state.left_out().values(), *state.lasting("swapped"))
+            for since in as_index([fault.since], self.zone)
+        ]
+        notes = ["; ".join(lasting)] * len(given)
+        for row in np.flatnonzero(far.any(axis=1)):
+            parts = [
+                f"{names[k]} is {quantity(given[row, k], self.units[k])}"
+                + (
+                    f", expected about {quantity(expected[row, k - n_sensors], self.units[k])}"
+                    if k >= n_sensors
+                    else ""
+                )
+                + ": implausible, left out"
+                for k in np.flatnonzero(far[row])
+            ]
+            notes[row] = "; ".join([*parts, *lasting])
+        return notes
+
+    def _day(self, moment: int) -> int:
+        return int(local_days(as_index([moment], self.zone))[0])
+
+    def _midnight(self, day: int) -> int:
+        stamp = pd.Timestamp(int(day) * DAY_NS)
+        if self.zone:
+            stamp = stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True)
+        return int(stamp.value)
+
+
+def local_days(stamps: pd.DatetimeIndex) -> Counts:
+    """Calendar day of each stamp in its own time zone, in days since 1970."""
+    return stamps.tz_localize(None).as_unit("ns").asi8 // DAY_NS
+
+
+def daily_means(days: Counts, values: Array, least: float) -> tuple[Counts, Array]:
+    """Days that have records, and means of those that have enough values; else NaN."""
+    first = np.flatnonzero(np.diff(days, prepend=days[:1] - 1))
+    known = ~np.isnan(values)
+    sums, counts = (
+        np.add.reduceat(part, first, axis=0) for part in (np.where(known, values, 0.0), known.astype(float))
+    )
+    return days[first], np.where(counts >= max(least, 1.0), sums / np.maximum(counts, 1.0), np.nan)
+
+
+def run_limits(values: Array, per_day: float) -> Counts:
+    """Numbers of records in a row from which missing and equal values are a fault, (2, n_columns).
+
+    The third longest run of the baseline is its usual one: its own faults are no rule.
+    """
+    limits = np.empty((2, values.shape[1]), dtype=np.int64)
+    seen = values[~np.isnan(values).all(axis=1)]
+    for column, series in enumerate(seen.T):
+        known = np.flatnonzero(~np.isnan(series))
+        for kind, (runs, least, factors) in enumerate(
+            [(np.diff(known) - 1, max(3, round(per_day)), (1.7, 3.0)), (equal_runs(series[known])[1], 5, (4.0, 4.0))]
+        ):
+            longest = np.sort(np.append(runs[runs > kind], [0, 0, 0]))[::-1]
+            usual = int(np.ceil(min(factors[0] * longest[0], factors[1] * longest[2])))
+            limits[kind, column] = max(least * (2 if kind == 0 and longest[0] else 1), usual)
+    return limits
+
+
+def quantity(value: float, unit: str, digits: int = 2) -> str:
+    return f"{value:.{digits}g} {unit}".rstrip()

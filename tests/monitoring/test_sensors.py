@@ -1,0 +1,188 @@
+"""Faults of sensors are named and dated, damage is not masked, and repaired sensors come back."""
+
+import copy
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skthermo.detection import MahalanobisDetector
+from skthermo.monitoring import Monitor
+
+N_BASELINE, N_DAYS, PER_DAY = 200, 50, 4
+ONSET = N_BASELINE + 10
+MODES = ["f1", "f2", "f3", "f4"]
+
+
+def bridge(n_sensors=3, zone=None, seed=0):
+    """Records of a bridge whose thermometers follow one weather, each with its own noise."""
+    random = np.random.default_rng(seed)
+    n = (N_BASELINE + N_DAYS) * PER_DAY
+    index = pd.date_range("2026-01-01", periods=n, freq=pd.Timedelta(days=1) / PER_DAY, tz=zone).as_unit("ns")
+    day = np.arange(n) / PER_DAY
+    slow = np.repeat(np.convolve(random.normal(0, 2, n // PER_DAY + 6), np.ones(7) / 2, "valid"), PER_DAY)
+    weather = 10 + 4 * np.sin(2 * np.pi * day) + slow
+    T = pd.DataFrame(
+        {f"T{j}": weather * (1 + 0.1 * j) + random.normal(0, 0.6, n) for j in range(n_sensors)}, index=index
+    )
+    F = [2.0, 3.0, 3.3, 5.0] * (1 - 0.001 * weather[:, np.newaxis]) * (1 + random.normal(0, 0.003, (n, 4)))
+    return T.join(pd.DataFrame(F, index, MODES))
+
+
+def fitted(records, **settings):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what 200 days tell of one alarm a year
+        return Monitor(MahalanobisDetector(), targets=MODES, **settings).fit(records[: N_BASELINE * PER_DAY])
+
+
+@pytest.fixture(scope="module")
+def records():
+    return bridge()
+
+
+@pytest.fixture(scope="module")
+def monitor(records):
+    return fitted(records)
+
+
+def after_service(monitor, records, n_days=30):
+    """The monitor after the days that follow the baseline; the last record closes the last of these."""
+    monitor = copy.deepcopy(monitor)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of records that are not evaluated
+        monitor.update(records[N_BASELINE * PER_DAY : (N_BASELINE + n_days) * PER_DAY + 1])
+    return monitor
+
+
+def late(records, day=ONSET):
+    """Stamps from a day on."""
+    return records.index[day * PER_DAY :]
+
+
+def with_fault(records, kind):
+    """Records with a fault from the onset on, and the columns concerned."""
+    faulty, since = records.copy(), late(records)
+    if kind == "dead":
+        faulty.loc[since, "T1"] = np.nan
+    elif kind == "stuck":
+        faulty.loc[since, "T1"] = 11.5
+    elif kind == "offset":
+        faulty.loc[since, "T1"] += 3.0
+    elif kind == "drift":
+        faulty.loc[since, "T1"] += (since - since[0]) / pd.Timedelta(days=10)
+    elif kind == "implausible":
+        faulty.loc[since, "f4"] *= 1.4
+        return faulty, ["f4"]
+    elif kind == "swapped":
+        faulty.loc[since, ["f2", "f3"]] = faulty.loc[since, ["f3", "f2"]].to_numpy()
+        return faulty, ["f2", "f3"]
+    return faulty, ["T1"]
+
+
+def test_healthy_sensors_are_left_alone(monitor, records):
+    served = after_service(monitor, records, N_DAYS)
+    assert served.faults_.empty
+    pd.testing.assert_frame_equal(served.corrected_, records.loc[served.records_.index], check_freq=False)
+
+
+@pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "drift", "implausible", "swapped"])
+def test_a_fault_is_named_dated_and_left_out(monitor, records, kind):
+    faulty, columns = with_fault(records, kind)
+    served = after_service(monitor, faulty, N_DAYS - 1)
+    faults, onset = served.faults_, late(records)[0]
+    assert faults["column"].tolist() == columns
+    assert set(faults["kind"]) == {kind}
+    assert faults["until"].isna().all()
+    assert (abs(faults["since"] - onset) <= pd.Timedelta(days=20 if kind == "drift" else 1)).all()
+    assert (faults["detected"] - onset <= pd.Timedelta(days=40 if kind == "drift" else 3)).all()
+    kept = served.corrected_.loc[max(faults["detected"]) + pd.Timedelta("1D") :]
+    if kind == "swapped":
+        np.testing.assert_array_equal(kept[columns], records.loc[kept.index, columns])
+    else:
+        assert kept[columns].isna().all(axis=None)
+    assert kept.drop(columns=columns).notna().all(axis=None)
+
+
+@pytest.mark.one_case
+@pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "swapped"])
+def test_a_repaired_sensor_comes_back(monitor, records, kind):
+    faulty, columns = with_fault(records, kind)
+    repaired = late(records, ONSET + 10)
+    faulty.loc[repaired] = records.loc[repaired]
+    served = after_service(monitor, faulty)
+    faults = served.faults_
+    assert faults["column"].tolist() == columns
+    assert (abs(faults["until"] - repaired[0]) <= pd.Timedelta(days=2)).all()
+    assert served.corrected_.iloc[-1].equals(records.loc[served.last_])
+
+
+@pytest.mark.one_case
+@pytest.mark.parametrize(
+    "lost", [{"f1": 0.1}, {"f3": 0.1}, {"f1": 0.2, "f2": 0.02}, dict.fromkeys(["f1", "f2", "f3", "f4"], 0.1)]
+)
+def test_damage_is_not_taken_for_a_fault(monitor, records, lost):
+    damaged = records.copy()
+    for mode, share in lost.items():
+        damaged.loc[late(records), mode] *= 1 - share
+    served = after_service(monitor, damaged)
+    assert served.faults_.empty
+    assert served.corrected_[MODES].equals(damaged.loc[served.records_.index, MODES])
+
+
+@pytest.mark.one_case
+@pytest.mark.parametrize("moved", [[6.0, -6.0, 20.0], [25.0, 25.0, 25.0]])
+def test_where_most_thermometers_depart_none_is_left_out(monitor, records, moved):
+    faulty = records.copy()
+    faulty.loc[late(records), ["T0", "T1", "T2"]] += moved
+    served = after_service(monitor, faulty)
+    assert served.faults_.empty
+    assert served.corrected_.equals(faulty.loc[served.records_.index])
+
+
+def test_of_two_thermometers_that_contradict_each_other_both_stay(monitor, records):
+    """It is not known which is wrong: of two, or of two that are left."""
+    two, left = bridge(2), records.copy()
+    left.loc[late(records, N_BASELINE + 3), "T0"] = np.nan
+    for faulty, own, kinds in ((two, fitted(two), []), (left, monitor, ["dead"])):
+        faulty.loc[late(records), "T1"] += 3.0
+        served = after_service(own, faulty)
+        assert served.faults_["kind"].tolist() == kinds
+        assert served.corrected_["T1"].equals(faulty.loc[served.records_.index, "T1"])
+
+
+def test_a_reference_tells_which_thermometer_is_wrong_and_fills_it():
+    station = bridge(2).rename(columns={"T1": "station"})
+    own, onset = fitted(station, reference=["station"]), late(station)
+    station.loc[onset, "T0"] += 3.0
+    served = after_service(own, station)
+    assert served.faults_[["column", "kind"]].to_numpy().tolist() == [["T0", "offset"]]
+    truth = bridge(2)["T0"]
+    seen = served.corrected_["T0"][-60:]
+    assert (seen - truth.loc[seen.index]).abs().mean() < 1.5
+    assert "station" not in served.corrected_
+
+
+def test_one_thermometer_can_still_be_dead_or_stuck():
+    alone = bridge(1)
+    own = fitted(alone)
+    for value, kind in ((np.nan, "dead"), (9.0, "stuck")):
+        alone.loc[late(alone), "T0"] = value
+        assert after_service(own, alone).faults_["kind"].tolist() == [kind]
+
+
+def test_outages_of_the_logger_and_empty_days_are_no_faults(monitor, records):
+    outage = records.index[ONSET * PER_DAY : (ONSET + 10) * PER_DAY]
+    empty = records.copy()
+    empty.loc[outage] = np.nan
+    assert after_service(monitor, empty).faults_.empty
+    assert after_service(monitor, records.drop(outage)).faults_.empty
+
+
+def test_days_are_those_of_the_records_time_zone():
+    zoned = bridge(zone="Europe/Brussels")
+    own = fitted(zoned)
+    faults = after_service(own, with_fault(zoned, "offset")[0]).faults_
+    assert faults["column"].tolist() == ["T1"]
+    assert str(faults["since"].dt.tz) == "Europe/Brussels"
+    assert abs(faults["since"][0] - late(zoned)[0]) <= pd.Timedelta(days=1)
