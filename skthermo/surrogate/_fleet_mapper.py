@@ -171,10 +171,14 @@ class FleetMapper(TableRegressor):
         self.sizes_ = np.nanmean(sizes, axis=0)
         days = np.median(np.diff(row_times(X))) / 86_400e9 if has_stamps(X) and len(inputs) > 1 else 1.0
         dependence = 2.0 / np.clip(days, 1e-3, 2.0)
-        self.posteriors_ = [
-            Posterior.learned(functions[rows], link(column) - mean[rows], dependence)
-            for (mean, functions), column, rows in zip(self._functions(X, inputs), columns, usable.T, strict=True)
-        ]
+        self.posteriors_ = []
+        for (mean, functions), column, rows in zip(self._functions(X, inputs), targets.T, usable.T, strict=True):
+            rows = rows & ~np.isnan(functions).any(axis=1)  # a mapper may lack means of earlier temperatures
+            if rows.sum() < 2:
+                raise ValueError(
+                    f"an output has {rows.sum()} of n_samples={len(inputs)} rows complete; expected 2 or more"
+                )
+            self.posteriors_.append(Posterior.learned(functions[rows], link(column[rows]) - mean[rows], dependence))
         warn_each(self.findings_)
         return self
 
