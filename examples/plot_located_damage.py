@@ -3,9 +3,9 @@ From an alarm to the damaged elements
 =====================================
 
 A footbridge of three equal spans is monitored for a year. In the next spring, three neighbouring elements of its first
-span have lost a part of their stiffness. :func:`~skthermo.studies.identify_damage` says which span has changed, and
-:func:`~skthermo.studies.locate_damage` where in it, element by element, as far as the records tell. The bridge is
-symmetric, so that frequencies alone cannot tell the first span from the last; measured mode shapes can.
+span have lost a part of their stiffness. :func:`~skthermo.studies.identify_damage` says which span has changed and,
+given the structure, where in it, element by element, as far as the records tell. The bridge is symmetric, so that
+frequencies alone cannot tell the first span from the last; measured mode shapes can.
 
 Run it with ``python examples/plot_located_damage.py``; figures go to the folder ``figures``. It needs
 :download:`page_recipes.py` beside it. The guide is :doc:`/guide/identify`.
@@ -19,7 +19,7 @@ from page_recipes import command_line, save_figures
 
 from skthermo.fem import Beam, Spring, Structure, add_noise
 from skthermo.plotting import StructureDisplay
-from skthermo.studies import locate_damage
+from skthermo.studies import identify_damage
 from skthermo.surrogate import DataInformedFEM
 
 options = command_line().parse_args()
@@ -65,7 +65,7 @@ fem = DataInformedFEM(model, random_state=0).fit(T[:366], F[:366])
 # Each stretch of neighbouring beams may be damaged, as may whole spans and the bearings. What frequencies cannot tell
 # apart stays together: the same place in the first and in the last span, one the mirror image of the other.
 
-located = locate_damage(fem, bridge, T[366:], F[366:], random_state=0)
+located = identify_damage(fem, T[366:], F[366:], structure=bridge, random_state=0)
 print(located.summary())
 print(located.groups.round(2))
 colours = {"cmap": "viridis_r", "limits": (0, 1), "label": "probability of damage"}
@@ -77,9 +77,8 @@ StructureDisplay.from_structure(bridge, located.table["probability"], **colours)
 dofs = [bridge.dofs.index((i, "z")) for i in range(3, 30, 3)]
 shapes = [one.modes(theta[[370]])[1][0][dofs] for one in (model, truth)]
 shapes = [shape + 0.02 * np.abs(shape).max(axis=0) * random.normal(size=shape.shape) for shape in shapes]
-with_shapes = locate_damage(
-    fem, bridge, T[366:], F[366:], shapes=tuple(shapes), dofs=dofs, shape_noise=0.02, random_state=0
-)
+measured = {"shapes": tuple(shapes), "dofs": dofs, "shape_noise": 0.02}
+with_shapes = identify_damage(fem, T[366:], F[366:], structure=bridge, random_state=0, **measured)
 print(with_shapes.summary())
 StructureDisplay.from_structure(bridge, with_shapes.table["probability"], **colours)
 

@@ -24,7 +24,7 @@ LIMITS = pd.DataFrame.from_dict(
         "plotting": (8, 0, 9, 5),
         "preprocessing": (17, 7, 7, 6),
         "reporting": (1, 11, 0, 0),
-        "studies": (15, 15, 10, 24),
+        "studies": (13, 16, 10, 24),
         "surrogate": (10, 11, 9, 11),
         "updating": (4, 10, 0, 3),
     },
@@ -39,6 +39,7 @@ LARGER = {  # what has more, and why
     "monitoring.Monitor": "a detector in service: its settings, its records, its events, what an owner decides",
     "studies.DetectabilityStudy": "what is simulated, what is uncertain, and every table of the result",
     "studies.detection_task": "the settings of a study, for grid searches",
+    "studies.IdentifiedDamage": "the most probable explanation, all others, and what they leave open",
     "studies.identify_damage": "each prior and each doubt about a measurement is a setting",
 }
 

@@ -46,7 +46,7 @@ class ImportedStructure(Structure):
     """Nodes, members and groups of a model that another program has assembled, with a term for each member.
 
     It serves wherever a `Structure` does: `assemble` makes the whole stiffness of groups of members the parameters,
-    `divide` takes groups apart, `skthermo.studies.locate_damage` finds damaged members, and displays draw them.
+    `divide` takes groups apart, `skthermo.studies.identify_damage` finds damaged members, and displays draw them.
 
     Parameters
     ----------

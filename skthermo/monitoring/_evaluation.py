@@ -84,9 +84,10 @@ def losses_of(detector: Any) -> pd.DataFrame | None:
 
 
 def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
-    """Effects of losses of the damage groups in standard deviations, NaN where they explain less than half of a record.
+    """Losses of the damage groups, as in column "loss top", and their effects in standard deviations, "effect top".
 
-    Groups that cannot be distinguished are one, such as "top or bottom"; no columns without such directions.
+    NaN where they explain less than half of a record. Groups that cannot be distinguished are one, such as "top or
+    bottom"; no columns without such directions.
     """
     directional = directions_of(detector)
     if directional is None:
@@ -94,16 +95,19 @@ def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
     *steps, last = parts_of(detector)
     with collected(drop_others=True):
         table = _through(steps, records)
-        effects, shares = last.severities(table) * directional.sensitivities_, last.explained(table)
+        losses, shares = last.severities(table).set_axis(records.index), last.explained(table)
     names = directional.directions_.index
     alike = pd.DataFrame(np.eye(len(names)), names, names)
     for one, other in directional.indistinguishable_:
         alike.loc[one, other] = 1.0
     together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
     joined = {name: " or ".join(names[together == together[name]]) for name in names}
-    effects = effects.T.groupby(joined).sum().T.round(2).set_axis(records.index)
-    is_explained = np.round(shares, 4)[:, np.newaxis] >= 0.5
-    return effects.where((effects > 0) & is_explained)
+    losses, effects = (
+        one.T.groupby(joined).sum().T for one in (losses, (losses * directional.sensitivities_).round(2))
+    )
+    is_explained = (effects > 0) & (np.round(shares, 4)[:, np.newaxis] >= 0.5)
+    found = {"loss ": losses.round(6), "effect ": effects}
+    return pd.concat([one.where(is_explained).add_prefix(prefix) for prefix, one in found.items()], axis=1)
 
 
 def causes(records: pd.DataFrame, targets: list[Any], temperatures: list[Any], index: Array) -> list[str]:

@@ -133,9 +133,10 @@ class Events:
                 n_alarms = int((~np.isnan(level[first:stop])).sum())
                 means = effects[first:stop].sum() / n_alarms
                 groups = "" if kind == MEASUREMENT else leading(means[means > 2].rename(lambda name: name[7:]))
+                size = decisions[f"loss {groups.split(', ')[0]}"][first:stop].sum() / n_alarms if groups else np.nan
                 end = decisions.index[stop] if stop < len(times) else pd.NaT
                 stamps = decisions.index[first], end, level[peak], decisions.index[peak]
-                rows.append((kind, *stamps, modes.iloc[peak], groups, n_alarms))
+                rows.append((kind, *stamps, modes.iloc[peak], groups, size, n_alarms))
                 spans.append((first, stop))
         order = sorted(range(len(rows)), key=lambda n: (spans[n][0], rows[n][0]))
         self.numbers = {kind: np.zeros(len(times), dtype=np.int64) for kind in limits}
@@ -143,7 +144,7 @@ class Events:
             self.numbers[rows[n][0]][slice(*spans[n])] = number
         stamp = decisions.index.dtype
         dtypes = {"kind": object, "start": stamp, "end": stamp, "peak": float, "peak_time": stamp}
-        dtypes |= {"modes": object, "groups": object, "n_alarms": np.int64}
+        dtypes |= {"modes": object, "groups": object, "size": float, "n_alarms": np.int64}
         columns = zip(*(rows[n] for n in order), strict=True) if rows else [()] * len(dtypes)
         self.table = pd.DataFrame(
             {
@@ -195,7 +196,7 @@ def evaluations(decisions: pd.DataFrame, events: Events, said: pd.DataFrame) -> 
             "threshold": decisions["threshold"].to_numpy(),
             "modes": pd.Series(np.where(is_shown, modes, "").tolist(), decisions.index, dtype=object),
             "groups": pd.Series(groups.tolist(), decisions.index, dtype=object),
-            "reason": decisions["reason"].to_numpy(),
+            "reason": decisions["reason"],
             "event": np.where(has_index | is_held, number, 0),
         },
         decisions.index,

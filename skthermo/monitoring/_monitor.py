@@ -131,7 +131,8 @@ class Monitor(SavesFrames, Estimator):
     events_ : DataFrame
         A row for each event, counted from 1: ``kind`` ("damage", "watch", or "measurement or structure":
         responses that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it
-        is open), ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the
+        is open), ``size`` (loss of stiffness of the first of ``groups``, on average over its records in alarm; NaN
+        without), ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the
         largest number of responses set aside), ``peak_time``, ``modes`` (at the peak) and ``groups`` (of all records in
         alarm together), as in `update`, ``n_alarms`` (records while it was open), ``acknowledged``, ``harmless`` and
         ``note``.
@@ -529,7 +530,7 @@ class Monitor(SavesFrames, Estimator):
         records = records.iloc[: places[-1] + 1]
         sizes = np.abs(departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places])
         sizes = np.round(np.nan_to_num(sizes), 2)
-        effects = group_effects(self.detector_, records[self.features_]).iloc[places].add_prefix("effect ")
+        effects = group_effects(self.detector_, records[self.features_]).iloc[places]
         decisions = self.decisions_.copy()
         modes = decisions["modes"].to_numpy(copy=True)
         modes[rows] = [leading(dict(zip(map(str, self.targets_), size, strict=True))) for size in sizes]

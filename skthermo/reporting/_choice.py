@@ -50,9 +50,8 @@ class Choice:
 
     @property
     def comparison(self) -> list[str]:
-        """What the study's summary says of the ranking; times and bands are in other sections."""
-        waits = self.study.time_to_detection(detector=self.best, smallest=True)
-        elsewhere = {f"{row['scenario']!r} {row['text']}." for _, row in waits.iterrows()}
+        """What the study's summary says of the ranking; bands are in another section."""
+        elsewhere: set[str] = set()
         if self.study.uncertainty_ is not None:
-            elsewhere |= set(self.study.uncertainty_summary(self.best).splitlines())
+            elsewhere = set(self.study.uncertainty_summary(self.best).splitlines())
         return [line for line in self.study.summary(self.limit).splitlines() if line not in elsewhere]

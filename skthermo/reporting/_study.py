@@ -20,7 +20,6 @@ from skthermo.reporting._templates import Row, rows_of
 from skthermo.studies import DetectabilityStudy, IdentifiedDamage, ProgressiveDamage, Scenario, UncertainDamage
 
 MOST_DRAWN = 12  # largest number of scenarios that are drawn
-RELIABLE = 0.95  # share of the cases in which damage is detected within the reported time
 State: TypeAlias = Scenario | ProgressiveDamage | UncertainDamage
 
 
@@ -71,7 +70,6 @@ def study_facts(
         "versions": versions(),
         "warned": warned,
         **alarms(study),
-        **times(study),
     }
 
 
@@ -98,19 +96,6 @@ def alarms(study: DetectabilityStudy) -> dict[str, Any]:
         "missed": sorted(missed, key=lambda state: state["rate"]),
         "n_not_evaluated": int(sum(is_unknown.sum() for is_unknown in simulated)),
         "n_simulated": sum(len(is_unknown) for is_unknown in simulated),
-    }
-
-
-def times(study: DetectabilityStudy) -> dict[str, Any]:
-    """How soon damage is detected, in all scenarios and for the smallest damage of each family, healthy states last."""
-    is_healthy = dict(zip(study.results_["scenario"], study.results_["measure"] == "PFA", strict=True))
-    smallest = study.time_to_detection(level=RELIABLE, smallest=True)
-    waits = study.time_to_detection(level=RELIABLE)
-    return {
-        "soonest": rows_of(smallest.sort_values("scenario", key=lambda names: names.map(is_healthy), kind="stable")),
-        "waits": rows_of(waits),
-        "windows": [name for name in waits if f"{name} healthy" in waits and waits[name].notna().any()],
-        "delayed": float(waits["not_evaluated"].max()),
     }
 
 

@@ -14,7 +14,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.arrays import Array, means_of_known, median, rows_by_pattern
+from skthermo._core.arrays import Array, means_of_known, median
 from skthermo._core.frames import correlation_times
 from skthermo.exceptions import WeatherWarning
 from skthermo.preprocessing import HampelFilter
@@ -23,9 +23,7 @@ from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.weather import (
     NearestPlaces,
     TrainingRange,
-    WeatherFunctions,
     mean_of_nearest,
-    nearest_in_parts,
     one_in_each_part,
     weather_coordinates,
 )
@@ -82,49 +80,9 @@ class BaselineResiduals:
         """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
         return self._where_known(weather, lambda known: self._similar_mean(self.own, known))
 
-    def shares(self, weather: Array) -> Array:
-        """Share of each record in the mean of the expected residuals over all rows, (n_records, n_modes)."""
-        shares = np.zeros_like(self.values)
-        weather = weather[~np.isnan(weather).any(axis=1)]
-        wanted = self.coordinates.transform(weather) if len(weather) else weather
-        for mask, modes in rows_by_pattern(compared(self.values, int(MOST_SIMILAR / 0.1)).T):
-            known = np.flatnonzero(mask)
-            if not len(known):
-                continue
-            counts = np.zeros(len(known))
-            for _, _, near in nearest_in_parts(self.places[known], wanted, self._n_compared):
-                counts += np.bincount(near.ravel(), minlength=len(known))
-            shares[np.ix_(known, modes)] = (counts / max(counts.sum(), 1))[:, np.newaxis]
-        return shares
-
-    def prediction_weights(self, weather: Array) -> Array:
-        """Weight of each record in the mean of the healthy predictions over all rows, (n_records, n_modes).
-
-        The predictions count as least squares on `WeatherFunctions`, and the rest as its mean in similar weather: the
-        mapper errs alike for a season, the most in the coldest and the warmest.
-        """
-        weights, functions = self.shares(weather), WeatherFunctions.fitted(self.weather)
-        of_records = functions.values(self.weather)
-        wanted = functions.values(weather[~np.isnan(weather).any(axis=1)], is_clipped=True)
-        for column, known in zip(weights.T, ~np.isnan(self.values.T), strict=True):
-            if known.any() and len(wanted):
-                some = of_records[known]
-                column[known] += np.linalg.pinv(some).T @ (wanted.mean(axis=0) - some.T @ column[known])
-        return weights
-
-    def n_expected(self, weather: Array) -> Array:
-        """Effective sample size of the mean of the expected residuals over all rows, (n_modes,); 0 without any."""
-        squares = (self.shares(weather) ** 2).sum(axis=0)
-        return np.divide(1.0, squares, out=np.zeros(self.n_modes), where=squares > 0)
-
     def less_similar(self, values: Array) -> Array:
         """Values of the records, (n_records, n_columns), less the mean of the records in similar weather."""
         return values - self._similar_mean(values, self.weather)
-
-    @cached_property
-    def scatter(self) -> Scatter:
-        """How records scatter around what similar weather explains, and how long they remember it."""
-        return Scatter.estimated(self)
 
     @property
     def is_overfitted(self) -> bool:
@@ -385,50 +343,10 @@ class Scatter:
             )
         return cls(parts, memory, n_records)
 
-    @classmethod
-    def independent(cls, deviations: Array, n_records: int) -> Scatter:
-        """Independent records and modes of known standard deviations, (n_modes,)."""
-        covariance = np.diag(deviations**2)
-        return cls(np.array([covariance, 0 * covariance]), 0.0, np.full(len(deviations), n_records))
-
     @property
     def variances(self) -> Array:
         """Variance of single records, (n_modes,)."""
         return np.diag(self.parts.sum(axis=0))
-
-    @property
-    def numbers(self) -> Array:
-        """As many independent records as determine each part, (2, n_modes)."""
-        return np.outer([1.0, (1 - self.memory) / (1 + self.memory)], self.n_records)
-
-    @property
-    def n_trained(self) -> float:
-        """As many independent records as would determine the mean of all modes as well as the training records do."""
-        most = int(self.n_records.max(initial=0))
-        weights = (np.arange(most)[:, np.newaxis] < self.n_records) / np.maximum(self.n_records, 1)
-        numbers = self.n_independent(self.of_sums(weights, np.arange(most)))
-        return float(numbers[self.variances > 0].min(initial=np.inf))
-
-    def n_independent(self, parts: Array) -> Array:
-        """As many independent records as would have a mean with such variances, (n_modes,)."""
-        variances = np.diag(parts.sum(axis=0))
-        return np.divide(self.variances, variances, out=np.zeros(len(variances)), where=variances > 0)
-
-    def freedom(self, parts: Array) -> float:
-        """Degrees of freedom of a covariance, (2, n_modes, n_modes), by parts: Satterthwaite's, mean of the modes."""
-        variances = np.diagonal(parts, axis1=1, axis2=2)[:, self.variances > 0]
-        squares = (variances**2 / self.numbers[:, self.variances > 0]).sum(axis=0)
-        return float((variances.sum(axis=0) ** 2 / squares).mean())
-
-    def of_sums(self, weights: Array, places: Array) -> Array:
-        """Covariance of weighted sums of records in order of place, (2, n_modes, n_modes), by parts.
-
-        Weights are (n_records, n_modes); places count records.
-        """
-        kept = self.memory ** np.diff(places, prepend=places[:1])
-        before = _running_sums(weights, kept)
-        after = _running_sums(weights[::-1], np.roll(kept[::-1], 1))[::-1]
-        return self.parts * np.array([weights.T @ weights, weights.T @ (before + after - weights)])
 
 
 def lagged_covariances(first: Array, second: Array, lags: Sequence[int]) -> Array:
@@ -510,13 +428,3 @@ def _covariance(correlations: Array, variances: Array) -> Array:
     positive = vectors * np.maximum(values, 1e-3) @ vectors.T
     scale = np.sqrt(variances / np.diag(positive))
     return positive * np.outer(scale, scale)
-
-
-def _running_sums(values: Array, kept: Array) -> Array:
-    """Sums of the values up to each row; a share ``kept`` of the sum of the row before is added to each value."""
-    if (kept[1:] == kept[-1]).all():
-        return np.asarray(scipy.signal.lfilter([1.0], [1.0, -kept[-1]], values, axis=0))
-    sums = values.copy()
-    for row in range(1, len(sums)):
-        sums[row] += kept[row] * sums[row - 1]
-    return sums

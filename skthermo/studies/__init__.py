@@ -16,9 +16,7 @@ from skthermo.studies.detectability import (
 from skthermo.studies.identification import (
     DamagePrior,
     IdentifiedDamage,
-    LocatedDamage,
     identify_damage,
-    locate_damage,
 )
 
 __all__ = [
@@ -26,7 +24,6 @@ __all__ = [
     "DetectabilityStudy",
     "DetectionTask",
     "IdentifiedDamage",
-    "LocatedDamage",
     "PODCurve",
     "ProgressiveDamage",
     "Scenario",
@@ -34,7 +31,6 @@ __all__ = [
     "compare_extensions",
     "detection_task",
     "identify_damage",
-    "locate_damage",
     "pod_curve",
     "sweep",
 ]

@@ -37,6 +37,7 @@ from skthermo._core.frames import (
     Table,
     check_same_rows,
     column_names,
+    columns_by_sensor,
     frame_like,
     has_stamps,
     like_targets,
@@ -360,7 +361,7 @@ class TemperatureMapper(MultiplierRegressor):
         Exponential means of earlier temperatures beside those of now (`~skthermo.preprocessing.ExponentialMeans`): of
         all columns with these half-lives, or none. "auto" takes those of one column, with 6 hours, a day, 5 or 30 days
         or all of these, with which periods held out are predicted better, if any (:doc:`/guide/records_theory`). It
-        needs a DatetimeIndex and records of nine months.
+        needs a DatetimeIndex and records of nine months, and takes none beside lags.
     random_state : int, RandomState or None, default=None
         Seed of the regressor, unless it has its own seed.
 
@@ -495,10 +496,12 @@ class TemperatureMapper(MultiplierRegressor):
 
     def _chosen(self, T: Table, targets: Array) -> ExponentialMeans | None:
         """Unfitted means of earlier temperatures."""
-        is_timed = has_stamps(T) and not (T.index.hasnans or T.index.has_duplicates)
-        if self.means is None or (is_auto(self.means) and not is_timed):
+        if self.means is None or not is_auto(self.means):
+            return None if self.means is None else ExponentialMeans(half_lives=self.means)
+        if not has_stamps(T) or T.index.hasnans or T.index.has_duplicates:
             return None
-        return chosen_means(T, targets) if is_auto(self.means) else ExponentialMeans(half_lives=self.means)
+        has_past = any(len(columns) > 1 for columns in columns_by_sensor(T).values())  # lags or means
+        return None if has_past else chosen_means(T, targets)
 
     def _inputs(self, X: ArrayLike) -> Array:
         T = super()._inputs(X)

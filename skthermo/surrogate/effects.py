@@ -1,7 +1,7 @@
 """Changes of a structure by unknown amounts: their effects on its parameters, and on its frequencies over some
 weather."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, Matrix, as_floats
+from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import check_is_fitted
 from skthermo.fem.damage import as_directions, names_of_groups
 
@@ -21,15 +21,14 @@ HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 class StructuralChanges:
     """Effects of some amounts on theta, whose columns they multiply by 1 + direction * amount.
 
-    The columns are the model's parameters, then 1 - severity of each of the model's damage ``groups``, then 1 + amount
-    of each of the added ``masses``. ``directions`` are (n_causes, n_columns), and ``bounds``, (n_causes, 2), the lowest
-    and the highest amounts that reduced models cover.
+    The columns are the model's parameters, then 1 - severity of each of the model's damage ``groups``. ``directions``
+    are (n_causes, n_columns), and ``bounds``, (n_causes, 2), the lowest and the highest amounts that reduced models
+    cover.
     """
 
     groups: Sequence[str]
     directions: Array
     bounds: Array
-    masses: Mapping[str, Matrix] = field(default_factory=dict, repr=False)
     near_share: float = 1 / 3  # of the bounds, up to which amounts have a reduced model; one for all would be large
 
     @classmethod
@@ -41,7 +40,7 @@ class StructuralChanges:
     @property
     def n_parameters(self) -> int:
         """Number of columns that are the model's parameters."""
-        return self.directions.shape[1] - len(self.groups) - len(self.masses)
+        return self.directions.shape[1] - len(self.groups)
 
     def factors(self, amounts: Array) -> Array:
         """Factors of the columns, (..., n_columns), for amounts (..., n_causes)."""
@@ -53,8 +52,7 @@ class StructuralChanges:
 
     def rows(self, theta: Array, amounts: Array) -> Array:
         """Rows of theta with every set of amounts, (n_sets, n_rows, n_columns)."""
-        further = np.ones((len(theta), len(self.groups) + len(self.masses)))
-        return np.hstack([theta, further]) * self.factors(amounts)[:, np.newaxis]
+        return np.hstack([theta, np.ones((len(theta), len(self.groups)))]) * self.factors(amounts)[:, np.newaxis]
 
     def are_near(self, amounts: Array) -> NDArray[np.bool_]:
         """Which sets of amounts a reduced model covers, (n_sets,)."""
@@ -68,7 +66,7 @@ class StructuralChanges:
 
     def severities(self, amounts: Array) -> Array:
         """Severities of the model's groups, (..., n_groups)."""
-        return 1 - self.factors(amounts)[..., self.n_parameters :][..., : len(self.groups)]
+        return 1 - self.factors(amounts)[..., self.n_parameters :]
 
 
 @dataclass(frozen=True)
@@ -85,40 +83,28 @@ class ChangedStructure:
     @property
     def is_exact(self) -> bool:
         """Whether the model takes all of the columns."""
-        groups, masses, model = self.changes.groups, self.changes.masses, self.fem.model
-        has_groups = not groups or hasattr(model, "with_damage_parameters")
-        return has_groups and (not masses or hasattr(model, "with_mass_parameters"))
+        return not self.changes.groups or hasattr(self.fem.model, "with_damage_parameters")
 
-    def linearise(self, theta: Array, sets: Array, dofs: NDArray[np.intp] | None = None) -> list[Array]:
-        """Frequencies for some sets of amounts, (n_sets, n_rows, n_modes), and derivatives of ln f by the amounts.
-
-        With ``dofs``, also the shapes there, (n_sets, n_rows, n_dofs, n_modes), and their derivatives.
-        """
+    def linearise(self, theta: Array, sets: Array) -> list[Array]:
+        """Frequencies for some sets of amounts, (n_sets, n_rows, n_modes), and derivatives of ln f by the amounts."""
         rows = self.changes.rows(theta, sets)
         are_near = self.changes.are_near(sets) & self._is_slow
         results: list[Array] = []
         for near in np.unique(are_near):
             own = are_near == near
             flat = rows[own].reshape(-1, rows.shape[2])
-            solved = (self._near if near else self._anywhere).linearise(flat, self.fem.n_jobs, dofs, relative=True)
+            solved = (self._near if near else self._anywhere).linearise(flat, self.fem.n_jobs, relative=True)
             results = results or [np.empty((*rows.shape[:2], *array.shape[1:])) for array in solved]
             for result, array in zip(results, solved, strict=True):
                 result[own] = array.reshape(-1, *result.shape[1:])
-        inner = self.changes.slopes(sets)[:, np.newaxis]
-        results[1] = results[1] @ inner
-        if dofs is not None:
-            results[3] = results[3] @ inner[:, np.newaxis]
+        results[1] = results[1] @ self.changes.slopes(sets)[:, np.newaxis]
         return results
 
     def with_amounts(self, theta: Array, amounts: Array) -> tuple[Any, Array]:
         """The simulator of the structure with one set of amounts, and its own rows of theta."""
-        factors = self.changes.factors(amounts)
-        times = factors[self.changes.n_parameters + len(self.changes.groups) :] - 1
         severities = zip(self.changes.groups, self.changes.severities(amounts).tolist(), strict=True)
         simulator = self.fem.simulator_.damaged({group: severity for group, severity in severities if severity})
-        for number, mass in zip(times, self.changes.masses.values(), strict=True):
-            simulator = simulator.changed("with_added", mass=number * mass) if number else simulator
-        return simulator, theta * factors[: theta.shape[1]]
+        return simulator, theta * self.changes.factors(amounts)[: theta.shape[1]]
 
     @property
     def _is_slow(self) -> bool:
@@ -130,7 +116,7 @@ class ChangedStructure:
     @cached_property
     def _anywhere(self) -> Any:
         """The simulator that has the amounts as further columns of theta."""
-        return self.fem.simulator_.with_columns(self.changes.groups, self.changes.masses, None)
+        return self.fem.simulator_.with_columns(self.changes.groups, {}, None)
 
     @cached_property
     def _near(self) -> Any:
@@ -138,9 +124,8 @@ class ChangedStructure:
         box = self.fem.simulator_.box
         if box is None:
             box = self._bounds()
-        n_amounts = len(self.changes.groups) + len(self.changes.masses)
-        box = np.vstack([box, np.ones((n_amounts, 2))]) * self.changes.near()
-        return self.fem.simulator_.with_columns(self.changes.groups, self.changes.masses, box)
+        box = np.vstack([box, np.ones((len(self.changes.groups), 2))]) * self.changes.near()
+        return self.fem.simulator_.with_columns(self.changes.groups, {}, box)
 
     def _bounds(self) -> Array:
         """Bounds of the parameters that the chain has learned, or of those ``around`` too, with a margin of 5 %."""

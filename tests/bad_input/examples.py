@@ -1259,15 +1259,6 @@ method(
     confidence=(0.9, number(0, 1, 90)),
     by=("pod", choice()),
 )
-method(
-    "studies.DetectabilityStudy.time_to_detection",
-    STUDY,
-    usual="source",
-    within=(["7D"], bad([7], ["soon"], ["-1D"], STAMP, [True])),
-    level=(0.9, number(0, 1, 90)),
-    confidence=(0.9, number(0, 1, 90, but=("None",))),
-    smallest=(False, flag()),
-)
 method("studies.DetectabilityStudy.detector_name", STUDY, detector=("MahalanobisDetector", texts("None")))
 COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | bad([1, 2, 3, 4], [30, 10, 19])
 use(
@@ -1779,8 +1770,6 @@ NOT_CALLED |= {
     "preprocessing.RecordFindings": "made by check_records",
     "preprocessing.SetAside": "made by set_aside",
     "studies.IdentifiedDamage": "made by identify_damage",
-    "studies.LocatedDamage": "made by locate_damage",
-    "studies.locate_damage": "not tried: it wants a structure whose model is fitted",
     "datasets.BridgeFleet": "made by make_fleet",
     "datasets.FleetBridge": "made by make_fleet",
     "studies.PODCurve": "made by pod_curve",

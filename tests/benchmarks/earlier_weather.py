@@ -12,6 +12,8 @@ how many years with a drift or a step, and no memory, means are chosen.
 import numpy as np
 import pandas as pd
 from harness import arguments, shown, z24_records
+from sklearn.base import clone
+from sklearn.pipeline import Pipeline
 from structures import Footbridge, slow_soil
 
 from skthermo.datasets import make_fleet, make_kw51_campaign, make_truss_campaign
@@ -60,17 +62,17 @@ def kw51():
     yield "KW51, a campaign", records.temperatures, records.frequencies[:n], records.clean_frequencies[n:]
 
 
-def error(means, T, F, truth):
+def error(mapper, T, F, truth):
     """Of a mapper that learns each mode, twice, the second time without what is far from the first."""
     errors = []
     for name in F:
         known = F[[name]]
         for _ in range(2):
-            mapper = TemperatureMapper(means=means).fit(T.loc[F.index], known)
-            left = np.log(F[[name]] / np.asarray(mapper.predict(T.loc[F.index])))
+            mapper = clone(mapper).fit(T.loc[F.index], known)
+            left = np.log(F[[name]] / np.asarray(mapper.predict(T.loc[F.index])).reshape(-1, 1))
             left -= left.median()
             known = F[[name]].mask(left.abs() > 5 * 1.48 * left.abs().median())
-        predicted = np.asarray(mapper.predict(T.loc[truth.index]))[:, 0]
+        predicted = np.asarray(mapper.predict(T.loc[truth.index])).ravel()
         errors.append(100 * np.nanmedian(np.abs(predicted / truth[name] - 1)))
     return np.mean(errors)
 
@@ -79,11 +81,13 @@ def measured(part):
     rows = []
     for name, T, F, truth in PARTS[part]():
         T = T.ffill().bfill()
-        chosen = TemperatureMapper().fit(T.loc[F.index], F).means_
-        row = {"structure": name, "means": "" if chosen is None else ", ".join(chosen.half_lives)}
-        given = None if chosen is None else chosen.half_lives
-        rows.append(row | {"without": error(None, T, F, truth), "auto": error("auto", T, F, truth)})
-        rows[-1]["all modes with these"] = rows[-1]["without"] if given is None else error(given, T, F, truth)
+        together = TemperatureMapper().behind_means(T.loc[F.index], F)  # means that suit all modes
+        row = {"structure": name, "half-lives": ""}
+        if isinstance(together, Pipeline):
+            row["half-lives"] = ", ".join(together[0].half_lives)
+        ways = {"without": TemperatureMapper(means=None), "chosen by all modes": together}
+        ways["chosen by each mode"] = TemperatureMapper()
+        rows.append(row | {way: error(mapper, T, F, truth) for way, mapper in ways.items()})
     return pd.DataFrame(rows).set_index("structure")
 
 

@@ -29,7 +29,7 @@ from skthermo.updating import ModelUpdater
 
 RIGHT, WRONG, ENSEMBLE, FREQUENCIES, SHAPES = "right model", "wrong model", "ensemble", "frequencies", "shapes"
 DESIGNS = {"truss": (RIGHT, WRONG), "footbridge": (RIGHT, WRONG, ENSEMBLE), "KW51": (FREQUENCIES, SHAPES)}
-N_CAMPAIGNS = {"truss": 18, "footbridge": 6, "KW51": 3}
+N_CAMPAIGNS = {"truss": 6, "footbridge": 3, "KW51": 3}
 N_HEALTHY = 4  # windows without damage of each campaign
 N_MODELS = 6  # of an ensemble
 VISIBLE = 2.0  # Cramer-Rao deviations from which on damage should be named
@@ -76,9 +76,9 @@ def least_squares(model, healthy, later, groups):
 
 def is_visible(found, truth):
     """Whether each damage exceeds Cramer-Rao deviations beside the one other group that is most like it."""
-    alike = found.separability.similarity.abs().to_numpy(copy=True)
+    alike = found.similarity.abs().to_numpy(copy=True)
     np.fill_diagonal(alike, 0.0)
-    largest = pd.Series(np.nanmax(alike, axis=1, initial=0.0), found.separability.similarity.index).clip(upper=1 - 1e-9)
+    largest = pd.Series(np.nanmax(alike, axis=1, initial=0.0), found.similarity.index).clip(upper=1 - 1e-9)
     alone = found.table["error_alone"]
     beside = (alone / np.sqrt(1 - largest**2).reindex(alone.index).fillna(1.0)).fillna(np.inf)
     return all(severity > VISIBLE * beside.get(group, np.inf) for group, severity in truth.items())
@@ -96,8 +96,8 @@ def answered(found, truth, groups):
         OURS: set(found.most_probable) == set(truth),
         "probability": found.probability,
         "of the truth": sum(p for causes, p in explanations if set(causes.split(" + ")) - {"no damage"} == set(truth)),
-        "error": found.separability.precision["together"].reindex(groups).median(),
-        "p": found.probabilities.p_value,
+        "error": found.groups["error_together"].reindex(groups).median(),
+        "p": found.p_value,
     }
     held = (table["ci_low"] <= severities + 1e-12) & (severities <= table["ci_high"] + 1e-12)
     known = table["ci_low"].notna()
@@ -179,6 +179,15 @@ def coverage_table(groups):
     return pd.DataFrame(rows).T.rename_axis("structure")
 
 
+def score_table(states):
+    """Mean -ln of the probability of the truth, at least .05 %."""
+    scores = states.assign(score=-np.log(states["of the truth"].clip(lower=5e-4)))
+    kinds = {"no damage": scores["damaged"] == 0, "damaged": scores["damaged"] > 0, "all": scores["damaged"] >= 0}
+    return pd.DataFrame(
+        {kind: scores[rows].groupby("structure", sort=False)["score"].mean() for kind, rows in kinds.items()}
+    )
+
+
 def correlation_table(states, groups):
     """The same by the correlation of noise from day to day."""
     rows = {}
@@ -245,6 +254,7 @@ def main():
                 f"Most probable explanations by their probability in percent, {which} models: how often they are true",
                 reliability_table(states[rows]),
             )
+    shown("Mean -ln of the probability of the true set", score_table(states), 3)
     shown("Severities in their bands of 90 %, in percent of how many", coverage_table(groups))
     if (rows := states["design"] == RIGHT).any():
         shown(

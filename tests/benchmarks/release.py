@@ -73,7 +73,7 @@ PARTS = {
     "drift": Part("parameter_drift.py --parts tracked"),
     "new-baselines": Part("monitor_retraining.py", "--seeds 1 --only refit", needs="kw51"),
     "fleet-prior": Part("fleet_prior.py --members frequencies --against 43ba4fa4"),
-    "fleet-monitors": Part("fleet_monitor.py --against 43ba4fa4"),
+    "fleet-monitors": Part("fleet_monitor.py"),
     "mode-tracker": Part("mode_tracker.py", "--records 50"),
     "modal-identification": Part("modal_identification.py"),
     "shapes": Part("shape_inputs.py", "--rows 20 --models truss"),

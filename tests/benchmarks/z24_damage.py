@@ -44,7 +44,7 @@ def main():
     table = 100 * found.table[["probability", "severity", "ci_low", "ci_high", "if_damaged"]]
     table.columns = ["probability of damage", "mean loss", "band of 90 %, lowest", "highest", "loss if damaged"]
     table["by least squares"] = ["damaged" if group in simple else "" for group in table.index]
-    worth = f"{found.records.n_compared} of {found.records.n_given} records, worth {found.records.n_independent:.0f}"
+    worth = "{compared:.0f} of {given:.0f} records, worth {independent:.0f}".format(**found.records)
     shown(
         f"Z24: damage of each group, averaged over all explanations, %; {worth} independent ones",
         table.rename_axis("group"),

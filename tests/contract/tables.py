@@ -13,7 +13,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import Bunch
 
-from skthermo.datasets import make_fleet, make_truss, make_truss_campaign, truss_structure
+from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import match_modes
 from skthermo.metrics import error_table
@@ -24,7 +24,6 @@ from skthermo.studies import (
     compare_extensions,
     detection_task,
     identify_damage,
-    locate_damage,
     pod_curve,
     sweep,
 )
@@ -115,7 +114,6 @@ def results_of_studies(fem, later):
     yield "studies.DetectabilityStudy", study
     yield "studies.DetectabilityStudy.ranking", study.ranking()
     yield "studies.DetectabilityStudy.minimum_detectable_damage", study.minimum_detectable_damage()
-    yield "studies.DetectabilityStudy.time_to_detection", study.time_to_detection()
     yield "studies.DetectabilityStudy.labelled_scores", study.labelled_scores()
     yield "studies.compare_extensions", compare_extensions(study, T, modes=[6])
     task = detection_task(fem, T, scenarios, columns=fem.mode_names_, n_repeats=2, random_state=0)
@@ -125,8 +123,6 @@ def results_of_studies(fem, later):
     damaged = make_truss_campaign(samples_per_year=120, damage={"bottom": 0.2}, random_state=1)
     identified = identify_damage(fem, damaged.temperatures, damaged.frequencies, GROUPS[:2], random_state=0)
     yield "studies.IdentifiedDamage", identified
-    of_members = truss_structure(), damaged.temperatures, damaged.frequencies, ["bottom"]
-    yield "studies.LocatedDamage", locate_damage(fem, *of_members, random_state=0)
 
 
 def results_of_monitoring(fem, year, later):

@@ -10,7 +10,7 @@ import pytest
 import scipy.linalg
 
 from skthermo.fem import Beam, ImportedStructure, Structure, add_noise, probe
-from skthermo.studies import locate_damage
+from skthermo.studies import identify_damage
 from skthermo.surrogate import DataInformedFEM
 from tests.drop_ins.recipes import run_recipe
 
@@ -91,7 +91,8 @@ def test_damage_in_members_of_another_program_is_located():
     fem = DataInformedFEM(model, random_state=0).fit(T[:300], healthy)
     damage = np.where(np.isin(list(BEAMS), ["beam 8", "beam 9"]), 0.6, 1.0)
     damaged = np.array([frequencies_of_pynite(damage * multiplier) for multiplier in theta[300:]])
-    located = locate_damage(fem, girder, T[300:], add_noise(damaged, 0.002, random_state=2), random_state=0)
+    F = add_noise(damaged, 0.002, random_state=2)
+    located = identify_damage(fem, T[300:], F, structure=girder, random_state=0)
     assert set(located.likely_members()) == {"beam 8", "beam 9"}
     assert located.table.loc[["beam 8", "beam 9"], "severity"].to_numpy() == pytest.approx(0.4, abs=0.05)
     assert "(x = 14 to 18 m)" in located.summary()

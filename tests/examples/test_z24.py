@@ -62,7 +62,7 @@ def study_results(frozen, few):
 @pytest.mark.nightly
 def test_the_damage_is_identified(study_results):
     found, _ = study_results
-    assert found.probabilities.p_value < 0.01
+    assert found.p_value < 0.01
     for group in ("piers", "soil"):
         assert found.severities[group] == pytest.approx(SEVERITY, abs=2 * found.table.loc[group, "standard_error"])
     assert found.severities.drop(["piers", "soil"]).max() < 0.02

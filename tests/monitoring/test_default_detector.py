@@ -3,6 +3,7 @@
 import pickle
 import warnings
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -65,6 +66,7 @@ def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_
         event = whole.events_.iloc[-1]
         assert event["kind"] == "damage"
         assert event["groups"].split(", ")[0] == (group if loss > 0 else "")
+        assert event["size"] == pytest.approx(loss, rel=0.3) if loss > 0 else np.isnan(event["size"])
         assert list(whole.status("2026-01-31").events[-1]["groups"]) == [g for g in event["groups"].split(", ") if g]
 
 

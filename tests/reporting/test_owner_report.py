@@ -153,21 +153,19 @@ def test_the_page_says_what_the_table_says(page, study):
 
 
 def test_identified_damage_is_said_first_and_in_full(page):
-    loss = f"a loss of 20\xa0% of stiffness in {HOSTILE} (90\xa0% interval 18 to 22\xa0%)"
-    said = f"Most probable: {loss}, probability 90\xa0%."
+    said = (
+        f"Most probable: a loss of 20\xa0% of stiffness in {HOSTILE} (90\xa0% interval 18\xa0% to 22\xa0%), probability"
+    )
     assert page.text.count(said) == 2
     assert page.text.index(said) < page.text.index("False alarms")
-    assert f"Less probable: a loss of 15\xa0% in {HOSTILE} and of 3\xa0% in {QUOTED} (8\xa0%)." in page.text
+    assert f"Less probable: {HOSTILE} 15\xa0%, {QUOTED} " in page.text
 
 
 def test_groups_that_are_not_seen_have_no_amount():
     page = identified_in(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unobservable=["piers"])
     assert "piers" in page.heads
     assert page.cells.count("unobservable") == 1
-    total = sum(probability for probability, _ in EXPLANATIONS.values())
-    page = identified_in(
-        {name: (probability / total, amounts) for name, (probability, amounts) in EXPLANATIONS.items()}
-    )
+    page = identified_in(EXPLANATIONS)
     assert "The measured modes show and distinguish all groups." in page.text
 
 
@@ -176,9 +174,8 @@ def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(s
     nothing = identified({"something else": (0.93, {}), "no damage": (0.07, {})}, groups=[HOSTILE, QUOTED])
     page = Page(owner_report(study, tmp_path / "a.html", identified=nothing).read_text(encoding="utf-8"))
     headline = page.text[page.text.index("The structure as it is now") : page.text.index("False alarms")]
-    assert "Most probable: something else than damage of these groups, probability 93\xa0%." in headline
-    assert "No damage of these groups explains the shifts: mode" in headline
-    assert "Identified damage: damage of these groups alone" in page.text[page.text.rindex("Warnings") :]
+    assert "Most probable: something else, probability 93\xa0%." in headline
+    assert "Identified damage: the causes that were sought do not" in page.text[page.text.rindex("Warnings") :]
 
 
 @pytest.mark.filterwarnings("ignore:.*time-shift")  # north_lag3 stands alone
@@ -307,16 +304,3 @@ def test_what_does_not_fit_is_named(study, tmp_path, place, options, message):
         owner_report("study", tmp_path / "a.html")
     with pytest.raises(NotFittedError, match="run"):
         owner_report(DetectabilityStudy(None, None, []), tmp_path / "a.html")
-
-
-def test_it_leads_with_the_smallest_damage_and_how_soon_it_is_detected(study, page):
-    waits, smallest = study.time_to_detection(), study.time_to_detection(smallest=True)
-    order = ("The structure as it is now", "Smallest damage", "False alarms", "Time to detection", "Alarm within a day")
-    places = [page.text.index(text) for text in order]
-    assert places == sorted(places)
-    for text in smallest["text"]:
-        assert text in page.text
-    weeks = [float(cell.partition("\xa0%")[0]) for cell in page.cells if re.fullmatch(r"[\d.]+\xa0% \(.*%\)", cell)]
-    assert all(np.isclose(weeks, 100 * share, rtol=0.05).any() for share in waits["7D"] if 0 < share < 0.99)
-    assert "Alarm within a week" in page.heads
-    assert "with the first record of the simulated weather, 2024-01-01 00:00." in page.text

@@ -51,10 +51,10 @@ def test_a_bound_reaches_the_level_where_severity_at_says(log):
 
 def test_two_severities_are_fitted_exactly():
     curve = pod_curve([0.1, 0.3], [10, 90], [100, 100])
-    assert curve.a50 == pytest.approx(0.2)
+    assert curve.a50 == pytest.approx(np.sqrt(0.1 * 0.3))
     np.testing.assert_allclose(curve.predict([0.1, 0.3])[0], [0.1, 0.9])
     variances = 1 / (100 * 0.09) + np.zeros(2)  # of both logits
-    assert curve.covariance[1, 1] == pytest.approx(variances.sum() / 0.2**2)
+    assert curve.covariance[1, 1] == pytest.approx(variances.sum() / np.log(3) ** 2)
 
 
 def test_strengthening_is_the_mirror_image_of_damage():
@@ -103,7 +103,7 @@ def test_a_bound_that_never_reaches_the_level_is_infinite():
 
 def test_unfavourable_starts_converge():
     truth = expit(-30 + 100 * SEVERITIES)
-    curve = pod_curve(SEVERITIES, truth, np.ones(5))
+    curve = pod_curve(SEVERITIES, truth, np.ones(5), log=False)
     assert (curve.intercept, curve.slope) == pytest.approx((-30, 100), rel=1e-6)
 
 
@@ -128,13 +128,22 @@ def test_impossible_data_are_errors(arguments, message):
         pod_curve(*arguments)
 
 
-def warned_share(pod, n_records, n_draws=100):
+@pytest.mark.filterwarnings("ignore:.*poor-curve-fit")
+def test_the_default_bound_is_safe_where_the_law_is_linear_in_the_severity():
+    random, truth = np.random.RandomState(0), (logit(0.9) + 4.8) / 40
+    severities = np.array([0.05, 0.1, 0.15, 0.2, 0.3])
+    draws = random.binomial(200, expit(-4.8 + 40 * severities), (100, 5))
+    bounds = [pod_curve(severities, draw, np.full(5, 200)).a90_95 for draw in draws]
+    assert np.mean(np.array(bounds) >= truth) >= 0.95
+
+
+def warned_share(pod, n_records, n_draws=100, log=True):
     """Share of binomial data of which the curve is said to miss the points."""
     random, n_warned = np.random.RandomState(0), 0
     for _ in range(n_draws):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            curve = pod_curve(SEVERITIES, random.binomial(n_records, pod), np.full(5, n_records))
+            curve = pod_curve(SEVERITIES, random.binomial(n_records, pod), np.full(5, n_records), log=log)
         texts = [str(warning.message) for warning in caught if "outside the bounds of" in str(warning.message)]
         assert len(texts) == (curve.n_missed > 0)
         assert all(f"outside the bounds of {curve.n_missed} of 5 tested" in text for text in texts)
@@ -144,11 +153,11 @@ def warned_share(pod, n_records, n_draws=100):
 
 @pytest.mark.parametrize("n_records", [30, 300, 3000])
 def test_a_curve_that_fits_gives_no_warning(n_records):
-    assert warned_share(expit(-6 + 30 * SEVERITIES), n_records) <= 0.01
+    assert warned_share(expit(8 + 5 * np.log(SEVERITIES)), n_records) <= 0.01
 
 
 def test_false_alarms_bend_the_curve_too_little_to_matter():
-    assert warned_share(0.02 + 0.98 * expit(-6 + 30 * SEVERITIES), 3000) <= 0.01
+    assert warned_share(0.02 + 0.98 * expit(-6 + 30 * SEVERITIES), 3000, log=False) <= 0.01
 
 
 @pytest.mark.one_case

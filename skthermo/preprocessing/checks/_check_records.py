@@ -31,9 +31,8 @@ from skthermo.preprocessing.checks._record_findings import (
 )
 from skthermo.preprocessing.checks._rows import (
     copies_found,
-    different_rows_found,
     exchanged_found,
-    few_rows_found,
+    rows_found,
     times_found,
 )
 
@@ -59,12 +58,11 @@ def examine(
                 indexes.append(reading.given_index)
                 findings += times_found(reading.given_index)
     is_pair = len(tables) == 2
-    differing = different_rows_found(*tables) if is_pair else []
-    findings += few_rows_found(tables) if tables else []
+    findings = (rows_found(tables) if tables else []) + findings
     copies = copies_found(tables)
     exchanged = exchanged_found(*tables) if is_pair and unit == "Hz" and not copies else []
     if exchanged or "exchanged-tables" in map(itemgetter(0), copies):
-        return readings, [*differing, *findings, *copies, *exchanged], False
+        return readings, [*findings, *copies, *exchanged], False
     for reading in tables:
         if len(reading.values) < 2:
             continue
@@ -76,7 +74,7 @@ def examine(
                 check_model(model)
                 compare_with_model(reading, model)
         put_stuck_aside(reading)
-    return readings, [*differing, *findings, *copies], is_pair and not differing
+    return readings, [*findings, *copies], is_pair and "different-rows" not in map(itemgetter(0), findings)
 
 
 def check_records(

@@ -58,32 +58,25 @@ def labels_found(index: pd.Index) -> list[RecordFinding]:
     return [RecordFinding.in_rows(index, "stamps-as-text", "", everywhere, detail, period=False)] if detail else []
 
 
-def few_rows_found(tables: list[Reading]) -> list[RecordFinding]:
-    """Whether few rows have a value in each table."""
-    n_rows, n_findings = len(tables[0].values), 0
-    is_known = np.ones(n_rows, dtype=bool)
-    for table in tables:
-        n_rows, n_findings = min(n_rows, len(table.values)), n_findings + len(table.findings)
-        is_known = is_known[:n_rows] & ~np.isnan(table.values[:n_rows]).all(axis=1)
-    known = np.flatnonzero(is_known)
-    if len(known) >= 50 or (not len(known) and n_findings):
-        return []
-    what, detail = "few-rows" if len(known) > 1 else "no-rows", f"{len(known)} of {n_rows} rows have values"
-    return [RecordFinding.in_rows(tables[0].index, what, "", known, detail)]
-
-
-def different_rows_found(T: Reading, F: Reading) -> list[RecordFinding]:
-    """Whether two tables differ in the number of rows or in their labels."""
-    what, here, there = "different-rows", T.given_index, F.given_index
+def rows_found(tables: list[Reading]) -> list[RecordFinding]:
+    """Whether tables differ in the number of rows or in their labels, and whether few rows have a value in each."""
+    found, first, last = [], tables[0], tables[-1]
+    here, there, n_findings = first.given_index, last.given_index, len(first.findings) + len(last.findings)
     if len(here) != len(there):
-        detail = f"{len(here)} rows of {T.what} and {len(there)} of {F.what}"
-        return [RecordFinding(what, "", abs(len(here) - len(there)), None, None, detail)]
-    if not (T.is_frame and F.is_frame) or here.equals(there):
-        return []
-    differ = [row for row, (one, other) in enumerate(zip(here, there, strict=True)) if one != other] or [0]
-    row = differ[0]
-    detail = f"{len(differ)} of {len(here)} rows have different labels, the first row {row}: {here[row]}, {there[row]}"
-    return [RecordFinding.in_rows(here, what, "", np.array(differ), detail, period=False)]
+        detail = f"{len(here)} rows of {first.what} and {len(there)} of {last.what}"
+        found.append(RecordFinding("different-rows", "", abs(len(here) - len(there)), None, None, detail))
+    elif first.is_frame and last.is_frame and not here.equals(there):
+        rows = np.array([row for row, pair in enumerate(zip(here, there, strict=True)) if pair[0] != pair[1]] or [0])
+        detail = f"{len(rows)} of {len(here)} rows have different labels, the first row {rows[0]}"
+        detail = f"{detail}: {here[rows[0]]} and {there[rows[0]]}"
+        found.append(RecordFinding.in_rows(here, "different-rows", "", rows, detail, period=False))
+    n_rows = min(len(here), len(there))
+    is_known = ~np.isnan(first.values[:n_rows]).all(axis=1) & ~np.isnan(last.values[:n_rows]).all(axis=1)
+    known = np.flatnonzero(is_known)
+    if len(known) < 50 and (len(known) or not n_findings):
+        what, detail = "few-rows" if len(known) > 1 else "no-rows", f"{len(known)} of {n_rows} rows have values"
+        found.append(RecordFinding.in_rows(first.index, what, "", known, detail))
+    return found
 
 
 def copies_found(tables: list[Reading]) -> list[RecordFinding]:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, check_flag, check_probability
+from skthermo._core.arrays import Array, check_probability
 from skthermo._core.warnings import warnings_once
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
@@ -18,7 +18,6 @@ from skthermo.studies.detectability._ranking import in_words, rank
 from skthermo.studies.detectability._rates import EvaluatedRecords
 from skthermo.studies.detectability._replicates import ReplicateRates, sentences
 from skthermo.studies.detectability._simulation import SIMULATED, Candidate, Evaluation, ask_each
-from skthermo.studies.detectability._waits import soonest, waits_table
 
 MANY_FALSE_ALARMS = 0.5  # rate above which baseline and simulation seem to be of different structures
 
@@ -121,7 +120,7 @@ class StudyFindings:
         return detector
 
     def pod_curve(
-        self, family: str, source: str = "simulated", *, log: bool = False, detector: str | None = None
+        self, family: str, source: str = "simulated", *, log: bool = True, detector: str | None = None
     ) -> PODCurve:
         """Probability of detection over severity for one family of scenarios.
 
@@ -131,7 +130,7 @@ class StudyFindings:
             Of the scenarios.
         source : str, default="simulated"
             "simulated" or "reference".
-        log : bool, default=False
+        log : bool, default=True
             Whether the logit is linear in the logarithm of the severity.
         detector : str, optional
             Name of the detector, where there are several.
@@ -214,74 +213,6 @@ class StudyFindings:
             return table
         bands = [self.replicates.smallest(one, level, method, self.confidence) for one in families.values()]
         return table.assign(**dict(zip(["pi_low", "pi_high"], np.transpose(bands), strict=True)))
-
-    def time_to_detection(
-        self,
-        within: Sequence[str | int] | None = None,
-        level: float = 0.95,
-        *,
-        source: str = "simulated",
-        confidence: float | None = None,
-        detector: str | None = None,
-        smallest: bool = False,
-    ) -> pd.DataFrame:
-        """How soon damage is found: the chance to find it within some times, and the time within which it is found.
-
-        Damage may begin at any time of the records, all onsets counting alike, and after the last record comes the
-        first one again; that of a scenario with an onset begins there. It is found with the first alarm.
-
-        Parameters
-        ----------
-        within : sequence of str or int, optional
-            Times such as "7D", or numbers of records where the weather has no ``DatetimeIndex``. By default a day, a
-            week and 30 days, or 1, 7 and 30 records.
-        level : float, default=0.95
-            Share of the cases in which damage is found reliably.
-        source : str, default="simulated"
-            "simulated" or "reference".
-        confidence : float, optional
-            Of the bounds, two-sided; by default that of the study.
-        detector : str, optional
-            Name of one of several detectors; by default all.
-        smallest : bool, default=False
-            Whether to give only one row for each detector and family: the smallest severity that is found reliably
-            within the longest of the times, or the largest one where none is.
-
-        Returns
-        -------
-        DataFrame
-            One row for each detector and scenario:
-
-            - ``detector``, ``scenario``, ``family``, ``severity``, ``source``;
-            - for each time such as "7D": ``7D``, the probability of an alarm within it; ``7D ci_low`` and
-              ``7D ci_high``, its bounds; ``7D healthy``, the same probability of the healthy structure (NaN without a
-              healthy scenario). NaN where the time is shorter than that between two records, or longer than all;
-            - ``median``: time within which half of the cases are found;
-            - ``reliable``: the same for the share ``level``, and ``reliable highest``: time from which the lower
-              bound of the probability is as high. NaT (NaN) where that takes longer than the records;
-            - ``not_evaluated``: share of the time without a record that is evaluated, which delays what is found;
-            - ``text``: in words, after the name of the scenario.
-
-            Times are counted in the usual time between records, from the one before the onset on. They are numbers of
-            records where there are no stamps.
-
-        Raises
-        ------
-        ValueError
-            If a time is none, the level is not between 0 and 1, or there is no such source or detector.
-
-        Notes
-        -----
-        An alarm within the time may be a false one: compare with the probability of the healthy structure. How the
-        bounds allow for onsets that wait for the same alarm: :ref:`how-rates-are-bounded`.
-        """
-        check_probability(level, "level")
-        asked = self.confidence if confidence is None else check_probability(confidence, "confidence")
-        self._check_source(source)
-        chosen = None if detector is None else self.detector_name(detector)
-        records = {key: one for key, one in self._records(source).items() if chosen in (None, key[0])}
-        table = waits_table(records, self.evaluation.transitions, within, level, asked)
-        return soonest(table, within) if check_flag(smallest, "smallest") else table
 
     def is_undetected(self, family: str, source: str = "simulated", detector: str | None = None) -> bool:
         """Whether no severity of a family raises clearly more alarms than the healthy structure does.
@@ -467,8 +398,7 @@ class StudyFindings:
         Returns
         -------
         str
-            What `ranking` says, a line for each group of detectors, and what `time_to_detection` says of the first
-            one: of the healthy structure, and of each family the smallest severity that is detected reliably.
+            What `ranking` says, a line for each group of detectors, and what the bands of the first one include.
 
         Raises
         ------
@@ -476,11 +406,7 @@ class StudyFindings:
             As `ranking`.
         """
         ranking = self.ranking(max_false_alarms, source)
-        waits = self.time_to_detection(source=source, detector=ranking.index[0], smallest=True)
-        lines = [
-            in_words(ranking, max_false_alarms, self.confidence),
-            *(f"{one.scenario!r} {one.text}." for one in waits.itertuples()),
-        ]
+        lines = [in_words(ranking, max_false_alarms, self.confidence)]
         if self.replicates is not None and source == SIMULATED:
             lines.append(self.uncertainty_summary(ranking.index[0]))
         return "\n".join(lines)

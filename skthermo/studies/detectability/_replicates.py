@@ -350,7 +350,7 @@ class ReplicateRates:
         lowest, highest = (np.quantile(found, q, method=m) for q, m in ((tail, "lower"), (1 - tail, "higher")))
         return float(sign * lowest), float(sign * highest)
 
-    def curves(self, family: FamilyRates, log: bool = False) -> list[PODCurve]:
+    def curves(self, family: FamilyRates, log: bool = True) -> list[PODCurve]:
         """Fitted curves of all campaigns of all replicates that have one."""
         tested, curves = family.tested, []
         n = tested["n_effective"] / tested["n_repeats"]

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 import pandas as pd
 from joblib import Memory, delayed
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
@@ -230,14 +230,12 @@ def _longest_window(detector: BaseEstimator) -> int:
 class Evaluation:
     """What detectors decided in the repeats of a study, by detector, scenario and source.
 
-    ``decisions`` have shape (n_repeats, n_records); ``transitions``, (n_repeats, n_onsets, n_window), are those of
-    detectors with windows on records that are damaged after some onsets only. ``calibration`` holds decisions on
-    healthy records with noise of other seeds, by detector and source, ``indices`` the damage indices of the first
-    repeat, and ``errors`` those of the detectors that failed, by name.
+    ``decisions`` have shape (n_repeats, n_records). ``calibration`` holds decisions on healthy records with noise of
+    other seeds, by detector and source, ``indices`` the damage indices of the first repeat, and ``errors`` those of
+    the detectors that failed, by name.
     """
 
     decisions: Mapping[Key, Array] = field(default_factory=dict)
-    transitions: Mapping[Key, Array] = field(default_factory=dict)
     errors: Mapping[str, Exception] = field(default_factory=dict)
     calibration: Mapping[Key, Array] = field(default_factory=dict)
     indices: Mapping[Key, pd.Series] = field(default_factory=dict)
@@ -245,7 +243,7 @@ class Evaluation:
     def with_repeats(self, later: Sequence[Evaluation]) -> Evaluation:
         """This evaluation and those of later repeats together."""
         joined = {}
-        for name in ("decisions", "transitions", "calibration"):
+        for name in ("decisions", "calibration"):
             repeats = [getattr(one, name) for one in (self, *later)]
             joined[name] = {key: np.concatenate([one[key] for one in repeats if key in one]) for key in repeats[0]}
         errors = dict(self.errors)
@@ -255,7 +253,7 @@ class Evaluation:
 
     def only(self, names: Collection[str]) -> Evaluation:
         """That of some detectors without errors, one after the other."""
-        parts = ("decisions", "transitions", "calibration", "indices")
+        parts = ("decisions", "calibration", "indices")
         found = {
             part: {key: one for name in names for key, one in getattr(self, part).items() if key[0] == name}
             for part in parts
@@ -320,21 +318,7 @@ class Records:
     values: ArrayLike
     T: Table
     rows: Table
-    healthy: Array | None = None
     _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
-
-    @property
-    def has_onsets(self) -> bool:
-        """Whether damage that is there from the beginning may be thought to begin at any record."""
-        is_known = self.source == SIMULATED and self.healthy is not None
-        return is_known and not self.scenario.is_healthy and self.scenario.onset is None
-
-    def beginning(self, memory: int) -> Records:
-        """The records, damaged after some onsets only, and healthy before each for as long as a detector remembers."""
-        if memory not in self._known:
-            damaged = damaged_rows(len(self.values), memory)[:, np.newaxis]
-            self._known[memory] = replace(self, values=np.where(damaged, self.values, self.healthy))
-        return self._known[memory]
 
     def entering(self, candidate: Candidate) -> Table:
         """What the last step of a detector sees."""
@@ -418,11 +402,9 @@ class Simulation:
 
     @property
     def share_in_replicates(self) -> float:
-        """Share of the tables of a repeat that a draw of a replicate evaluates: no transitions, and no calibration."""
-        n_damaged = sum(not scenario.is_healthy and scenario.onset is None for scenario in self.scenarios)
-        n_all, n_windowed = len(self.candidates), sum(one.memory > 1 for one in self.candidates.values())
-        n_decided, n_calibrated = n_all * len(self.scenarios), n_all * (n_damaged < len(self.scenarios))
-        return n_decided / (n_decided + n_windowed * n_damaged + n_calibrated)
+        """Share of the tables of a repeat that a draw of a replicate evaluates: no calibration."""
+        n_decided = len(self.scenarios)
+        return n_decided / (n_decided + any(scenario.is_healthy for scenario in self.scenarios))
 
     def without(self, failed: Collection[str]) -> Simulation:
         """The same without the detectors that failed."""
@@ -471,14 +453,12 @@ class Simulation:
     ) -> Iterator[Records]:
         """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers.
 
-        These are drawn by the first seed, unless noise and temperatures are given: then, the records of the healthy
-        structure with the same noise are not kept.
+        These are drawn by the first seed, unless noise and temperatures are given.
         """
         noise, T = drawn or self.drawn(int(seeds[0]))
         for scenario in scenarios:
             draws = self.clean[scenario.name]
-            values, healthy = draws[repeat % len(draws)] * (1 + noise), None if drawn else self._healthy * (1 + noise)
-            yield Records(scenario, SIMULATED, values, T, self.T, healthy)
+            yield Records(scenario, SIMULATED, draws[repeat % len(draws)] * (1 + noise), T, self.T)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 shape = as_columns(values).shape
@@ -489,15 +469,6 @@ class Simulation:
                     )
                 yield Records(scenario, REFERENCE, values, self.T, self.T)
 
-    @cached_property
-    def _healthy(self) -> Array:
-        """Frequencies of the healthy structure before noise."""
-        names = [scenario.name for scenario in self.scenarios if scenario.is_healthy]
-        with without_warnings():
-            if names:
-                return self.clean[names[0]][0]
-            return self.fem.thermal_.simulated(self._weather)
-
     def evaluate(
         self, records: Iterable[Records], errors: Mapping[str, Exception], with_indices: bool = False
     ) -> Evaluation:
@@ -506,38 +477,23 @@ class Simulation:
         Records of one scenario and source are those of one repeat after another. Without indices, as in later repeats,
         whose warnings are not given, some are evaluated together.
         """
-        decisions, transitions, indices = defaultdict(list), defaultdict(list), {}
+        decisions, indices = defaultdict(list), {}
         for some in ([one] for one in records) if with_indices else _together(records):
             answers, errors = ask_each(self.candidates, partial(self._answers, some, with_indices), errors)
             for name, found in answers.items():
-                for one, (index, decided, during) in zip(some, found, strict=True):
+                for one, (index, decided) in zip(some, found, strict=True):
                     key = name, one.scenario.name, one.source
                     decisions[key].append(decided)
-                    if during is not None:
-                        transitions[key].append(during)
                     if with_indices:
                         indices[key] = index
-        return Evaluation(
-            {key: np.array(values) for key, values in decisions.items()},
-            {key: np.array(values) for key, values in transitions.items()},
-            errors,
-            indices=indices,
-        )
+        return Evaluation({key: np.array(values) for key, values in decisions.items()}, errors, indices=indices)
 
-    def _answers(self, records: Sequence[Records], with_indices: bool, name: str) -> list[tuple[Any, Array, Any]]:
-        """Damage index, decisions and those of transitions of one detector for each of some records."""
+    def _answers(self, records: Sequence[Records], with_indices: bool, name: str) -> list[tuple[Any, Array]]:
+        """Damage index, if asked, and decisions of one detector for each of some records."""
         candidate = self.candidates[name]
-        entering, memory = [one.entering(candidate) for one in records], candidate.memory
-        during: list[Any] = [None] * len(records)
-        if memory > 1:
-            with without_warnings():
-                for number, one in enumerate(records):
-                    if one.has_onsets:
-                        seen = one.beginning(memory).entering(candidate)
-                        during[number] = transitions_of(candidate.decisions([seen])[0], memory)
+        entering = [one.entering(candidate) for one in records]
         found = candidate.damage_indices(entering, [one.rows for one in records]) if with_indices else None
-        decisions = candidate.decisions(entering, found)
-        return list(zip(found or during, decisions, during, strict=True))
+        return list(zip(found or [None] * len(records), candidate.decisions(entering, found), strict=True))
 
 
 def _together(records: Iterable[Records]) -> Iterator[list[Records]]:
@@ -552,26 +508,6 @@ def _together(records: Iterable[Records]) -> Iterator[list[Records]]:
         some.append(one)
     if some:
         yield some
-
-
-def onsets_of(n_records: int, n_window: int) -> NDArray[np.intp]:
-    """Records at which damage begins again and again, with a window of damaged and one of healthy records in turn."""
-    onsets = np.arange(n_window, n_records - n_window + 1, 2 * n_window)
-    return onsets if onsets.size else np.array([n_records // 2])
-
-
-def damaged_rows(n_records: int, n_window: int) -> NDArray[np.bool_]:
-    """Which records are damaged, a window after each of these onsets."""
-    damaged = np.zeros(n_records, dtype=bool)
-    places = onsets_of(n_records, n_window)[:, np.newaxis] + np.arange(n_window)
-    damaged[places[places < n_records]] = True
-    return damaged
-
-
-def transitions_of(decisions: Array, n_window: int) -> Array:
-    """Decisions on such records in the windows after the onsets, (n_onsets, n_window), NaN after the last record."""
-    places = onsets_of(len(decisions), n_window)[:, np.newaxis] + np.arange(n_window)
-    return np.append(decisions, np.full(n_window, np.nan, decisions.dtype))[places]
 
 
 def clean_frequencies(

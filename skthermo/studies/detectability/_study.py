@@ -130,9 +130,6 @@ class DetectabilityStudy(BaseEstimator):
         Threshold less damage index in every repeat, by detector, scenario and source: negative is an alarm, and NaN is
         not evaluated. As float32: eight detectors, 13 scenarios, 20 repeats and 365 records are 3 MB; 17 detectors and
         a year of hours 155 MB.
-    transitions_ : dict of (str, str, str) to ndarray of shape (n_repeats, n_onsets, n_window)
-        Such decisions of a `~skthermo.detection.CompensatedDetector` with a window, after onsets of damage that are two
-        windows apart, while a window still holds healthy records; for `time_to_detection`.
     calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
         Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
         `ranking` moves thresholds by them; nothing else is evaluated by them. Measured records have none.
@@ -237,7 +234,6 @@ class DetectabilityStudy(BaseEstimator):
     thresholds_ = held("_found.thresholds")
     indices_ = held("_found.evaluation.indices")
     decisions_ = held("_found.evaluation.decisions")
-    transitions_ = held("_found.evaluation.transitions")
     calibration_ = held("_found.evaluation.calibration")
     columns_ = held("_found.columns")
     uncertainty_ = held("_found.uncertainty")
@@ -249,7 +245,6 @@ class DetectabilityStudy(BaseEstimator):
 
     pod_curve = _of_findings(StudyFindings.pod_curve)
     minimum_detectable_damage = _of_findings(StudyFindings.minimum_detectable_damage)
-    time_to_detection = _of_findings(StudyFindings.time_to_detection)
     is_undetected = _of_findings(StudyFindings.is_undetected)
     ranking = _of_findings(StudyFindings.ranking)
     labelled_scores = _of_findings(StudyFindings.labelled_scores)

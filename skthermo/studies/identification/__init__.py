@@ -3,7 +3,5 @@
 from skthermo.studies.identification._causes import DamagePrior
 from skthermo.studies.identification._identified import IdentifiedDamage
 from skthermo.studies.identification._identify import identify_damage
-from skthermo.studies.identification._locate import locate_damage
-from skthermo.studies.identification._located import LocatedDamage
 
-__all__ = ["DamagePrior", "IdentifiedDamage", "LocatedDamage", "identify_damage", "locate_damage"]
+__all__ = ["DamagePrior", "IdentifiedDamage", "identify_damage"]

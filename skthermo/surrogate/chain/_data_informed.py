@@ -109,7 +109,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         has none. Names such as ``inverse__noise`` in ``set_params`` and grids reach the default parts, too.
     mapper : regressor, optional
         M2. By default ``TemperatureMapper()``. With lags of hours, for example ``make_pipeline(LagFeatures(),
-        TemperatureMapper(means=None))``. Means of earlier temperatures that a mapper chooses are those that explain the
+        TemperatureMapper())``. Means of earlier temperatures that a mapper chooses are those that explain the
         frequencies, and ``mapper_`` is a pipeline that begins with them.
     aligner : transformer, "auto" or "passthrough", default="auto"
         Maps measured frequencies onto the model's and back. "auto" is ``BiasAligner(method="scale")``, and

@@ -16,7 +16,7 @@ RESULTS = {name: {"causes": list(one.most_probable)} for name, one in found.item
 RESULTS |= {
     "severities": {name: one.severities for name, one in found.items()},
     "errors": found["bottom"].table["standard_error"],
-    "damaged": [bool(one.probabilities.damage > 0.9) for one in found.values()],
+    "damaged": [bool(one.probability_of_damage > 0.9) for one in found.values()],
     "inside": bool(lowest < 0.12 < highest),
     "scenario": found["bottom"].scenario().name,
     "summary": "bottom" in found["bottom"].summary(),

@@ -15,7 +15,7 @@ other = identify_damage(fem, T, later.frequencies[:120] * [1, 1, 1, 1, 1, 0.93],
 loss = identify_damage(fem, T, F, ["bottom", "top"], prior=DamagePrior(severity=0.2), random_state=0)
 RESULTS = {
     "gain": float(gain.table.loc["bottom stiffer", "severity"]),
-    "other": [bool(other.probabilities.other > 0.5), bool(loss.probabilities.other > 0.5)],
+    "other": [bool(other.probability_other > 0.5), bool(loss.probability_other > 0.5)],
     "law": DamagePrior(severity=0.3).law,
 }
 TOLERANCES = {"gain": {"atol": 0.02}}
