@@ -133,7 +133,7 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 #    Less probable: girder_torsion 3 %, abutments 8.5 %, soil 19 % (12 %); something else (10 %); piers 11 %, soil
 #    18 %, something else (9 %); abutments 8.6 %, soil 19 %, something else (9 %).
 #    Probability of no change: below 0.1 %.
-#    112 records (worth 3.86 independent ones) compared with 2,800 training records (worth 95.6).
+#    112 records (worth 3.9 independent ones) compared with 2,800 training records (worth 96).
 #    girder_bending and piers cannot be distinguished by these modes.
 #
 #    Every group, on average over all explanations

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._core.arrays import Array, check_probability
-from skthermo._core.text import SPACE, Sentences, chance_text, counted, listed, percent, probability_text
+from skthermo._core.text import SPACE, Sentences, chance_text, counted, listed, percent, probability_text, significant
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.studies._scenarios import UncertainDamage
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE
@@ -220,9 +220,9 @@ class IdentifiedDamage(Sentences):
             yield f"Probability of no change: {chance_text(1 - self.probability_of_damage)}."
         records = self.records
         yield (
-            f"{counted(int(records['compared']), 'record')} (worth {records['independent']:.3g} independent ones) "
-            f"compared with {counted(int(records['trained']), 'training record')} (worth "
-            f"{records['independent of trained']:.3g})."
+            f"{counted(int(records['compared']), 'record')} (worth {significant(records['independent'])} independent "
+            f"ones) compared with {counted(int(records['trained']), 'training record')} (worth "
+            f"{significant(records['independent of trained'])})."
         )
 
     def _phrase(self, name: str) -> str:
