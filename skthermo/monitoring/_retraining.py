@@ -67,7 +67,7 @@ class Retraining:
     >>> from skthermo.datasets import make_truss_campaign
     >>> from skthermo.detection import MahalanobisDetector, TemperatureCompensator
     >>> from skthermo.monitoring import Monitor
-    >>> healthy = make_truss_campaign(2, random_state=0)
+    >>> healthy = make_truss_campaign(2, random_state=2)
     >>> records = healthy.temperatures.join(healthy.frequencies)
     >>> compensator = TemperatureCompensator(LinearRegression(), targets=list(healthy.frequencies))
     >>> monitor = Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False).fit(records[:365])

@@ -193,6 +193,8 @@ def proposed_shifts(places: Array, values: Array, inertia: int) -> list[int]:
     n_rows, found = len(places), set()
     farthest = n_rows // 4
     for length in (0, 1, inertia):
+        if 2 * length > n_rows:
+            continue
         spectra = []
         for table in (places, values):
             standard = np.nan_to_num(table - means_of_known(table))

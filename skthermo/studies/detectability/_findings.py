@@ -316,8 +316,6 @@ class StudyFindings:
         'Mahalanobis' detects 22.4% of the damaged records at a false-alarm rate of 1.9%.
         Significantly worse at 95% confidence: 'forest' (18.7% at 1.2%).
         These comparisons include noise only: another year, baseline or FE model may change the order.
-        'healthy' raises a false alarm in 2 of 100 cases within 1 day, 12 within 7 days, 42 within 30 days.
-        'bottom 10 %' is detected within 15 days in 95 of 100 cases; false alarms in that time: 23 of 100.
         """
         limit = check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence if confidence is None else check_probability(confidence, "confidence")

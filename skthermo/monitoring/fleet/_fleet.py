@@ -24,8 +24,9 @@ from skthermo._core.parallel import as_they_come, with_progress
 from skthermo._core.text import counted
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import SkthermoWarning
-from skthermo.monitoring._discoveries import Discoveries, discover, without_zone
-from skthermo.monitoring._fleet_bridge import (
+from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring._status import MonitorStatus
+from skthermo.monitoring.fleet._bridge import (
     Fitted,
     KnownBridge,
     by_value,
@@ -38,8 +39,7 @@ from skthermo.monitoring._fleet_bridge import (
     read_known,
     update_bridge,
 )
-from skthermo.monitoring._monitor import Monitor
-from skthermo.monitoring._status import MonitorStatus
+from skthermo.monitoring.fleet._discoveries import Discoveries, discover, without_zone
 
 
 def fit_fleet(
