@@ -264,8 +264,8 @@ def _joined(named: dict[str, Any], path: Path) -> NamedMatrices:
     """Matrices on the union of their labels, if they have such, and without degrees of freedom that are held."""
     named, dofs = _on_all_labels(named, path)
     matrices = {name: value if _is_matrix(value) else None for name, value in named.items()}
-    sparse = [one for one in matrices.values() if scipy.sparse.issparse(one) and _is_square(one)]
-    diagonals = [one.diagonal() for one in sparse]
+    square = [one for one in matrices.values() if one is not None and _is_square(one)]
+    diagonals = [one.diagonal() for one in square if scipy.sparse.issparse(one)]
     held = 1e36  # what Abaqus puts on the diagonal where a degree of freedom is held
     if any((diagonal == held).any() for diagonal in diagonals) and len({len(d) for d in diagonals}) == 1:
         free = np.flatnonzero((np.array(diagonals) != held).all(axis=0))

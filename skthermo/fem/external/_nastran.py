@@ -182,7 +182,8 @@ def _in_lines(lines: list[bytes]) -> Iterator[tuple[str, scipy.sparse.csc_array 
         if heading is None:
             got = lines[at][:40].decode("latin-1")
             raise ValueError(f"line {at + 1} is {got!r}; expected the heading of a matrix")
-        head = Head(*map(int, heading.groups()[:4]), heading[5].decode("ascii"))
+        n_columns, n_rows, form, kind = map(int, heading.groups()[:4])
+        head = Head(n_columns, n_rows, form, kind, heading[5].decode("ascii"))
         n, width = map(int, heading.group(6, 7)) if heading[6] else (5, 16)
         try:
             matrix, end = _of_text(lines, at + 1, head, n, width)
@@ -254,7 +255,8 @@ def _in_records(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | 
         word = len(record) // 6
         integer = f"{order}i{word}"
         numbers, name = np.frombuffer(record[: 4 * word], integer).tolist(), record[4 * word :].translate(None, b" \0")
-        head = Head(*numbers, name.decode("latin-1"))
+        n_columns, n_rows, form, kind = numbers
+        head = Head(n_columns, n_rows, form, kind, name.decode("latin-1"))
         real = f"{order}f{8 if head.kind % 2 == 0 else word}"
         try:
             yield head.name, _of_columns(records, head, integer, real)

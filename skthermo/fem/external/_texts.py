@@ -107,8 +107,11 @@ def labelled(rows: Integers, columns: Integers, values: Numbers, *, is_symmetric
     """A matrix from the labels (n, 2) of rows and columns; of a symmetric one, a half may be given."""
     both = np.vstack([rows, columns])
     codes, places = np.unique(both[:, 0] * 2**31 + both[:, 1], return_inverse=True)
-    entries = *np.split(places, 2), values, len(codes)
-    matrix = symmetric(*entries, in_order=False) if is_symmetric else square(*entries)
+    row, column = np.split(places, 2)
+    if is_symmetric:
+        matrix = symmetric(row, column, values, len(codes), in_order=False)
+    else:
+        matrix = square(row, column, values, len(codes))
     return Labelled(matrix, np.column_stack([codes >> 31, codes % 2**31]))
 
 
