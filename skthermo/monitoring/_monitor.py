@@ -441,12 +441,6 @@ class Monitor(SavesFrames, Estimator):
         """Damage indices of records in order of time, by the detector in charge."""
         return index_of(self.detector_, self.features_, records)
 
-    def _with(self, detector: Any, trained: pd.DataFrame) -> Monitor:
-        """This monitor with another detector in charge, which was fitted on some records."""
-        twin = self._twin()
-        twin._take_charge(detector, trained)
-        return twin
-
     def _twin(self) -> Monitor:
         """A monitor that stands as this one, to be changed in its place: an error leaves this one as it was."""
         twin = object.__new__(type(self))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 import scipy  # which loads scipy.signal once it is used
@@ -18,7 +17,6 @@ from skthermo._core.arrays import Array, means_of_known, median
 from skthermo._core.frames import correlation_times
 from skthermo.exceptions import WeatherWarning
 from skthermo.preprocessing import HampelFilter
-from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.weather import (
     NearestPlaces,
@@ -79,16 +77,6 @@ class BaselineResiduals:
     def expected(self, weather: Array) -> Array:
         """Mean residual that the mapper leaves in similar weather, (n_samples, n_modes); NaN where it is unknown."""
         return self._where_known(weather, lambda known: self._similar_mean(self.own, known))
-
-    def less_similar(self, values: Array) -> Array:
-        """Values of the records, (n_records, n_columns), less the mean of the records in similar weather."""
-        return values - self._similar_mean(values, self.weather)
-
-    @property
-    def is_overfitted(self) -> bool:
-        """Whether the mapper's own median residual is less than three quarters of that out of fold."""
-        own, out_of_fold = median(np.abs(self.own)), median(np.abs(self.values))
-        return bool(own.mean() < 0.75 * out_of_fold.mean())
 
     def quantiles(self, confidence: float) -> Array:
         """Spreads from the prediction that hold the records with a given probability, (n_modes,)."""
@@ -308,123 +296,3 @@ def order_statistic(scores: Array, confidence: float) -> float:
     """The ceil((n + 1) confidence)-th smallest of n scores; infinite if n is too small for the confidence."""
     rank = int(np.ceil((len(scores) + 1) * confidence))
     return float(np.sort(scores)[rank - 1]) if rank <= len(scores) else np.inf
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """Covariances of records as the sum of an independent part and of one that fades from record to record.
-
-    ``parts``, (2, n_modes, n_modes), are covariances of single records, zero for modes with fewer than 20 of them.
-    ``memory`` is the correlation of the second part with itself one record later, ``n_records``, (n_modes,), the number
-    of records of each mode.
-    """
-
-    parts: Array
-    memory: float
-    n_records: NDArray[np.intp]
-
-    @classmethod
-    def estimated(cls, residuals: Any) -> Scatter:
-        """Learn from `BaselineResiduals` what weather similar to theirs does not explain.
-
-        Residuals of records that the mapper has learned are too small, those out of fold too large; products of one
-        with the other lie between. What the comparison with similar weather takes away is known from simulated records.
-        """
-        of_fold = residuals.less_similar(residuals.values)
-        own = of_fold if residuals.is_overfitted else residuals.less_similar(residuals.own)
-        n_records = (~np.isnan(own)).sum(axis=0)
-        found = lagged_covariances(own, of_fold, range(int(np.clip(len(own) // 4, 2, 120))))  # lags in records
-        known = np.flatnonzero((n_records >= 20) & (np.diag(found[0]) > 0))
-        parts, memory = np.zeros((2, *found[0].shape)), 0.0
-        if known.size:
-            inside = np.ix_(known, known)
-            memory, parts[0][inside], parts[1][inside] = _split(
-                found[:, known][:, :, known], n_records[known], residuals.less_similar, len(own)
-            )
-        return cls(parts, memory, n_records)
-
-    @property
-    def variances(self) -> Array:
-        """Variance of single records, (n_modes,)."""
-        return np.diag(self.parts.sum(axis=0))
-
-
-def lagged_covariances(first: Array, second: Array, lags: Sequence[int]) -> Array:
-    """Mean products of columns some records apart, (n_lags, n_modes, n_modes), over pairs that are known."""
-    known = [(~np.isnan(table)).astype(float) for table in (first, second)]
-    filled = [np.nan_to_num(table) for table in (first, second)]
-    found = np.empty((len(lags), first.shape[1], first.shape[1]))
-    for place, lag in enumerate(lags):
-        sums, pairs = (a[lag:].T @ b[: len(b) - lag] + b[lag:].T @ a[: len(a) - lag] for a, b in (filled, known))
-        found[place] = (sums + sums.T) / np.maximum(pairs + pairs.T, 1)
-    return found
-
-
-def _split(
-    found: Array, n_records: NDArray[np.intp], less_similar: Callable[[Array], Array], n_rows: int
-) -> tuple[float, Array, Array]:
-    """Memory, and covariances of the independent and of the fading part, that explain the covariances that were found.
-
-    Without clear signs of a fading part, its covariance is zero.
-    """
-    times = np.geomspace(1.5, max(n_rows / 8, 3.0), 12)  # correlation times that are tried
-    memories = np.append(0.0, (times - 1) / (times + 1))
-    expected = _expected(memories, less_similar, n_rows, len(found))
-    single = np.diag(found[0])
-    of_modes = np.diagonal(found, axis1=1, axis2=2) / single
-    both = np.stack(np.broadcast_arrays(expected[0], expected), axis=1)
-    along, of_memory = (both @ of_modes).swapaxes(1, 2), np.repeat(np.arange(len(memories)), len(single))
-    shares, lengths = project_on_cones(both @ both.swapaxes(1, 2), along.reshape(-1, 2), of_memory)
-    misfits = ((of_modes**2).sum(axis=0) - lengths.reshape(len(memories), -1) ** 2) @ n_records
-    best = int(np.argmin(misfits))
-    if misfits[0] - misfits[best] <= 2 * (len(n_records) + 1):  # as the same number of parameters explain of noise
-        best = 0
-    memory, total = float(memories[best]), _correlations(found[0], single)
-    if best == 0:
-        variances = single * (expected[0] @ of_modes) / (expected[0] @ expected[0])
-        return memory, _covariance(total, variances), np.zeros_like(total)
-    variances = single * shares[of_memory == best].T
-    matrices = np.linalg.lstsq(expected[[0, best]].T, found.reshape(len(found), -1), rcond=None)[0]
-    parts = []
-    for part, faded in enumerate((1.0, (1 - memory) / (1 + memory))):
-        known = faded * n_records.min()
-        own = _correlations(matrices[part].reshape(total.shape), variances[part])
-        own = np.where(np.isnan(own), total, own)
-        parts.append(_covariance((known * own + PSEUDO_RECORDS * total) / (known + PSEUDO_RECORDS), variances[part]))
-    return memory, parts[0], parts[1]
-
-
-def _expected(memories: Array, less_similar: Callable[[Array], Array], n_rows: int, n_lags: int) -> Array:
-    """Covariances of simulated records of unit variance, once similar weather has taken its share.
-
-    They are (n_memories, n_lags); the records, 2 to 64 columns of some 100,000 in all, are drawn alike in every call.
-    """
-    n_drawn = int(np.clip(100_000 // n_rows, 2, 64))
-    start = 500
-    shocks = np.random.RandomState(0).standard_normal((start + n_rows, n_drawn))
-    noise = [np.sqrt(1 - m**2) * scipy.signal.lfilter([1.0], [1.0, -m], shocks, axis=0)[start:] for m in memories]
-    rest = np.split(less_similar(np.hstack(noise)), len(memories), axis=1)
-    n_pairs = n_drawn * (n_rows - np.arange(n_lags))
-    return np.array([_lagged_products(one, n_lags).sum(axis=1) / n_pairs for one in rest])
-
-
-def _lagged_products(columns: Array, n_lags: int) -> Array:
-    """Sums of the products of values 0, 1, ... rows apart, (n_lags, n_columns)."""
-    length = scipy.fft.next_fast_len(len(columns) + n_lags, real=True)
-    spectra = scipy.fft.rfft(columns, length, axis=0)
-    return np.asarray(scipy.fft.irfft(spectra.real**2 + spectra.imag**2, length, axis=0)[:n_lags])
-
-
-def _correlations(matrix: Array, variances: Array) -> Array:
-    """A matrix over the roots of variances; NaN where one of these is zero."""
-    scale = np.sqrt(np.outer(variances, variances))
-    return np.clip(np.divide(matrix, scale, out=np.full_like(scale, np.nan), where=scale > 0), -1, 1)
-
-
-def _covariance(correlations: Array, variances: Array) -> Array:
-    """The covariance with these variances and with positive definite correlations close to the given ones."""
-    np.fill_diagonal(correlations, 1.0)
-    values, vectors = np.linalg.eigh(correlations)
-    positive = vectors * np.maximum(values, 1e-3) @ vectors.T
-    scale = np.sqrt(variances / np.diag(positive))
-    return positive * np.outer(scale, scale)

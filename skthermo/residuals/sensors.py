@@ -118,75 +118,26 @@ class SensorRegression:
             error[np.ix_(gaps, self.learned)] = roots[of_row, :, sensor]
             yield error
 
+    def variances_of_fills(
+        self, raw: Any, filled: Any, predict: Callable[[Any], Array], outcome: Callable[[Array], Array]
+    ) -> Array:
+        """Variances of predictions because temperatures were filled, (n_rows, n_outcomes), or a column of zeros.
 
-@dataclass(frozen=True)
-class PredictionError:
-    """Covariance of the error of predictions that is known of each row, (n_rows, n_modes, n_modes).
-
-    ``rows`` are those with such an error.
-    """
-
-    rows: NDArray[np.intp]
-    covariances: Array
-
-    @classmethod
-    def of_rows(cls, covariances: Array) -> PredictionError:
-        """That of rows with a covariance each; zero where it is unknown."""
-        known = np.nan_to_num(covariances)
-        rows = np.flatnonzero(known.any(axis=(1, 2)))
-        return cls(rows, known[rows])
-
-    @classmethod
-    def of_fills(
-        cls,
-        sensors: SensorRegression,
-        raw: Any,
-        filled: Any,
-        predict: Callable[[Any], Array],
-        outcome: Callable[[Array], Array] = np.asarray,
-    ) -> PredictionError:
-        """Errors of filled temperatures in predictions.
-
-        Filled values are moved by one standard deviation up and down, sensor by sensor, and predicted again. The error
-        of the ``outcome`` of each prediction counts.
+        Filled values are moved by one standard deviation up and down, sensor by sensor, and predicted again. The
+        ``outcome`` of each prediction that has moved counts.
         """
+        variances, middle = np.zeros((len(filled), 1)), None
         with collected():
-            middle = np.empty(0)
-            moved: list[Array] = []
-            for error in sensors.errors(raw):
-                middle = middle if moved else predict(filled)
-                moved += [predict(frame_like(filled, as_floats(filled) + side)) for side in (-error, error)]
-            if not moved:
-                return NO_ERRORS
-            rows = np.flatnonzero(np.any([np.nan_to_num(one - middle).any(axis=1) for one in moved], axis=0))
-            start = outcome(middle[rows])
-            changes = np.nan_to_num([outcome(one[rows]) - start for one in moved])
-        return cls(rows, np.einsum("ijk,ijl->jkl", changes, changes) / 2)
-
-    def of_part(self, rows: slice) -> PredictionError:
-        """That of some rows of a table, counted from the first of them."""
-        first, stop = np.searchsorted(self.rows, [rows.start, rows.stop])
-        return PredictionError(self.rows[first:stop] - rows.start, self.covariances[first:stop])
-
-    def of_all(self, n_rows: int, n_modes: int) -> Array:
-        """The covariance of each row of a table, zero where nothing is known."""
-        covariances = np.zeros((n_rows, n_modes, n_modes))
-        if len(self.rows):
-            covariances[self.rows] = self.covariances
-        return covariances
-
-    def plus(self, other: PredictionError, n_rows: int) -> PredictionError:
-        """The error of two independent causes in a table of so many rows."""
-        if not len(other.rows):
-            return self
-        if not len(self.rows):
-            return other
-        n_modes = other.covariances.shape[1]
-        return PredictionError.of_rows(self.of_all(n_rows, n_modes) + other.of_all(n_rows, n_modes))
-
-
-NO_ERRORS = PredictionError(np.empty(0, dtype=np.intp), np.empty((0, 1, 1)))
-"""Where no error of predictions is known."""
+            for error in self.errors(raw):
+                middle = predict(filled) if middle is None else middle
+                for side in (error, -error):
+                    moved = predict(frame_like(filled, as_floats(filled) + side))
+                    rows = np.nan_to_num(moved - middle).any(axis=1)
+                    changes = outcome(moved[rows]) - outcome(middle[rows])
+                    added = np.zeros((len(filled), changes.shape[1]))
+                    added[rows] = np.nan_to_num(changes) ** 2 / 2
+                    variances = variances + added
+        return variances
 
 
 def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:

@@ -176,60 +176,10 @@ def unpredicted_text(
     return f"rows {', and rows '.join(found)} cannot be predicted and are NaN. {'. '.join(found.values())}"
 
 
-@dataclass(frozen=True)
-class WeatherFunctions:
-    """Functions of the weather, whose sum stands for the errors that a mapper may have learned.
-
-    A constant, three principal coordinates of the standardised weather and their squares, and two hinges of the first
-    coordinate, where the weather is cold and where it is hot.
-    """
-
-    mean: Array
-    directions: Array
-    ends: Array
-    reach: Array
-
-    @classmethod
-    def fitted(cls, weather: Array) -> WeatherFunctions:
-        """The functions for records, (n_records, n_inputs), without gaps in those that count."""
-        known = weather[~np.isnan(weather).any(axis=1)]
-        centre, directions = weather_axes(known)
-        directions = directions[:3]
-        spread = ((known - centre) @ directions.T).std(axis=0)
-        directions = directions / np.where(spread > 0, spread, 1.0)[:, np.newaxis]
-        places = (known - centre) @ directions.T
-        ends = np.quantile(places[:, 0], (0.15, 0.85))
-        return cls(centre, directions, ends, np.array([places.min(axis=0), places.max(axis=0)]))
-
-    @property
-    def size(self) -> int:
-        return 2 * len(self.directions) + 3
-
-    def values(self, weather: Array, *, is_clipped: bool = False) -> Array:
-        """All functions, (n_records, size); weather outside the records' range may count as its nearest edge."""
-        places = (weather - self.mean) @ self.directions.T
-        if is_clipped:
-            places = np.clip(places, *self.reach)
-        first, (low, high) = places[:, :1], self.ends
-        hinges = [np.maximum(low - first, 0.0), np.maximum(first - high, 0.0)]
-        return np.hstack([np.ones_like(first), places, places**2 - 1, *hinges])
-
-
 def weather_coordinates(weather: Array, explained: float = 0.99) -> Pipeline:
     """Principal components of the standardised weather, in which similar records are near each other."""
     with np.errstate(divide="ignore", invalid="ignore"):  # of weather that is always the same
         return make_pipeline(StandardScaler(), PCA(explained)).fit(weather)
-
-
-def weather_axes(weather: Array, explained: float = 0.99) -> tuple[Array, Array]:
-    """The middle of the weather, (n_inputs,), and its principal directions per degree, (n_coordinates, n_inputs).
-
-    A direction has the sign that does not depend on rounding where two inputs weigh alike.
-    """
-    scaler, components = (step for _, step in weather_coordinates(weather, explained).steps)
-    vectors = components.components_
-    signs = np.where(vectors @ np.linspace(2, 1, vectors.shape[1]) < 0, -1.0, 1.0)
-    return scaler.mean_ + components.mean_ * scaler.scale_, signs[:, np.newaxis] * vectors / scaler.scale_
 
 
 class NearestPlaces:

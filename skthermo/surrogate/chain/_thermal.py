@@ -33,7 +33,7 @@ from skthermo._core.frames import Table, check_same_rows, column_names, frame_li
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
-from skthermo.residuals.sensors import PredictionError, SensorRegression, filled_text
+from skthermo.residuals.sensors import SensorRegression, filled_text
 from skthermo.residuals.weather import TrainingRange, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
 from skthermo.surrogate._simulator import Simulator
@@ -265,8 +265,7 @@ class ThermalModel(SavesFrames):
         def log_frequencies(both: Array) -> Array:
             return np.log(self.frequencies(both[:, :n_parameters])) + both[:, n_parameters:]
 
-        cost = PredictionError.of_fills(self.sensors, weather.given, weather.filled, predict, log_frequencies)
-        variances = np.einsum("ijj->ij", cost.of_all(len(weather), len(self.mode_names)))
+        variances = self.sensors.variances_of_fills(weather.given, weather.filled, predict, log_frequencies)
         inputs = inputs_of_last_step(self.mapper, weather.filled)
         stated = predict_with_std(last_step(self.mapper), inputs)[1]
         if stated is not None:
