@@ -161,11 +161,15 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "slopes = slopes",
         ),
     ],
-    ("residuals/weather.py", "test_sensor_regression.py"): [
+    ("residuals/sensors.py", "residuals/test_sensors.py"): [
         ("sensors in unknown weather", "outside = beyond > 0", "outside = beyond > 1e9"),
+        ("usual departures of sensors", "np.fmax(3 * usual, least)", "np.fmax(0.5 * usual, least)"),
     ],
-    ("monitoring/_records.py", "test_sensor_regression.py"): [
-        ("usual departures of sensors", "TIMES_USUAL * usual", "0.5 * usual"),
+    ("residuals/weather.py", "residuals/test_extrapolation.py"): [
+        ("growth outside the weather", "1 + np.log1p(self.reach", "1 + 0 * np.log1p(self.reach"),
+    ],
+    ("detection/_base.py", "detection/test_thresholds.py"): [
+        ("blocks longer than the memory", "np.clip(np.median(numbers) / 2, 5, 50)", "50"),
     ],
     ("residuals/baseline.py", "surrogate/test_uncertainty.py"): [
         ("spread of the same period", "np.where(test[:, np.newaxis], np.nan, self._scattered)", "self._scattered"),
@@ -179,8 +183,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             'kind="stable")\n        order = np.flatnonzero(known)\n        inputs',
         ),
     ],
-    ("residuals/weather.py", "surrogate/test_uncertainty.py"): [
-        ("cost of filled temperatures", "changes, changes) / 2", "changes, 0 * changes) / 2"),
+    ("residuals/sensors.py", "surrogate/test_uncertainty.py"): [
+        ("cost of filled temperatures", "np.nan_to_num(changes) ** 2 / 2", "0 * np.nan_to_num(changes)"),
     ],
     ("_core/frames.py", "surrogate/test_uncertainty.py"): [
         ("correlation time", "1 + 2 * correlations[:n_clear]", "1 + correlations[:n_clear]"),
@@ -238,10 +242,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("_core/parallel.py", "test_threads.py"): [
         ("limits around threads", "if effective_n_jobs(n_jobs) > 1 else", "if effective_n_jobs(n_jobs) > 9 else"),
-    ],
-    ("residuals/baseline.py", "surrogate/test_scatter.py"): [
-        ("memory of scatter", "kept = self.memory ** np", "kept = 0.0 * np"),
-        ("what similar weather takes from scatter", "less_similar(np.hstack(noise))", "np.hstack(noise)"),
     ],
     ("monitoring/_drift.py", "monitoring/test_track_parameters.py"): [
         ("weather beside drift", "coordinates**3, earlier])", "coordinates**3, 0 * earlier])"),
