@@ -26,16 +26,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weather of another variance", "np.sqrt(1 - decay**2) * noise[1:]", "(1 - decay) * noise[1:]"),
         ("a law that is not reversed in frost", "gain=-law.gain)", "gain=law.gain)"),
     ],
-    ("monitoring/_active.py", "monitoring/test_monitor.py"): [
-        ("indices at an edge that are not computed alone", "flatnonzero(from_edge <=", "flatnonzero(from_edge < -"),
-    ],
-    ("monitoring/_history.py", "monitoring/test_monitor.py"): [
-        (
-            "late records that do not go back to their day",
-            "place = _last_before(self.checkpoints, first)",
-            "place = len(self.checkpoints) - 1",
-        ),
-    ],
     ("monitoring/_retraining.py", "monitoring/test_retraining.py"): [
         ("records of an event train", "kept &= ~inside", "kept &= True"),
         ("old weeks that never fade", "moved[_season_is_missing(prior.index, own.index)]", "moved"),
@@ -134,16 +124,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
     ],
-    ("surrogate/inverse/_steps.py", "surrogate/test_posterior_inverse.py"): [
-        ("pull of the prior", "pull = x @ self.precision", "pull = x @ self.precision / 2"),
-    ],
     ("surrogate/inverse/_posterior.py", "surrogate/test_posterior_inverse.py"): [
-        ("rows that stall", "np.where(lost, np.nan, np.exp(local.x))", "np.exp(local.x)"),
         ("weight of rows with gaps", "((at_best / std) ** 2)", "(at_best / std)"),
         ("the common factor", "return self.common**2 + np.diag(self.own**2)", "return np.diag(self.own**2)"),
-    ],
-    ("surrogate/inverse/_posterior.py", "surrogate/test_reduced_posterior.py"): [
-        ("rows that leave the reduced model", "if outside.size:", "if not outside.size:"),
     ],
     ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
         ("residuals of records of weight 0", "measured).all(axis=1) & self.counted", "measured).all(axis=1)"),
@@ -172,7 +155,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("blocks longer than the memory", "np.clip(np.median(numbers) / 2, 5, 50)", "50"),
     ],
     ("residuals/baseline.py", "surrogate/test_uncertainty.py"): [
-        ("spread of the same period", "np.where(test[:, np.newaxis], np.nan, self._scattered)", "self._scattered"),
+        ("spread of the same period", "np.where(test[:, np.newaxis], np.nan, self.values)", "self.values"),
         ("spread beyond the range", " * (1 + beyond)[:, np.newaxis]", ""),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
     ],
@@ -212,7 +195,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("stuck sensors at all", "lengths[longest] >= 5", "lengths[longest] >= 500"),
     ],
     ("preprocessing/checks/_beside_weather.py", "preprocessing/test_checks.py"): [
-        ("direction of a time shift", "lines[rows - shift]", "lines[np.minimum(rows + shift, n_rows - 1)]"),
         ("inertia as a time shift", "strength[farthest - 1 : farthest + inertia + 1] = 0", "strength[farthest] = 0"),
         ("exchanged modes that cross", "        if np.sqrt(ratio.prod()) < 0.5:", "        if True:"),
     ],
@@ -299,7 +281,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
     ],
     ("plotting/_display.py", "plotting/test_limits.py"): [
-        ("a group of points taken for outliers", "FEW = 0.02", "FEW = 0.2"),
         ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
     ],
     ("plotting/_detectors.py", "plotting/test_detectors.py"): [
@@ -316,13 +297,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("significant alarms among the others", '("significant" if is_significant else "open")', '"open"'),
         ("silent bridges below healthy ones", 'place, size = "silent",', 'place, size = "well",'),
     ],
-    ("plotting/_monitor.py", "plotting/test_monitor.py"): [
-        (
-            "days without records that nobody sees",
-            "days.reindex(midnights_between(days.index[0], days.index[-1]))",
-            "days",
-        ),
-    ],
     ("reporting/_choice.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
     ],
@@ -332,7 +306,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/_files.py", "monitoring/test_files.py"): [
         ("functions read from files", "isinstance(found, type) and found", "found"),
         ("classes of other packages by a trusted name", "and found.__module__ == module", ""),
-        ("versions of a saved monitor", "if monitor.versions_ != versions():", "if False:"),
     ],
     ("commands/_bridge.py", "commands/test_monitor_commands.py"): [
         ("an alarm that has ended within a batch", "if has_alarm or state ==", "if state =="),
