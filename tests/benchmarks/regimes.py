@@ -7,10 +7,14 @@
 - winters: thirty bridges of ``make_fleet`` learn six weeks of two-hourly records to March, and evaluate the
   spring; in the damaged one, the first damage group has lost 20 %.
 
+"No extrapolation" is the default whose residuals count as much outside the baseline's weather as inside.
+
 The exit code is 1 if the default gives more than 4 % false alarms in spring, or misses half of the damage.
 """
 
 import sys
+from contextlib import nullcontext
+from unittest.mock import patch
 
 import numpy as np
 import pandas as pd
@@ -19,10 +23,18 @@ from harness import arguments, compensated, joined, last_step, modes_of, shown
 
 from skthermo.datasets import make_fleet, make_z24
 from skthermo.detection import DirectionalDetector
+from skthermo.residuals.weather import Extrapolation
 
 SEEDS = 0, 1, 7
-WAYS = {'"auto", default': "auto", "None": None}
+WAYS = {'"auto", default': "auto", "None": None, "no extrapolation": "auto"}
 LAST = {"directions of the FE model": lambda: DirectionalDetector(make_z24()), "Mahalanobis": lambda: None}
+
+
+def as_inside(way):
+    """In the way without extrapolation, residuals have one variance in any weather."""
+    if way != "no extrapolation":
+        return nullcontext()
+    return patch.object(Extrapolation, "variances", lambda self, weather: np.ones(len(weather)))
 
 
 def z24():
@@ -30,8 +42,9 @@ def z24():
     for baseline, tables in z24_folds():
         for way, regimes in WAYS.items():
             for what, last in LAST.items():
-                detector = compensated(modes_of(baseline), last(), regimes=regimes).fit(baseline)
-                one = indices(detector, tables)
+                with as_inside(way):
+                    detector = compensated(modes_of(baseline), last(), regimes=regimes).fit(baseline)
+                    one = indices(detector, tables)
                 found.setdefault(f"{what}, {way}", []).append((one, by_threshold(last_step(detector), one)))
     rows = {}
     for what, folds in found.items():
@@ -54,8 +67,9 @@ def winters():
             )
         )
         for way, regimes in WAYS.items():
-            detector = compensated(modes_of(baseline), regimes=regimes).fit(baseline)
-            decisions = [detector.predict(records) for records in later]
+            with as_inside(way):
+                detector = compensated(modes_of(baseline), regimes=regimes).fit(baseline)
+                decisions = [detector.predict(records) for records in later]
             rates.setdefault(way, []).append([100 * (one[one != 0] == -1).mean() for one in decisions])
     rows = {}
     for way, each in rates.items():
