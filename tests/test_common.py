@@ -296,7 +296,9 @@ def test_metadata_routing_changes_no_result():
             np.testing.assert_array_equal(results(estimator, data), off, err_msg=shown(estimator))
 
 
-NEED_NO_FIT = re.compile(r"_|fit|set_|get_params|get_metadata_routing|run$|findings$|steps_on$|behind_means$")  # beginnings of names
+NEED_NO_FIT = re.compile(  # beginnings of names
+    r"_|fit|set_|get_params|get_metadata_routing|run$|findings$|steps_on$|behind_means$"
+)
 
 
 def test_every_method_says_that_the_estimator_is_not_fitted():
