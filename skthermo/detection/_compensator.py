@@ -346,10 +346,12 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             self.folds_[test] = number
         self.training_range_ = TrainingRange.spanned(inputs, ~np.isnan(Y).all(axis=1))
         self.relative_ = (np.fmin.reduce(Y) > 0) & (np.nanstd(Y, axis=0) < np.nanmean(Y, axis=0) / 3)
-        predicted, doubts = self._regress(inputs, F, folds)
+        estimator = self._default_part("estimator") if self.estimator is None else self.estimator
+        estimator = with_means(estimator, inputs, F)
+        predicted, doubts = self._regress(estimator, inputs, F, folds)
         residuals = self._difference(Y, predicted)
         self.scale_, self.usual_deviation_ = robust_deviation(residuals), median(self._deviations(predicted))
-        self.extrapolation_ = self._learn_extrapolation(as_floats(inputs), inputs, F)
+        self.extrapolation_ = self._learn_extrapolation(estimator, inputs, F)
         residuals = self._shrunk(residuals, inputs, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
@@ -358,13 +360,14 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         findings += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
         return findings, frame_like(F, residuals)
 
-    def _regress(self, T: Any, F: Any, folds: list[tuple[Rows, Rows]]) -> tuple[Array, list[SkthermoWarning]]:
+    def _regress(
+        self, estimator: BaseEstimator, T: Any, F: Any, folds: list[tuple[Rows, Rows]]
+    ) -> tuple[Array, list[SkthermoWarning]]:
         """Fit the regression; predictions out of fold with standard deviations, and findings of the estimator.
 
         Targets that are far from a first regression do not train the second one.
         """
-        estimator, Y = self._default_part("estimator") if self.estimator is None else self.estimator, as_floats(F)
-        estimator = with_means(estimator, T, F)
+        Y = as_floats(F)
         for _ in range(2):
             with collected() as found:
                 self.regression_ = RowsRegression.fitted(estimator, T, F)
@@ -377,19 +380,19 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.estimator_ = self.regression_.estimator
         return predicted, found
 
-    def _learn_extrapolation(self, weather: Array, inputs: Any, F: Any) -> Extrapolation:
+    def _learn_extrapolation(self, estimator: BaseEstimator, T: Any, F: Any) -> Extrapolation:
         """How residuals scatter where the regression extrapolates, in the coldest and the warmest fifth of records."""
-        estimator, scale = self._default_part("estimator") if self.estimator is None else self.estimator, self.scale_
+        scale = np.where(self.scale_ > 0, self.scale_, np.nan)
 
         def residuals_of(others: Rows, fifth: Rows) -> Array:
             try:
                 with collected():
-                    predicted = self.regression_.out_of_fold(estimator, inputs, F, [(others, fifth)])[:, fifth]
+                    predicted = self.regression_.out_of_fold(estimator, T, F, [(others, fifth)])[:, fifth]
             except ValueError:  # the others are too few for a regression
                 return np.full((len(fifth), F.shape[1]), np.nan)
-            return self._difference(as_floats(F)[fifth], predicted) / np.where(scale > 0, scale, np.nan)
+            return self._difference(as_floats(F)[fifth], predicted) / scale
 
-        return Extrapolation.learned(self.training_range_, weather, residuals_of)
+        return Extrapolation.learned(self.training_range_, as_floats(T), residuals_of)
 
     def inputs(self, X: ArrayLike) -> tuple[Any, list[SkthermoWarning]]:
         """The columns beside the targets, gaps filled from the other sensors.
