@@ -30,7 +30,6 @@ from sklearn.utils._metadata_requests import _routing_enabled
 from sklearn.utils._param_validation import HasMethods, InvalidParameterError, StrOptions
 from sklearn.utils._user_interface import _print_elapsed_time
 from sklearn.utils.metadata_routing import get_routing_for_object
-from sklearn.utils.metaestimators import _BaseComposition
 from sklearn.utils.validation import _check_feature_names_in, _num_samples, check_is_fitted, has_fit_parameter
 
 from skthermo._core.arrays import (
@@ -239,11 +238,9 @@ def with_means(estimator: Any, X: Any, y: Any) -> Any:
     return last.behind_means(X, y, estimator.steps[:-1] if isinstance(estimator, Pipeline) else ())
 
 
-def held(path: str, *, is_copied: bool = False) -> Any:
-    """A property that a part of an object holds, such as "active_.threshold"; the object's class says what it is."""
-    get = attrgetter(path)
-    doc = f"``{path}``, as the class describes it."
-    return property((lambda owner: get(owner).copy()) if is_copied else get, doc=doc)
+def held(path: str) -> Any:
+    """A property that a part of an object holds, such as "_found.table"; the object's class says what it is."""
+    return property(attrgetter(path), doc=f"``{path}``, as the class describes it.")
 
 
 class Stages:

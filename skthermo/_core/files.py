@@ -20,12 +20,6 @@ UNFINISHED = ".unfinished"
 PAUSE = 0.05  # seconds between two looks at a lock
 
 
-def lock(file: IO) -> None:
-    """Wait until no other process holds a file's lock, then hold it until the file is closed."""
-    if fcntl is not None:
-        fcntl.flock(file, fcntl.LOCK_EX)
-
-
 @contextmanager
 def alone_with(path: Path, seconds: float) -> Iterator[None]:
     """Be the only process that works on a file, which may be replaced meanwhile; wait for others so long at most.

@@ -105,18 +105,12 @@ def track_parameters(
     years = np.arange(len(days)) * (DAY / YEAR)
     line = bending_line(years, np.arange(1, int(years[-1])))
     X = DailyWeather.fitted(daily_T.to_numpy()).of_days(daily_T.to_numpy())[0]
-    n_known, needed = (~np.isnan(y) & ~np.isnan(X[:, :1])).sum(axis=0), 3 * (X.shape[1] + line.shape[1])
-    few = n_known < needed
-    if few.all():
-        counts = ", ".join(f"{mode} {number}" for mode, number in zip(F, n_known, strict=True))
-        raise ValueError(
-            f"modes were measured, with temperatures, on too few days: {counts}; expected {needed} or more"
-        )
-    size = X.shape[1]
+    n_known = (~np.isnan(y) & ~np.isnan(X[:, :1])).sum(axis=0)
+    few = _on_few_days(n_known, 3 * (X.shape[1] + line.shape[1]), F.columns)
     equations, noise = regressed(np.hstack([X, line]), y[:, ~few], line.shape[1])
-    freedom = noise.independent(n_known.max()) - size
+    freedom = noise.independent(n_known.max()) - X.shape[1]
     trends = ModeTrends.fitted(equations, noise, slopes[~few], line.shape[1], freedom)
-    steady = ModeTrends.fitted(equations.first(size + 1), noise, slopes[~few], 1, freedom)
+    steady = ModeTrends.fitted(equations.first(X.shape[1] + 1), noise, slopes[~few], 1, freedom)
     p_value, explanation = steady.p_value(), Explanation.weighed(trends, names)
     best = explanation.sets[0] if p_value <= significance else ()
     alternatives = explanation.alternatives() if best else {}
@@ -125,10 +119,6 @@ def track_parameters(
         beside = [one for one in best if one != group and name not in alternatives[names[one]]]
         changes[name] = explanation.change(group, beside, line)
     shifts = sum((np.outer(changes[names[group]][0], slopes[:, group]) for group in best), np.zeros(y.shape))
-    at_end = np.kron(np.eye(len(trends.slopes)), line[-1:])
-    modes = pd.DataFrame(np.nan, pd.Index(F.columns, name="mode"), ["measured", "explained", "standard_error"])
-    errors = np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T))
-    modes.loc[~few] = np.column_stack([at_end @ trends.mean, shifts[-1, ~few], errors])
     return ParameterHistory(
         table=pd.DataFrame(
             {
@@ -149,9 +139,29 @@ def track_parameters(
             }
         ),
         alternatives=alternatives,
-        modes=modes,
+        modes=_modes(trends, line[-1:], shifts[-1], few, F.columns),
         shifts=pd.DataFrame(shifts, days, F.columns),
     )
+
+
+def _on_few_days(n_known: Array, needed: int, modes: pd.Index) -> Array:
+    """Which modes were measured on fewer days than are needed; an error if all were."""
+    few = n_known < needed
+    if few.all():
+        counts = ", ".join(f"{mode} {number}" for mode, number in zip(modes, n_known, strict=True))
+        raise ValueError(
+            f"modes were measured, with temperatures, on too few days: {counts}; expected {needed} or more"
+        )
+    return few
+
+
+def _modes(trends: ModeTrends, line: Array, shifts: Array, few: Array, names: pd.Index) -> pd.DataFrame:
+    """One row a mode, as in `ParameterHistory`, from the line and the explained shifts on the last day."""
+    at_end = np.kron(np.eye(len(trends.slopes)), line)
+    errors = np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T))
+    table = pd.DataFrame(np.nan, pd.Index(names, name="mode"), ["measured", "explained", "standard_error"])
+    table.loc[~few] = np.column_stack([at_end @ trends.mean, shifts[~few], errors])
+    return table
 
 
 def _rates(

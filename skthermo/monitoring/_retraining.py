@@ -17,6 +17,7 @@ from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correl
 from skthermo._core.text import capital, counted, listed, probability_text
 from skthermo._core.warnings import without_warnings
 from skthermo.detection import CompensatedDetector, TemperatureCompensator
+from skthermo.monitoring._columns import compensators_of
 from skthermo.monitoring._drift import DailyWeather, ModeTrends, daily_means, regressed
 from skthermo.monitoring._events import WATCH
 
@@ -332,11 +333,9 @@ def residuals_of(
         )
         return old, own, is_relative
     plain = TemperatureCompensator(targets=targets)
-    for part in (detector, *detector.get_params().values()):
-        if isinstance(part, TemperatureCompensator):
-            plain = clone(part)
-        if isinstance(part, CompensatedDetector):
-            plain = TemperatureCompensator(part.regressor, targets=part.targets, cv=part.cv)
+    for part in compensators_of(detector):
+        is_whole = isinstance(part, CompensatedDetector)
+        plain = TemperatureCompensator(part.regressor, targets=part.targets, cv=part.cv) if is_whole else clone(part)
     with without_warnings():
         left = np.asarray(plain.fit_transform(baseline)), np.asarray(plain.transform(new))
     names = list(plain.get_feature_names_out())

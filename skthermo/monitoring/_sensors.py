@@ -182,6 +182,7 @@ def windows(rest: Array) -> Array:
 
 
 def median_of_most(rows: Array, n_days: int) -> Array:
+    """Medians of columns that have a value on most of so many days; else NaN."""
     known = (~np.isnan(rows)).sum(axis=0)
     return np.where(known > n_days / 2, median(rows) if len(rows) else np.nan, np.nan)
 
@@ -346,7 +347,7 @@ class SensorWatch:
         per_day, n_sensors = len(stamps) / max(n_days, 1), len(columns)
         least, thermometers = 0.3 * per_day, None
         if n_sensors > 1 and n_days >= 3 * n_sensors + 5 and not np.isnan(temperatures).all(axis=0).any():
-            thermometers = Thermometers.fitted(*daily_means(days, temperatures, least))
+            thermometers = Thermometers.fitted(*means_by_day(days, temperatures, least))
         known = temperatures[~np.isnan(temperatures).all(axis=1)] if n_sensors else np.empty((0, 0))
         filler = Gaussian.fitted(known) if known.size else Gaussian(np.empty(0), np.empty((0, 0)))
         runs = run_limits(np.hstack([temperatures, responses]), per_day)
@@ -426,7 +427,9 @@ class SensorWatch:
         own = np.hstack([as_floats(T_day)[:, [columns[0] for columns in self.columns]], as_floats(F_day)])
         kept, known = state.days > days[-1] - self.span, state.days_of_means > days[-1] - 120
         temperatures = own[:, : len(self.sensors)]
-        means = daily_means(days, np.where(self.weather.implausible(temperatures), np.nan, temperatures), self.least)[1]
+        means = means_by_day(days, np.where(self.weather.implausible(temperatures), np.nan, temperatures), self.least)[
+            1
+        ]
         state = replace(
             state,
             stamps=np.r_[state.stamps[kept], stamps],
@@ -595,14 +598,11 @@ def local_days(stamps: pd.DatetimeIndex) -> Counts:
     return stamps.tz_localize(None).as_unit("ns").asi8 // DAY_NS
 
 
-def daily_means(days: Counts, values: Array, least: float) -> tuple[Counts, Array]:
+def means_by_day(days: Counts, values: Array, least: float) -> tuple[Counts, Array]:
     """Days that have records, and means of those that have enough values; else NaN."""
-    first = np.flatnonzero(np.diff(days, prepend=days[:1] - 1))
-    known = ~np.isnan(values)
-    sums, counts = (
-        np.add.reduceat(part, first, axis=0) for part in (np.where(known, values, 0.0), known.astype(float))
-    )
-    return days[first], np.where(counts >= max(least, 1.0), sums / np.maximum(counts, 1.0), np.nan)
+    by_day = pd.DataFrame(values).groupby(days)
+    means = by_day.mean().where(by_day.count() >= max(least, 1.0))
+    return means.index.to_numpy(), means.to_numpy()
 
 
 def run_limits(values: Array, per_day: float) -> Counts:
@@ -624,4 +624,5 @@ def run_limits(values: Array, per_day: float) -> Counts:
 
 
 def quantity(value: float, unit: str, digits: int = 2) -> str:
+    """A number with its unit, if it has one."""
     return f"{value:.{digits}g} {unit}".rstrip()

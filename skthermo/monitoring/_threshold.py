@@ -17,10 +17,8 @@ from skthermo._core.text import counted_number, duration_text, percent
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.monitoring._events import levels, open_events, runs
 
-WEEK = pd.Timedelta("7D")
 
-
-def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = WEEK) -> NDArray[np.intp]:
+def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = 7 * DAY) -> NDArray[np.intp]:
     """Number of the block of each record, counted without gaps."""
     return np.unique((times - times[0]) // length, return_inverse=True)[1]
 
@@ -38,9 +36,26 @@ def level_exceeded(peaks: Array, times: float, n_highest: int = 16) -> float:
     """
     if times >= 1:
         return float(np.interp(times, np.arange(1, len(peaks) + 1), peaks))
+    k, base, excesses = highest_squares(peaks, n_highest)
+    return float(np.sqrt(base + excesses.sum() * (((k + 1) / times) ** (1 / k) - 1)))
+
+
+def times_exceeded(peaks: Array, level: float, n_highest: int = 16) -> float:
+    """How often a healthy structure exceeds a level, in as long a time as that of the peaks, on average.
+
+    The inverse of `level_exceeded`, at most once beyond the highest peak.
+    """
+    if level <= peaks[0]:
+        return float(np.interp(-level, -peaks, np.arange(1, len(peaks) + 1)))
+    k, base, excesses = highest_squares(peaks, n_highest)
+    return float(min((k + 1) * (1 + (level**2 - base) / max(excesses.sum(), np.finfo(float).tiny)) ** -k, 1.0))
+
+
+def highest_squares(peaks: Array, n_highest: int = 16) -> tuple[int, float, Array]:
+    """Number of the highest peaks, the square of the next one, and by how much their squares exceed it."""
     k = min(n_highest, len(peaks) - 1)
     squares = peaks[: k + 1] ** 2
-    return float(np.sqrt(squares[k] + (squares - squares[k]).sum() * (((k + 1) / times) ** (1 / k) - 1)))
+    return k, float(squares[k]), squares[:k] - squares[k]
 
 
 @dataclass(frozen=True)
@@ -148,8 +163,7 @@ class EventLevels:
                 "more alarms a year"
             )
             yield ResultWarning(text, "undetected-changes")
-        k = min(16, len(self.peaks) - 1)
-        excesses = self.peaks.iloc[:k].to_numpy() ** 2 - self.peaks.iloc[k] ** 2
+        k, _, excesses = highest_squares(self.peaks.to_numpy())
         by_chance = 1.0 - (0.01 / k) ** (1 / (k - 1))  # share of the largest of k exponential excesses (Cochran)
         if excesses[0] > by_chance * excesses.sum():
             text = (

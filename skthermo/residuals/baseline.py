@@ -26,7 +26,6 @@ from skthermo.residuals.weather import (
     weather_coordinates,
 )
 
-PSEUDO_RECORDS = 12  # weight, in independent records, of correlations of single records beside correlations of a part
 JITTER = 1e-9  # share of its variance that each mode has of its own, also where two scatter the same
 MOST_PLACES = 20_000  # number of records among which neighbours are looked for
 MOST_SIMILAR = 500  # number of similar records that stand for all of them

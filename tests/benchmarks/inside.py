@@ -8,7 +8,6 @@ PLACES = {
     "fem.external._files": ["form_of", "read_file"],
     "monitoring.fleet._bridge": ["KnownBridge"],
     "monitoring._events": ["find_events", "followed"],
-    "monitoring._records": ["Lookback", "Memory"],
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._sensors": ["SensorWatch"],
     "monitoring._threshold": ["EventLevels", "estimate_false_alarms"],

@@ -214,10 +214,12 @@ def content_of(estimator: Any, T: Any, F: Any, monitor: Any) -> str:
 
 
 def given(fitted: Fitted) -> Fitted:
+    """The fitted objects of a bridge that is kept in memory."""
     return fitted
 
 
 def read_fitted(file: Path) -> Fitted:
+    """The fitted objects of a bridge, which its file holds after what is known of it."""
     with open(file, "rb") as content:
         pickle.load(content)
         return pickle.load(content)
@@ -233,6 +235,7 @@ def read_known(file: Path) -> KnownBridge:
 
 
 def monitor_in(monitors: Mapping[Hashable, Monitor], name: Hashable) -> Fitted:
+    """No estimator, and the monitor of a bridge, from a mapping that may read it when it is asked for."""
     return None, monitors[name]
 
 
@@ -243,4 +246,5 @@ def file_of(folder: Path, name: Hashable) -> Path:
 
 
 def part_of(opened: Callable[[], Fitted], part: int) -> Any:
+    """The estimator (0) or the monitor (1) of a bridge that is opened for it."""
     return opened()[part]

@@ -12,6 +12,7 @@ from scipy.stats import false_discovery_control
 from skthermo._core.arrays import Array, check_size
 from skthermo._core.text import counted_number, listed, percent, significant
 from skthermo.monitoring._monitor import Monitor
+from skthermo.monitoring._threshold import times_exceeded
 
 THREE_DAYS = 3 / 365.25  # of each peak of a baseline, in years
 
@@ -135,24 +136,9 @@ def discover(
 
 def event_p_value(monitor: Monitor, peak: float, n_years: float) -> float:
     """Probability that a healthy bridge has so high a peak in so many years."""
-    peaks = np.asarray(monitor.baseline_peaks_, dtype=float)
+    peaks = monitor.baseline_peaks_.to_numpy()
     per_year = times_exceeded(peaks, peak) / (len(peaks) * THREE_DAYS)
     return float(-np.expm1(-per_year * n_years))
-
-
-def times_exceeded(peaks: Array, level: float) -> float:
-    """How often a healthy structure exceeds a level in as long a time as that of its independent peaks, on average.
-
-    That is its rank among the peaks. Beyond the highest one, squares are taken as exponential, like the k highest ones
-    over the next one, b: with s, the sum of their excesses, (k + 1) (1 + (level^2 - b) / s)^-k.
-    """
-    peaks = np.sort(peaks)[::-1]
-    if level <= peaks[0]:
-        return float(np.interp(-level, -peaks, np.arange(1, len(peaks) + 1)))
-    k = min(16, len(peaks) - 1)
-    excesses = peaks[:k] ** 2 - peaks[k] ** 2
-    beyond = (k + 1) * (1 + (level**2 - peaks[k] ** 2) / max(excesses.sum(), np.finfo(float).tiny)) ** -k
-    return float(min(beyond, 1.0))
 
 
 def _events_since(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -135,15 +135,11 @@ def read_causes(
             f"causes have the names {wrong}; expected names in groups or added_mass that differ from each other and "
             f"from {SOMETHING_ELSE!r}, {NO_DAMAGE!r} and {ALL_GROUPS!r}"
         )
-    causes = [_counted(cause, (cause.name,), cause.name) for cause in causes]
+    causes = [replace(cause, rows=(cause.name,), group=cause.name) for cause in causes]
     if len(members) > 1:
         everything = tuple(dict.fromkeys(name for of in members.values() for name in of))
         causes.append(Cause(ALL_GROUPS, of=everything, rows=tuple(members), group=ALL_GROUPS, alone=True))
     return causes
-
-
-def _counted(cause: Cause, rows: tuple[Hashable, ...], group: str) -> Cause:
-    return Cause(**vars(cause) | {"rows": rows, "group": group})
 
 
 def _read_masses(model: Any, added_mass: Any) -> dict[str, tuple[Any, float]]:
