@@ -73,7 +73,7 @@ class Columns:
         return self.inputs if compensators_of(detector) else self.targets
 
     def default_detector(self, fem: Any) -> BaseEstimator:
-        """Directions of damage for responses in Hz, the Mahalanobis distance for others, of what the rest leaves."""
+        """Directions of damage for responses in Hz, the Mahalanobis distance for others, of residuals."""
         in_hertz = {self.units[name] for name in self.targets} == {"Hz"}
         last = DirectionalDetector("softening" if fem is None else fem) if in_hertz else MahalanobisDetector()
         return last if len(self.targets) == len(self.inputs) else CompensatedDetector(last, targets=self.targets)

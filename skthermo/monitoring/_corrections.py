@@ -1,4 +1,4 @@
-"""Records as a detector sees them, day by day: what is no measurement is left out, drift is taken out."""
+"""Records as a detector sees them, day by day: values that are no measurements are left out, drift is taken out."""
 
 from __future__ import annotations
 

@@ -320,7 +320,7 @@ class Explanation:
 
 
 def regressed(X: Array, y: Array, n_times: int, **noise_options: bool) -> tuple[NormalEquations, DailyNoise]:
-    """Normal equations of the modes on columns of which the last are of time, and the noise beside them."""
+    """Normal equations of the modes on columns, the last ones of time, and the noise beside them."""
     size, noise = X.shape[1], DailyNoise(1e-6, np.diag(np.nanvar(y, axis=0)))
     prior = prior_deviations(size - n_times, n_times)
     for _ in range(2):  # the first time as if days were independent
@@ -341,9 +341,9 @@ def rate_errors(steady: ModeTrends) -> Array:
 class DriftState(SavesFrames):
     """What a `DriftFollower` knows at the end of a day.
 
-    ``equations`` are those of days that are learned. ``waiting`` are the days since, a row each: columns that explain
-    ln f, then the modes. ``sudden`` says which of these are in a time that departs from what was predicted; none of
-    these is learned, ``n_left_out`` of such in a row. ``number`` counts days from the end of the baseline to the last
+    ``equations`` hold the days that are learned. ``waiting`` are the days since, a row each: columns that explain ln f,
+    then the modes. ``sudden`` marks the waiting days of a time that departs from the prediction: these are never
+    learned, and ``n_left_out`` counts them in a row. ``number`` counts days from the end of the baseline to the last
     one, ``before`` and ``numbers_before`` are the row and the number of the last day that each mode was learned from.
     """
 
@@ -363,10 +363,10 @@ class DriftFollower:
     """Takes slow drift out of measured frequencies, and leaves sudden changes in.
 
     The regression of `track_parameters` grows day by day, a month behind: a day is learned when it has waited for
-    ``delay`` days, and only if the mean of no such time that holds it departs from what was predicted. So a sudden
-    change is never learned as drift, however long it lasts; one that the mean of a month does not show is learned in
-    time, and reported as the drift that it looks like. What is taken out is the drift found since the middle of the
-    baseline, times a share that is 0 as long as it may be chance and goes to 1 as it becomes clear.
+    ``delay`` days, if in all that time the mean of the waiting days agreed with the prediction. So a sudden change is
+    never learned as drift, however long it lasts; one that the mean of a month does not show is learned in time, and
+    reported as the drift that it looks like. The correction is the drift since the middle of the baseline, times a
+    share that is 0 as long as it may be chance and goes to 1 as it becomes clear.
     """
 
     temperatures: list[Any]
@@ -388,7 +388,7 @@ class DriftFollower:
         missing = [one for one in inputs if one not in T] + [one for one in fem.mode_names_ if one not in F]
         if missing:
             raise ValueError(
-                f"the chain fem was fitted on temperatures and modes of which the baseline lacks {missing}; expected "
+                f"the baseline lacks {missing}, to which the chain fem was fitted; expected "
                 f"their names among the temperatures {list(T.columns)} and the frequencies {list(F.columns)}"
             )
         names, slopes = read_slopes(fem, groups)
@@ -529,7 +529,7 @@ class DriftFollower:
         return replace(state, equations=NormalEquations(information, moments), before=before, numbers_before=numbers)
 
     def _departs(self, state: DriftState, waiting: Array, number: int, trend: float = 0.01) -> bool:
-        """Whether the mean of the days that wait is too far from what was predicted."""
+        """Whether the mean of the days that wait is too far from the prediction."""
         n_modes = len(self.modes)
         n_weather, size = waiting.shape[1] - n_modes, state.equations.moments.shape[1]
         numbers = number - np.arange(len(waiting))[::-1]

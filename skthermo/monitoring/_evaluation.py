@@ -20,7 +20,7 @@ from skthermo.monitoring._threshold import lowered
 
 
 def index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
-    """Damage indices of records; what the detector would warn of is said of each record."""
+    """Damage indices of records; the reason of each record stands for a warning of the detector."""
     with collected(drop_others=True):
         return -np.asarray(detector.score_samples(records[columns]), dtype=float)
 

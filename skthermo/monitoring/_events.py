@@ -19,7 +19,7 @@ DAMAGE, MEASUREMENT, WATCH = "damage", "measurement or structure", "watch"
 
 
 def levels(index: Array, persistence: int) -> Array:
-    """The median index of the last ``2 persistence - 1`` evaluated records, of which those before the first are 0.
+    """The median index of the last ``2 persistence - 1`` evaluated records; records before the first count as 0.
 
     It exceeds a threshold where ``persistence`` of these records do; NaN for records that are not evaluated.
     """
@@ -155,7 +155,7 @@ class Events:
 
 
 def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFrame:
-    """Events with what the owner has said last of each: of an event of that kind at that time."""
+    """Events with the owner's last answer to each, found by its kind and time."""
     answers = []
     for event in events.itertuples():
         end = np.inf if pd.isna(event.end) else event.end.value

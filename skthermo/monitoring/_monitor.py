@@ -536,13 +536,13 @@ class Monitor(SavesFrames, Estimator):
         self.decisions_ = decisions
 
     def _explained(self) -> list[int]:
-        """Times (nanoseconds) at which what was set aside was said to be the fault of a sensor."""
+        """Times (nanoseconds) at which the owner called values that were set aside the fault of a sensor."""
         said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT]
         last = said.drop_duplicates("time", keep="last")
         return last["at"][last["harmless"]].tolist()
 
     def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
-        """Append what has changed since a former state to the transitions, after what was done."""
+        """Append the changes since a former state to the transitions, after the actions that made them."""
         old, new = (events[~(events["end"] < first)] for events in (before.events_, self.events_))
         found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
         for one in [*done, *sorted(found, key=lambda change: change["time"])]:
@@ -721,7 +721,7 @@ class Monitor(SavesFrames, Estimator):
         vars(self).update(vars(after))
 
     def _say(self, kind: str, time: pd.Timestamp, harmless: bool, note: str) -> None:
-        """Note what the owner says of the event of a kind at a time, at the time of the newest record."""
+        """Note the owner's answer to the event of a kind at a time, at the time of the newest record."""
         row = {"kind": kind, "time": time.value, "at": self.last_.value, "harmless": harmless, "note": note}
         said = pd.DataFrame([row]).astype(self.acknowledgements_.dtypes)
         self.acknowledgements_ = pd.concat([self.acknowledgements_, said], ignore_index=True)

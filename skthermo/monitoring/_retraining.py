@@ -186,7 +186,7 @@ def may_train(
     *,
     is_in_place: bool = False,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Records without events that nobody called harmless and values of faulty sensors, and what was left out and why.
+    """Records outside events that nobody called harmless, without values of faulty sensors; the others, with reasons.
 
     Modes that were exchanged for a time stand in their place already with ``is_in_place``.
     """
@@ -298,9 +298,9 @@ def notes_of(changes: list[LevelChange]) -> Iterator[str]:
 def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Change of each mode's level since an intervention, and older records moved to it.
 
-    The change is the mean of what the old regression on the weather leaves of the new records. Few days do not tell it
-    well: each week of old records is moved by an error of its own as large, so that what a detector learns of the
-    scatter holds for records to come. Weeks of a season that the new records have are left out.
+    The change is the mean residual of the new records beside the old regression on the weather. Few days do not tell it
+    well: each week of old records is moved by an error of its own as large, so that the scatter that a detector
+    learns holds for records to come. Weeks of a season that the new records have are left out.
     """
     targets = list(monitor.targets_)
     old, new, is_relative = residuals_of(monitor.detector_, prior, own, targets)

@@ -172,7 +172,7 @@ def season(days: Counts) -> Array:
 
 
 def windows(rest: Array) -> Array:
-    """Medians of the last days' departures, and what those of the last days differ by from those of the days before.
+    """Medians of departures in the last 3, 7 and 30 days, and steps from the month before to the last 3 and 7 days.
 
     NaN where fewer than half of the days have a value, (n_windows, n_thermometers).
     """
@@ -208,8 +208,8 @@ class Responses:
     """Responses in their own units beside what the weather predicts.
 
     ``limits`` are departures from which a value that moves alone is implausible: more than 25 robust deviations, a
-    quarter of its level, and three times what all but one in a thousand of the baseline depart by. ``deviations`` are
-    those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may be exchanged.
+    quarter of its level, and three times the departure that one value in a thousand of the baseline exceeds.
+    ``deviations`` are those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may be exchanged.
     """
 
     together: Gaussian
@@ -302,9 +302,9 @@ class Responses:
 class SensorWatch:
     """Watches thermometers and responses in service, and distinguishes faults of sensors from damage where data can.
 
-    Damage moves no thermometer: one that departs from what the others predict is at fault, if all is well without it,
-    and without it alone. A response that moves may be damaged: it is set aside only where no damage explains what it
-    shows. References check thermometers and fill their gaps.
+    Damage moves no thermometer: one that departs from the others' prediction is at fault if all others agree without
+    it, and without no other one. A response that moves may be damaged: it is set aside only where no damage explains its
+    values. References check thermometers and fill their gaps.
 
     The state is immutable, and what it says depends on complete days alone. ``runs``, (2, n_columns), are numbers of
     records from which missing or equal values are a fault.

@@ -336,7 +336,7 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
 
 
 def drawn_by_row(panels: dict[str, RatesPanel], colour: str, labels: Sequence[str]) -> dict[str, object]:
-    """What a display without headings is made of: all rows in one colour, in the order of the first panel."""
+    """Contents of a display without headings: all rows in one colour, in the order of the first panel."""
     names = list(next(iter(panels.values())).rates.index)
     return {"panels": panels, "places": places_of(names, {}), "colours": dict.fromkeys(names, colour), "labels": labels}
 
@@ -348,7 +348,7 @@ def in_percent(index: pd.Index, is_open: bool = False, **columns: object) -> pd.
 
 
 def of_causes(table: pd.DataFrame) -> dict[str, object]:
-    """What a display of the causes of a shift is made of."""
+    """Contents of a display of the causes of a shift."""
     probability = table["probability"]
     notes = {name: chance_text(share) for name, share in probability.items()}
     is_damage = "kind" not in table or table["kind"].eq("damage").all()
@@ -365,7 +365,7 @@ def of_causes(table: pd.DataFrame) -> dict[str, object]:
 
 
 def of_shifts(table: pd.DataFrame) -> dict[str, object]:
-    """What a display of measured and explained shifts is made of."""
+    """Contents of a display of measured and explained shifts."""
     errors = 2 * table["standard_error"].fillna(0)
     ends = {"low": table["measured"] - errors, "high": table["measured"] + errors}
     rates = in_percent(table.index, value=table["measured"], mark=table["explained"], **ends)
@@ -375,7 +375,7 @@ def of_shifts(table: pd.DataFrame) -> dict[str, object]:
 
 
 def of_explanations(table: pd.DataFrame) -> dict[str, object]:
-    """What a display of the most probable explanations is made of; the last row has what the others have together."""
+    """Contents of a display of the most probable explanations; the last row has the sum of the others."""
     probability = table["probability"].set_axis(table.get("text", table.index))
     shown = probability.iloc[:5]
     if (others := 1 - shown.sum()) >= 0.001:
@@ -387,7 +387,7 @@ def of_explanations(table: pd.DataFrame) -> dict[str, object]:
 
 
 def of_changes(changes: pd.Series) -> dict[str, object]:
-    """What a display of the smallest changes that are found is made of."""
+    """Contents of a display of the smallest changes that are found."""
     known = changes.astype(float).where(np.isfinite(changes.astype(float)))
     notes = dict.fromkeys(changes.index[known.isna()], "not found")
     rates = in_percent(changes.index, low=0.0, high=known, value=known)

@@ -1,4 +1,4 @@
-"""One of many bridges: fitted, updated, and what is known of it afterwards."""
+"""One of many bridges: its fit, its updates, and the facts about it."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class KnownBridge:
         return replace(self, facts=self.facts | facts, events=events, status=status)
 
     def failed(self, stage: str, error: BaseException) -> KnownBridge:
-        """The bridge as it was, with an error of which the last line of code is named."""
+        """The bridge as it was, with an error and the line of code that raised it."""
         last = traceback.extract_tb(error.__traceback__)[-1:]
         places = [f"{Path(one.filename).name}:{one.lineno} in {one.name}" for one in last]
         return replace(self, errors=((stage, f"{type(error).__name__}: {error}", "".join(places)),))
@@ -117,7 +117,7 @@ def fit_bridge(
     seed: int,
     keeps: bool,
 ) -> tuple[KnownBridge, Fitted | None]:
-    """Fit a bridge and its monitor, unless the same was fitted before; None is said of what is as it was."""
+    """Fit a bridge and its monitor, unless the same was fitted before; no fitted objects where all is as it was."""
     start, stage, bridge, fitted = time.perf_counter(), "records", KnownBridge(known.name), None
     with single_blas_thread(), collected() as found:
         try:
@@ -219,7 +219,7 @@ def given(fitted: Fitted) -> Fitted:
 
 
 def read_fitted(file: Path) -> Fitted:
-    """The fitted objects of a bridge, which its file holds after what is known of it."""
+    """The fitted objects of a bridge, which its file holds after the facts about it."""
     with open(file, "rb") as content:
         pickle.load(content)
         return pickle.load(content)

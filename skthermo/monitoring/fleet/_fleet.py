@@ -189,7 +189,7 @@ class Fleet:
     chains, monitors : mapping of name to estimator and to Monitor
         Those that are fitted, read when asked for.
     table : DataFrame
-        A row for each bridge, of which the columns are listed below.
+        A row for each bridge, with the columns below.
     events : DataFrame
         Events of all monitors: ``bridge``, ``event`` (its number) and the columns of a monitor's ``events_``.
     warnings : DataFrame

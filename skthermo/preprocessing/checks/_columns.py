@@ -15,7 +15,7 @@ from skthermo.preprocessing.checks._reading import Reading, texts_of
 LOGGED = (*MISSING_CODES, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
 COLDEST, HOTTEST = -90.0, 100.0  # degrees Celsius that a structure in the open may have
 OTHER_UNITS = (1.8, 32.0, "degrees Fahrenheit"), (10.0, 0.0, "tenths of a degree"), (-1.0, 0.0, "another sign")
-"""How many of them are a degree Celsius, what they are at 0 degrees Celsius, and their name."""
+"""Units other than degrees Celsius: how many make a degree, the value at 0 degrees, and the name."""
 
 
 def look_at_temperatures(T: Reading) -> None:
