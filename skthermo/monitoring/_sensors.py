@@ -209,7 +209,8 @@ class Responses:
 
     ``limits`` are departures from which a value that moves alone is implausible: more than 25 robust deviations, a
     quarter of its level, and three times the departure that one value in a thousand of the baseline exceeds.
-    ``deviations`` are those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may be exchanged.
+    ``deviations`` are those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may
+    be exchanged.
     """
 
     together: Gaussian
@@ -303,8 +304,8 @@ class SensorWatch:
     """Watches thermometers and responses in service, and distinguishes faults of sensors from damage where data can.
 
     Damage moves no thermometer: one that departs from the others' prediction is at fault if all others agree without
-    it, and without no other one. A response that moves may be damaged: it is set aside only where no damage explains its
-    values. References check thermometers and fill their gaps.
+    it, and without no other one. A response that moves may be damaged: it is set aside only where no damage explains
+    its values. References check thermometers and fill their gaps.
 
     The state is immutable, and what it says depends on complete days alone. ``runs``, (2, n_columns), are numbers of
     records from which missing or equal values are a fault.
