@@ -29,6 +29,8 @@ import scipy.io
 import scipy.signal  # which the library loads once it is used
 import scipy.sparse.linalg
 from harness import DATA, arguments, compensated, draw, joined, peak_megabytes, processor_seconds, recipes, shown, split
+from sklearn.covariance import EmpiricalCovariance
+from sklearn.ensemble import IsolationForest
 from sklearn.impute import KNNImputer
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
@@ -37,7 +39,7 @@ from structures import Footbridge, building_frame, footbridge, frame_bridge, lag
 from versions import OtherVersion, run_present
 
 from skthermo.datasets import make_kw51, make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector
+from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.fem import add_noise, sample
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import BlockedKFold, KNNGapImputer, LagFeatures
@@ -160,6 +162,38 @@ def intervals(clock, quick):
     fem.predict_interval(T)  # whose residuals are kept
     with clock.work():
         fem.predict_interval(T)
+
+
+def normal_records(quick, n_rows):
+    return 1e-3 * np.random.default_rng(0).standard_normal((n_rows // 10 if quick else n_rows, 6))
+
+
+def mahalanobis(clock, quick, n_rows=100_000):
+    """MahalanobisDetector fitted to {n_rows:,} records of 6 modes, beside scikit-learn's EmpiricalCovariance."""
+    R = normal_records(quick, n_rows)
+    for _ in range(10):
+        with clock.beside(0.1):
+            EmpiricalCovariance().fit(R)
+        with clock.work(0.1):
+            MahalanobisDetector().fit(R)
+
+
+def forest(clock, quick, n_rows=100_000):
+    """OutlierDetector of a forest fitted to {n_rows:,} records of 6 modes, beside IsolationForest, its scores included."""
+    R = normal_records(quick, n_rows)
+    with clock.beside():
+        IsolationForest(random_state=0).fit(R).score_samples(R)
+    with clock.work():
+        OutlierDetector(IsolationForest(random_state=0)).fit(R)
+
+
+def hourly_chain(clock, quick, n_rows=100_000):
+    """Chain of the truss fitted to {n_rows:,} hourly records."""
+    n_years = 1 if quick else 12
+    campaign = make_truss_campaign(n_years, samples_per_year=8760, samples_per_day=24, random_state=0)
+    T, F = (table[:n_rows] for table in (campaign.temperatures, campaign.frequencies))
+    with clock.work():
+        DataInformedFEM(make_truss(), random_state=0).fit(T, F)
 
 
 def drawn_models(clock, quick):
@@ -312,6 +346,7 @@ GROUPS = {
         "monitor-later": monitor_update_later,
         "two-files": page_of_two_files,
     },
+    "Many records": {"mahalanobis": mahalanobis, "forest": forest, "chain-records": hourly_chain},
     "Chains and studies": {
         "truss-chain": truss_chain,
         "intervals": intervals,
