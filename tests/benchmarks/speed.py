@@ -179,7 +179,7 @@ def mahalanobis(clock, quick, n_rows=100_000):
 
 
 def forest(clock, quick, n_rows=100_000):
-    """OutlierDetector of a forest fitted to {n_rows:,} records of 6 modes, beside IsolationForest, its scores included."""
+    """OutlierDetector of a forest fitted to {n_rows:,} records of 6 modes, beside IsolationForest and its scores."""
     R = normal_records(quick, n_rows)
     with clock.beside():
         IsolationForest(random_state=0).fit(R).score_samples(R)
