@@ -6,7 +6,7 @@ import pandas as pd
 from skthermo.studies import IdentifiedDamage
 from skthermo.studies.identification._causes import Cause
 from skthermo.studies.identification._evidence import Explanation
-from skthermo.studies.identification._identified import tabulated
+from skthermo.studies.identification._identify import tabulated
 
 
 def identified(explanations, *, groups=None, unobservable=(), alike=(), **changed):
@@ -25,7 +25,7 @@ def identified(explanations, *, groups=None, unobservable=(), alike=(), **change
         )
         for name, (probability, amounts) in explanations.items()
     ]
-    table = tabulated(explained, {name: [name] for name in names})
+    table = tabulated(explained, names)
     errors = [0.3 if name in unobservable else 0.02 for name in names]
     table = table.assign(error_alone=errors, error_together=0.5, kind="damage")
     similarity = pd.DataFrame(np.eye(len(names)), table.index, table.index)

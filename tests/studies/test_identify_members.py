@@ -137,3 +137,6 @@ def test_shapes_alone_distinguish_mirrored_places(symmetric):
     likely = with_shapes.likely_members(0.9, "deck")
     assert {2, 3} <= set(likely)
     assert max(likely) < N / 2
+    best = with_shapes.most_probable[0].removeprefix("deck: ").split(" to ")
+    assert f"x = {2 * int(best[0])} to {2 * int(best[-1]) + 2} m" in with_shapes.summary()
+    assert with_shapes.table.loc[2, "x"] == 5.0

@@ -1,18 +1,22 @@
-"""What may have changed, and how probable that is beforehand."""
+"""What may have changed, and how probable that is beforehand: groups, parameters, masses, stretches of members."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement, pairwise
 from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse
+from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from skthermo._core.arrays import Array, MatrixLike, check_names, is_real, real_array
+from skthermo.fem import Structure
 from skthermo.fem.damage import ALL_GROUPS, read_groups
 
 SOMETHING_ELSE, NO_DAMAGE = "something else", "no damage"
+Line = list[Hashable]
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ class Cause:
     mass pattern was added. ``of`` names the model's groups or the parameter that changes. ``rows`` are the rows of a
     table in which it counts: its own, those of all groups, or the members of a stretch of ``group``. ``scale`` is the
     standard deviation of the amount over the prior's severity, and ``share`` the part of its group's prior
-    probability. One that is ``alone`` explains without others.
+    probability. One that is ``alone`` explains without others. ``place`` says where a stretch is.
     """
 
     name: str
@@ -91,6 +95,7 @@ class Cause:
     group: str = ""
     share: float = 1.0
     alone: bool = False
+    place: str = ""
 
     @property
     def direction(self) -> int:
@@ -112,22 +117,20 @@ def read_causes(
 ) -> list[Cause]:
     """Causes that are asked for, and an even loss in all groups."""
     members = read_groups(model, groups)
-    causes = [Cause(name, of=tuple(of)) for name, of in members.items()]
     known = {name: [name] for name in model.groups} | members
     if stiffening is None or isinstance(stiffening, bool | np.bool_):
         stiffer = list(members) if stiffening else []
     else:
         stiffer = check_names([stiffening] if isinstance(stiffening, str) else stiffening, "stiffening", sorted(known))
-    causes += [Cause(f"{name} stiffer", "stiffening", -1.0, tuple(known[name])) for name in stiffer]
     asked = [parameters] if isinstance(parameters, str) else parameters or []
+    causes = [Cause(name, of=tuple(of)) for name, of in members.items()]
+    causes += [Cause(f"{name} stiffer", "stiffening", -1.0, tuple(known[name])) for name in stiffer]
     for name in check_names(asked, "parameters", model.parameter_names):
-        causes += [
-            Cause(f"{name} {way}", "parameter", end, (name,)) for way, end in (("lower", -0.95), ("higher", 1.0))
-        ]
-    causes += [  # up to three times; what takes mass away, once at most; once is as likely as usual
-        Cause(name, "mass", 3.0 if lowest >= 0 else 1.0, mass=mass, scale=5.0)
-        for name, (mass, lowest) in _read_masses(model, added_mass).items()
-    ]
+        causes.append(Cause(f"{name} lower", "parameter", -0.95, (name,)))
+        causes.append(Cause(f"{name} higher", "parameter", 1.0, (name,)))
+    for name, mass in _read_masses(model, added_mass).items():
+        lowest = (mass if mass.ndim == 1 else mass.diagonal()).min()  # what takes mass away does so once at most
+        causes.append(Cause(name, "mass", 3.0 if lowest >= 0 else 1.0, mass=mass, scale=5.0))  # once is as likely
     names = [cause.name for cause in causes]
     wrong = [name for name in names if name in (SOMETHING_ELSE, NO_DAMAGE, ALL_GROUPS, "") or names.count(name) > 1]
     if wrong:
@@ -142,8 +145,7 @@ def read_causes(
     return causes
 
 
-def _read_masses(model: Any, added_mass: Any) -> dict[str, tuple[Any, float]]:
-    """Mass patterns, and the lowest mass of each."""
+def _read_masses(model: Any, added_mass: Any) -> dict[str, Any]:
     if added_mass is None:
         return {}
     if not isinstance(added_mass, Mapping) or not all(isinstance(name, str) for name in added_mass):
@@ -156,25 +158,120 @@ def _read_masses(model: Any, added_mass: Any) -> dict[str, tuple[Any, float]]:
             model.with_added(mass=mass)
         except ValueError as error:
             raise ValueError(f"added_mass {name!r}: {error}") from error
-        matrix = mass if scipy.sparse.issparse(mass) else np.asarray(mass, dtype=float)
-        if not abs(matrix).max() > 0:
+        found[name] = mass if scipy.sparse.issparse(mass) else np.asarray(mass, dtype=float)
+        if not abs(found[name]).max() > 0:
             raise ValueError(f"added_mass {name!r} is 0 everywhere; expected kg at some degrees of freedom")
-        found[name] = (matrix, float((matrix if matrix.ndim == 1 else matrix.diagonal()).min()))
     return found
 
 
 def changed(model: Any, theta: Array, causes: Sequence[Cause], amounts: Sequence[float]) -> tuple[Any, Array]:
     """The model, and its parameters theta (1, n_parameters), after some amounts of causes."""
-    stiffness: dict[str, float] = {}
+    factors: dict[str, float] = {}
     theta = theta.copy()
     for cause, amount in zip(causes, amounts, strict=True):
-        match cause.kind:
-            case "mass":
-                model = model.with_added(mass=amount * cause.mass)
-            case "parameter":
-                theta[:, list(model.parameter_names).index(cause.of[0])] *= 1 + amount
-            case _:
-                for name in cause.of:
-                    stiffness[name] = stiffness.get(name, 1.0) * (1 - amount)
-    damage = {name: float(1 - factor) for name, factor in stiffness.items()}
-    return (model.damaged(damage) if damage else model), theta
+        if cause.kind == "mass":
+            model = model.with_added(mass=amount * cause.mass)
+        elif cause.kind == "parameter":
+            theta[:, list(model.parameter_names).index(cause.of[0])] *= 1 + amount
+        else:
+            factors |= {name: factors.get(name, 1.0) * (1 - amount) for name in cause.of}
+    return (model.damaged({name: float(1 - by) for name, by in factors.items()}) if factors else model), theta
+
+
+def members_of(model: Any, names: Sequence[str]) -> Line:
+    """Members of a structure whose stiffness some damage groups of a model scale."""
+    positions = dict.fromkeys(position for name in names for position in model.groups[name])
+    return list(dict.fromkeys(member for position in positions for member, _ in model.contents[position]))
+
+
+def lines_of(structure: Structure, members: Sequence[Hashable]) -> list[Line]:
+    """Members that common nodes connect, line by line, each from its end of lower coordinates.
+
+    Members that no other one touches, such as stays or bearings, are one line together; so are all members where
+    there are more than four lines, as in a grid of beams.
+    """
+    ends = [structure.members[member].nodes for member in members]
+    middles = np.array([np.mean([structure.nodes[node] for node in nodes], axis=0) for nodes in ends])
+    places = {node: place for place, node in enumerate(dict.fromkeys(node for some in ends for node in some))}
+    has_node = np.zeros((len(ends), len(places)))
+    for row, some in zip(has_node, ends, strict=True):
+        row[[places[node] for node in some if len(some) > 1]] = 1
+    touches = has_node @ has_node.T > 0
+    np.fill_diagonal(touches, False)
+    labels = connected_components(touches, directed=False)[1]
+    connected = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    lines = [_in_order(one, touches, middles) for one in connected if len(one) > 1]
+    alone = np.array([one[0] for one in connected if len(one) == 1], dtype=int)
+    if len(lines) > 4:
+        lines, alone = [], np.arange(len(members))
+    lines += [_by_place(alone, middles)] if len(alone) else []
+    return [[members[place] for place in line] for line in sorted(lines, key=lambda line: tuple(middles[line[0]]))]
+
+
+def _in_order(line: Array, touches: Array, middles: Array) -> list[int]:
+    """Members followed from an end; by place where they branch or form a ring."""
+    by_place, number = _by_place(line, middles), touches.sum(axis=1)
+    tips = [place for place in by_place if number[place] == 1]
+    if len(tips) != 2 or number[line].max() > 2:
+        return by_place
+    return depth_first_order(touches, tips[0], directed=False)[0].tolist()
+
+
+def _by_place(line: Array, middles: Array) -> list[int]:
+    """Members by their coordinate along the axis on which they extend most."""
+    axes = np.argsort(np.ptp(middles[line], axis=0), kind="stable")
+    return line[np.lexsort(middles[line][:, axes].round(9).T)].tolist()
+
+
+def pieces_of(lines: Sequence[Line], most: int = 24) -> list[list[Line]]:
+    """Pieces of lines, about so many in all, each of members that follow each other."""
+    size, found = -(-sum(map(len, lines)) // most), []
+    for line in lines:
+        edges = np.linspace(0, len(line), -(-len(line) // size) + 1).round().astype(int)
+        found.append([line[low:high] for low, high in pairwise(edges)])
+    return found
+
+
+def place_of(structure: Structure, members: Sequence[Hashable], group: Sequence[Hashable]) -> str:
+    """Where members are, along the axis on which their group extends most, such as "x = 10 to 15 m"."""
+    some, all_ = (
+        np.array([structure.nodes[node] for member in names for node in structure.members[member].nodes])
+        for names in (members, group)
+    )
+    axis = int(np.ptp(all_, axis=0).argmax())
+    ends = dict.fromkeys(f"{end:.6g}" for end in (some[:, axis].min(), some[:, axis].max()))
+    return f"{'xyz'[axis]} = {' to '.join(ends)} m"
+
+
+def stretches(
+    structure: Structure, cause: Cause, lines: Sequence[Sequence[Line]], names: Sequence[str], *, whole: float = 0.25
+) -> list[Cause]:
+    """The whole group, and each run of pieces of its lines, which have these names in the divided model, as causes.
+
+    Every length is less probable the longer it is, and every place of a length equally probable.
+    """
+    members = tuple(member for line in lines for piece in line for member in piece)
+    found, first = [], 0
+    for line in lines:
+        for low, high in combinations_with_replacement(range(len(line)), 2):
+            number = high - low + 1
+            if number == len(names):
+                continue
+            rows = tuple(member for piece in line[low : high + 1] for member in piece)
+            which = f"{rows[0]} to {rows[-1]}" if len(rows) > 1 else f"{rows[0]}"
+            found.append(
+                Cause(
+                    f"{cause.name}: {which}",
+                    of=tuple(names[first + low : first + high + 1]),
+                    scale=float(min(np.sqrt(len(members) / len(rows)), 3.0)),  # what is smaller may be more severe
+                    rows=rows,
+                    group=cause.name,
+                    share=len(line) / number / (len(line) - number + 1),
+                    alone=True,
+                    place=place_of(structure, rows, members),
+                )
+            )
+        first += len(line)
+    total = sum(one.share for one in found)
+    found = [replace(one, share=(1 - whole) * one.share / total) for one in found]
+    return [replace(cause, rows=members, share=whole if found else 1.0), *found]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -12,22 +14,26 @@ from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from skthermo._core.arrays import MatrixLike, as_random_state, check_jobs
+from skthermo._core.arrays import Array, MatrixLike, as_random_state, check_jobs, check_probability
 from skthermo._core.parallel import run_jobs
+from skthermo._core.text import SPACE, Sentences, chance_text, counted, listed, percent, probability_text, significant
 from skthermo._core.warnings import collected, warn_each
+from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
-from skthermo.studies._scenarios import check_chain, checked_models
-from skthermo.studies.identification._causes import Cause, DamagePrior, read_causes
-from skthermo.studies.identification._effects import Curves, observed
-from skthermo.studies.identification._evidence import Evidence, Explanation
-from skthermo.studies.identification._identified import (
-    IdentifiedDamage,
-    drawn,
-    severities_of,
-    tabulated,
+from skthermo.studies._scenarios import UncertainDamage, check_chain, checked_models
+from skthermo.studies.identification._causes import (
+    NO_DAMAGE,
+    SOMETHING_ELSE,
+    Cause,
+    DamagePrior,
+    lines_of,
+    members_of,
+    pieces_of,
+    read_causes,
+    stretches,
 )
-from skthermo.studies.identification._shift import FrequencyShift, measured_shift
-from skthermo.studies.identification._stretches import lines_of, members_of, pieces_of, stretches
+from skthermo.studies.identification._evidence import N_DRAWS, Evidence, Explanation, averaged, effects_of
+from skthermo.studies.identification._measured import FrequencyShift, measured_shift, observed
 from skthermo.surrogate import refitted
 
 
@@ -167,156 +173,474 @@ def identify_damage(
     with collected() as findings:
         shift = measured_shift(fem, T, F, noise)
         seen = observed(fem, fem.model, shift, **measured)
-    evidence = Evidence(seen, causes, Curves.tabulated(seen.response, causes), prior, shift.freedom)
+    evidence = Evidence(seen, causes, effects_of(seen, causes), prior, shift.freedom)
     if models is None:
-        explained = evidence.explanations(random)
+        whole = evidence.explanations(random)
     else:
 
         def with_model(model: Any, seed: int) -> list[Explanation]:
             with collected():  # as those of the chain itself
                 chain = refitted(fem, model=model)
                 seen = observed(chain, model, measured_shift(chain, T, F, noise), **measured)
-            curves = Curves.tabulated(seen.response, causes)
-            return Evidence(seen, causes, curves, prior, shift.freedom).explanations(np.random.RandomState(seed))
+            one = Evidence(seen, causes, effects_of(seen, causes), prior, shift.freedom)
+            return one.explanations(np.random.RandomState(seed))
 
         models = checked_models(fem, models)
         seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
         jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
-        explained = averaged(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
-    found = _identified(evidence, explained, shift, fem, random)
+        whole = averaged(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
+
+    errors, similarity = _errors(evidence)
+    draws, explained, members = _drawn(whole, causes, random), whole, errors[[]]
     if structure is not None:
-        found = _located(found, evidence, shift, fem, structure, measured, random)
+        located, members = _located(evidence, whole, shift, structure, fem, measured)
+        explained = located.explanations(random)
+    n_observed, best = len(seen.change), explained[0]
+    by_group = tabulated(explained, errors.index).join(errors)
+    found = IdentifiedDamage(
+        table=by_group if structure is None else tabulated(explained, members.index).join(members),
+        groups=by_group,
+        shifts=_shifts(shift, explained, fem.mode_names_),
+        draws=draws,
+        damage=_severities(whole[0], whole[0].draws.mean(axis=0)),
+        p_value=_p_value(seen.change @ np.linalg.solve(seen.covariance, seen.change), n_observed, shift),
+        misfit_p_value=_p_value(best.misfit, n_observed - len(best.causes), shift),
+        similarity=similarity,
+        records=shift.counts,
+        explained=explained,
+    )
+    if structure is not None:
+        found.table["is_likely"] = found.table.index.isin(found.likely_members())
     warn_each([*findings, *shift.findings, *seen.findings, *found.warnings()])
     return found
 
 
-def averaged(each: Sequence[Sequence[Explanation]]) -> list[Explanation]:
-    """The explanations of models that are equally probable, each with the draws of all of them."""
-    by_name: dict[str, list[Explanation]] = {}
-    for one in (one for explained in each for one in explained):
-        by_name.setdefault(one.name, []).append(one)
-    found = []
-    for some in by_name.values():
-        weights = np.array([one.probability for one in some])
-        counts = np.ceil(500 * weights / weights.sum()).astype(int)
-        draws = np.concatenate([one.draws[:count] for one, count in zip(some, counts, strict=True)])
-        shares = weights / weights.sum()
-        change, misfit = (shares @ np.array([getattr(one, name) for one in some]) for name in ("change", "misfit"))
-        probability = float(weights.sum()) / len(each)
-        found.append(replace(some[0], probability=probability, draws=draws, change=change, misfit=float(misfit)))
-    return sorted(found, key=lambda one: -one.probability)
-
-
-def _identified(
-    evidence: Evidence, explained: list[Explanation], shift: FrequencyShift, fem: Any, random: np.random.RandomState
-) -> IdentifiedDamage:
-    """Tables of explanations by whole groups, and what the causes' effects have in common."""
+def _errors(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Standard errors of the amounts of the causes that were asked for, with their kinds, and cosines of effects."""
     asked = [cause for cause in evidence.causes if not cause.alone]  # they come first
-    names = [cause.name for cause in asked]
-    scaled = np.sign(evidence.curves.bounds) / np.sqrt(evidence.variances[0])[:, np.newaxis]
-    slopes = (evidence.curves.slopes[:, 0].T * scaled)[:, : len(asked)]
+    number, names = len(asked), pd.Index([cause.name for cause in asked])
+    slopes = (evidence.slopes[0] / np.sqrt(evidence.variances[0]))[:number].T
+    slopes = slopes * np.sign([cause.bound for cause in asked])
     lengths = np.maximum(np.linalg.norm(slopes, axis=0), np.finfo(float).tiny)
-    table = tabulated(explained, {name: [name] for name in names})
-    information = slopes.T @ slopes + np.diag(evidence.deviations[: len(asked)] ** -2.0)
-    table["error_alone"], table["error_together"] = 1 / lengths, np.sqrt(np.diag(np.linalg.inv(information)))
-    table["kind"] = [cause.kind for cause in asked]
-    if lengths.max() * 0.1 < 1:
+    if lengths.max() < 10:
         errors = ", ".join(f"{name} {1 / length:.2g}" for name, length in zip(names, lengths, strict=True))
         raise ValueError(
             f"no group can be seen; expected a standard error of 0.1 or less for one of them, but they are {errors}. "
             "More records or other modes would lower them"
         )
-    seen, best = evidence.observed, explained[0]
-    return IdentifiedDamage(
-        table=table,
-        groups=table,
-        shifts=_shifts(shift, explained, fem.mode_names_),
-        draws=drawn(explained, list(dict.fromkeys(n for c in asked if c.direction < 0 for n in c.of)), 500, random),
-        damage=severities_of(best, best.draws.mean(axis=0)),
-        p_value=_p_of_misfit(
-            seen.change @ np.linalg.solve(seen.covariance, seen.change), len(seen.change), shift.freedom
-        ),
-        misfit_p_value=_p_of_misfit(best.misfit, len(seen.change) - len(best.causes), shift.freedom),
-        similarity=pd.DataFrame(slopes.T @ slopes / np.outer(lengths, lengths), table.index, table.index),
-        records=shift.counts,
-        explained=explained,
-    )
+    products = slopes.T @ slopes
+    together = np.linalg.inv(products + np.diag(evidence.deviations[:number] ** -2.0))
+    columns = {"error_alone": 1 / lengths, "error_together": np.sqrt(np.diag(together))}
+    table = pd.DataFrame(columns, names).assign(kind=[cause.kind for cause in asked])
+    return table, pd.DataFrame(products / np.outer(lengths, lengths), names, names)
 
 
 def _located(
-    found: IdentifiedDamage,
     evidence: Evidence,
+    whole: Sequence[Explanation],
     shift: FrequencyShift,
-    fem: Any,
     structure: Structure,
-    measured: dict[str, Any],
-    random: np.random.RandomState,
-) -> IdentifiedDamage:
-    """Explanations by stretches of groups that may be damaged; of all if whole ones do not explain the shifts."""
-    is_open = found.probability_other > 0.1 or found.misfit_p_value < 0.05
-    probable = found.table["probability"][found.table["kind"] == "damage"]
+    fem: Any,
+    measured: Mapping[str, Any],
+) -> tuple[Evidence, pd.DataFrame]:
+    """Evidence of stretches of groups that may be damaged, of all if whole ones do not explain the shifts; members."""
+    n_left = len(evidence.change) - len(whole[0].causes)
+    is_open = sum(one.probability for one in whole if one.has_else) > 0.1
+    is_open |= _p_value(whole[0].misfit, n_left, shift) < 0.05
+    asked = [cause for cause in evidence.causes if not cause.alone]
+    probable = tabulated(whole, [cause.name for cause in asked if cause.kind == "damage"])["probability"]
     causes: list[Cause] = []
-    pieces: list[Cause] = []
+    units: list[Cause] = []  # pieces, the sums of whose effects are those of stretches
     parts: dict[str, dict[str, set[Hashable]]] = {}
     members: dict[Hashable, dict[str, Any]] = {}
-    for cause in (one for one in evidence.causes if not one.alone):
+    for cause in asked:
         if cause.kind != "damage":
             causes.append(cause)
             continue
         lines = lines_of(structure, members_of(fem.model, cause.of))
-        if is_open or probable[cause.name] >= min(0.02, probable.max()):
-            divided = pieces_of(lines)
-            all_pieces = [piece for line in divided for piece in line]
-            names = [f"{cause.name}, piece {number}" for number in range(1, len(all_pieces) + 1)]
-            for name in cause.of:
-                inside = set(members_of(fem.model, [name]))
-                named = {piece: inside.intersection(rows) for piece, rows in zip(names, all_pieces, strict=True)}
-                parts[name] = {piece: rows for piece, rows in named.items() if rows}
-            pieces += [Cause(name, of=(name,)) for name in names]
-            causes += stretches(cause.name, cause.of, divided, names)
-        else:  # which `divide` checks, too
-            parts |= {name: {} for name in cause.of if name not in parts}
-            causes.append(replace(cause, rows=tuple(member for line in lines for member in line)))
         for place, line in enumerate(lines, 1):
-            members |= {one: {"group": cause.name, "line": place, "element": i} for i, one in enumerate(line, 1)}
+            for number, member in enumerate(line, 1):
+                middle = np.mean([structure.nodes[node] for node in structure.members[member].nodes], axis=0)
+                at = dict(zip("xyz", middle.tolist(), strict=False))
+                members[member] = {"group": cause.name, "line": place, "element": number} | at
+        if not is_open and probable[cause.name] < min(0.02, probable.max()):
+            parts |= {name: parts.get(name, {}) for name in cause.of}  # whose members `divide` checks, too
+            causes.append(replace(cause, rows=tuple(member for line in lines for member in line)))
+            continue
+        divided = pieces_of(lines)
+        pieces = [piece for line in divided for piece in line]
+        names = [f"{cause.name}, piece {number}" for number in range(1, len(pieces) + 1)]
+        for name in cause.of:
+            inside = set(members_of(fem.model, [name]))
+            named = {piece: inside.intersection(rows) for piece, rows in zip(names, pieces, strict=True)}
+            parts[name] = {piece: rows for piece, rows in named.items() if rows}
+        units += [Cause(name, of=(name,)) for name in names]
+        causes += stretches(structure, cause, divided, names)
     seen = observed(fem, structure.divide(fem.model, parts), shift, **measured)
-    whole = [cause for cause in causes if not cause.alone]
-    curves = Curves.tabulated(seen.response, whole).beside(Curves.tabulated(seen.response, pieces, 5))
-    names = [(cause.name,) for cause in whole] + [cause.of for cause in pieces]
-    incidence = np.array([[name[0] in ((c.of) if c.alone else (c.name,)) for name in names] for c in causes])
-    located = Evidence(seen, causes, curves.summed(incidence, causes), evidence.prior, shift.freedom)
-    explained = located.explanations(random)
-    best = explained[0]
-    groups = tabulated(explained, {name: [name] for name in found.groups.index})
-    table = tabulated(explained, {member: [member] for member in members})
-    table = table.join(pd.DataFrame(members.values(), table.index)).rename_axis("member")
-    found = replace(
-        found,
-        table=table,
-        groups=groups.join(found.groups[["error_alone", "error_together", "kind"]]),
-        shifts=_shifts(shift, explained, fem.mode_names_),
-        misfit_p_value=_p_of_misfit(best.misfit, len(seen.change) - len(best.causes), shift.freedom),
-        explained=explained,
+    units += [cause for cause in causes if not cause.alone]
+    is_in = np.array(
+        [[unit.name in ((*cause.of,) if cause.alone else (cause.name,)) for unit in units] for cause in causes]
     )
-    return replace(found, table=table.assign(is_likely=table.index.isin(found.likely_members())))
+    effects = np.einsum("cu,suo->sco", is_in, effects_of(seen, units, 5))
+    table = pd.DataFrame(list(members.values()), pd.Index(list(members), name="member", tupleize_cols=False))
+    return Evidence(seen, causes, effects, evidence.prior, shift.freedom), table
 
 
-def _p_of_misfit(misfit: float, freedom: int, of_errors: float) -> float:
+def _p_value(misfit: float, n_free: int, shift: FrequencyShift) -> float:
     """Probability (F) of a larger misfit by chance; NaN without more observations than causes."""
-    return float(stats.f.sf(misfit / freedom, freedom, of_errors)) if freedom > 0 else float("nan")
+    return float(stats.f.sf(misfit / n_free, n_free, shift.freedom)) if n_free > 0 else float("nan")
 
 
 def _shifts(shift: FrequencyShift, explained: Sequence[Explanation], names: Sequence[Any]) -> pd.DataFrame:
     known, values = ~np.isnan(shift.mean), np.full(len(shift.mean), np.nan)
     shares = np.array([one.probability for one in explained])
     values[known] = (shares @ np.array([one.change for one in explained]) / shares.sum())[: known.sum()]
-    return pd.DataFrame(
-        {
-            "measured": np.expm1(shift.mean),
-            "explained": np.expm1(values),
-            "standard_error": np.where(known, np.sqrt(np.diag(shift.covariance)), np.nan),
-            "n_records": shift.n_records,
-            "n_independent": shift.n_independent,
-        },
-        index=list(names),
-    )
+    columns = {
+        "measured": np.expm1(shift.mean),
+        "explained": np.expm1(values),
+        "standard_error": np.sqrt(np.diag(shift.covariance)),
+        "n_records": shift.n_records,
+        "n_independent": shift.n_independent,
+    }
+    return pd.DataFrame(columns, list(names))
+
+
+def _severities(one: Explanation, amounts: Array) -> dict[str, float]:
+    """Severities of the model's groups by the amounts of an explanation's causes."""
+    factors: dict[str, float] = {}
+    for cause, amount in zip(one.causes, amounts, strict=True):
+        if cause.direction < 0:
+            factors |= {name: factors.get(name, 1.0) * (1 - amount) for name in cause.of}
+    return {name: float(1 - factor) for name, factor in factors.items()}
+
+
+def _drawn(explained: Sequence[Explanation], causes: Sequence[Cause], random: np.random.RandomState) -> pd.DataFrame:
+    """Severities of the model's groups, of explanations by their probability."""
+    groups = dict.fromkeys(name for cause in causes if cause.direction < 0 for name in cause.of)
+    probable = np.array([one.probability for one in explained])
+    chosen = random.choice(len(probable), size=N_DRAWS, p=probable / probable.sum())
+    some = [(explained[place], random.randint(N_DRAWS)) for place in chosen]
+    rows = [_severities(one, one.draws[number % len(one.draws)]) for one, number in some]
+    return pd.DataFrame(rows, columns=list(groups)).fillna(0.0)
+
+
+def tabulated(explained: Sequence[Explanation], rows: Sequence[Hashable]) -> pd.DataFrame:
+    """Probability that each row, a cause or a member, has changed, and by how much on average."""
+    found = []
+    for row in rows:
+        parts = []
+        for one in explained:
+            inside = [row in cause.rows or row == cause.group for cause in one.causes]
+            if any(inside):
+                parts.append((one.probability, 1 - np.prod(1 - one.draws[:, inside], axis=1)))
+        probability = min(sum(share for share, _ in parts), 1.0)
+        values = np.concatenate([*(draws for _, draws in parts), np.zeros(1)])
+        weights = np.concatenate(
+            [*(np.full(len(draws), share / len(draws)) for share, draws in parts), [1 - probability]]
+        )
+        present = averages(values[:-1], weights[:-1])
+        extreme = present["ci_low" if present["severity"] < 0 else "ci_high"]
+        if_changed = {"if_damaged": present["severity"], "highest_if_damaged": extreme}
+        found.append({"probability": probability, **averages(values, weights), **if_changed})
+    return pd.DataFrame(found, pd.Index(list(rows), tupleize_cols=False))
+
+
+def averages(values: Array, weights: Array) -> dict[str, float]:
+    """Mean, standard deviation and 90 % band of weighted values; NaN of none."""
+    if not len(values):
+        return dict.fromkeys(("severity", "standard_error", "ci_low", "ci_high"), np.nan)
+    weights, order = weights / weights.sum(), np.argsort(values)
+    mean, shares = float(weights @ values), np.cumsum(weights[order])
+    low, high = (values[order][min(np.searchsorted(shares, end), len(values) - 1)] for end in (0.05 - 1e-12, 0.95))
+    deviation = float(np.sqrt(weights @ (values - mean) ** 2))
+    return {"severity": mean, "standard_error": deviation, "ci_low": float(low), "ci_high": float(high)}
+
+
+def _fewest(explained: Sequence[Explanation], groups: Collection[str], probability: float) -> list[Hashable]:
+    """Rows of a table that hold all changed ones of some groups, those added first that hold most for their number."""
+    sets = [
+        (one.probability, rows)
+        for one in explained
+        if (rows := frozenset(row for cause in one.causes if cause.group in groups for row in cause.rows))
+    ]
+    total, held, chosen = sum(share for share, _ in sets), 0.0, {}
+    while sets and held < probability * total * (1 - 1e-9):
+        more = {rows.difference(chosen) for _, rows in sets}
+        gain = {new: sum(s for s, rows in sets if rows <= chosen.keys() | new) / len(new) for new in more}
+        chosen |= dict.fromkeys(sorted(max(gain, key=lambda new: gain[new]), key=str))
+        held += sum(share for share, rows in sets if rows <= chosen.keys())
+        sets = [(share, rows) for share, rows in sets if not rows <= chosen.keys()]
+    return list(chosen)
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedDamage(Sentences):
+    """Explanations of a shift of frequencies with their probabilities, and what follows for each possible cause.
+
+    An explanation is a set of up to three causes, or none; causes are damage of a group or, with a structure, of a
+    stretch of its members, and what else was asked for.
+
+    Parameters
+    ----------
+    table : DataFrame
+        One row a cause or, with a structure, a member: ``probability`` that it has changed; ``severity``, its mean over
+        all explanations, where those without it count as 0, with ``standard_error``; ``ci_low`` and ``ci_high``, which
+        cover it with a probability of 90 %; ``if_damaged``, its mean where it has changed, and ``highest_if_damaged``,
+        which it then does not exceed with a probability of 95 %. Of causes also ``error_alone``, the standard error if
+        nothing else could have changed, ``error_together``, if all others may have changed as much as is likely
+        beforehand, and ``kind``: "damage", "stiffening", "parameter" or "mass". Of members also ``group``, ``line``
+        of connected members of the group, ``element``, the number along the line, ``x``, ``y`` and ``z`` of its middle,
+        and ``is_likely``, whether it is among `likely_members`.
+    groups : DataFrame
+        The same by cause, also with a structure.
+    shifts : DataFrame
+        One row a mode: mean relative shift ``measured`` and ``explained`` by the causes, the mean over explanations,
+        ``standard_error`` of the measured one, ``n_records``, and ``n_independent``, as many independent records as
+        would determine it as well.
+    draws : DataFrame
+        Severities of the model's groups, drawn from all explanations by their probability; one draw a row. Of whole
+        groups, also with a structure.
+    damage : dict of str to float
+        Severities of the model's groups in the most probable explanation by whole groups, for ``simulate``.
+    p_value : float
+        Probability that a healthy structure shows as large a shift.
+    misfit_p_value : float
+        Of a larger misfit than that of the most probable explanation, if it is right; NaN if it has as many causes as
+        there are modes. A low one says that something else changed too.
+    similarity : DataFrame
+        Cosines between the effects of the causes, in standard errors of the shifts.
+    records : Series
+        How many records were given and compared, and left out by reason; how many independent ones they and the
+        training records are worth.
+    explained : sequence of explanations
+        All explanations with a probability above .001 %, with draws of their amounts.
+
+    Examples
+    --------
+    >>> from skthermo.datasets import make_truss, make_truss_campaign
+    >>> from skthermo.studies import identify_damage
+    >>> from skthermo.surrogate import DataInformedFEM
+    >>> year = make_truss_campaign(random_state=0)
+    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> later = make_truss_campaign(damage={"top": 0.2}, random_state=1)
+    >>> T, F = later.temperatures[:90], later.frequencies[:90]
+    >>> found = identify_damage(fem, T, F, ["bottom", "top"], random_state=0)
+    >>> found.most_probable
+    ('top',)
+    >>> found.scenario().name
+    'identified damage'
+    """
+
+    table: pd.DataFrame
+    groups: pd.DataFrame
+    shifts: pd.DataFrame
+    draws: pd.DataFrame = field(repr=False)
+    damage: dict[str, float]
+    p_value: float
+    misfit_p_value: float
+    similarity: pd.DataFrame = field(repr=False)
+    records: pd.Series = field(repr=False)
+    explained: Sequence[Explanation] = field(repr=False)
+
+    @cached_property
+    def explanations(self) -> pd.DataFrame:
+        """One row an explanation, the most probable first, down to a probability of .1 %.
+
+        Its name joins its causes by " + "; "no damage" is the one without, and "something else" stands for any other
+        shift. ``probability``; ``misfit``, the sum of squared differences between measured and explained shifts, in
+        standard errors, at its most probable severities; ``text``, such as "side span 12 %, main stays 4 %".
+        """
+        rows = {}
+        for one in self._listed:
+            severities = [self.estimates.loc[(one.name, cause.name), "severity"] for cause in one.causes]
+            texts = [f"{cause.name} {_percent(size)}" for cause, size in zip(one.causes, severities, strict=True)]
+            text = ", ".join(texts + [SOMETHING_ELSE] * one.has_else) or NO_DAMAGE
+            rows[one.name] = {"probability": one.probability, "misfit": one.misfit, "text": text}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    @cached_property
+    def estimates(self) -> pd.DataFrame:
+        """Amount of each cause in each explanation, by explanation and cause, if that explanation is right.
+
+        Mean ``severity``, ``standard_error``, and ``ci_low`` and ``ci_high``, which cover it with a probability of
+        90 %.
+        """
+        amounts = {
+            (one.name, cause.name): averages(values, np.ones(len(values)))
+            for one in self._listed
+            for cause, values in zip(one.causes, one.draws.T, strict=True)
+        }
+        index = pd.MultiIndex.from_tuples(list(amounts), names=["explanation", "cause"])
+        return pd.DataFrame(list(amounts.values()), index, list(averages(np.zeros(0), np.zeros(0))))
+
+    @property
+    def _listed(self) -> Sequence[Explanation]:
+        """Explanations with a probability of .1 % or more, or the most probable one."""
+        return [one for one in self.explained if one.probability >= 1e-3] or self.explained[:1]
+
+    @property
+    def probability_of_damage(self) -> float:
+        """Probability that anything changed."""
+        return 1 - min(sum(one.probability for one in self.explained if one.is_healthy), 1.0)
+
+    @property
+    def probability_other(self) -> float:
+        """Probability that something else than the named causes shifted the frequencies."""
+        return min(sum(one.probability for one in self.explained if one.has_else), 1.0)
+
+    @property
+    def unobservable(self) -> list[str]:
+        """Causes whose severity alone would have a standard error above 10 %.
+
+        Their probability hardly differs from what the prior says.
+        """
+        return list(self.groups.index[self.groups["error_alone"] > 0.1])
+
+    @property
+    def indistinguishable(self) -> list[tuple[str, str]]:
+        """Pairs of causes that these modes show, but do not distinguish."""
+        shown = self.similarity.drop(index=self.unobservable, columns=self.unobservable)
+        errors = self.groups["error_alone"]
+        found = []
+        for one, other in combinations(shown, 2):
+            apart = np.sqrt(max(1 - max(shown.loc[one, other], 0.0) ** 2, 0.0))  # of the effect of each
+            if apart * 0.1 < max(errors[one], errors[other]):
+                found.append((one, other))
+        return found
+
+    @property
+    def most_probable(self) -> tuple[str, ...]:
+        """Causes of the most probable explanation, "something else" among them; empty for "no damage"."""
+        best = self.explained[0]
+        return (*(cause.name for cause in best.causes), *([SOMETHING_ELSE] * best.has_else))
+
+    @property
+    def probability(self) -> float:
+        """Probability of the most probable explanation."""
+        return self.explained[0].probability
+
+    @property
+    def severities(self) -> pd.Series:
+        """Amount of each cause, or of each member, the mean over all explanations."""
+        return self.table["severity"]
+
+    def scenario(self, name: str = "identified damage") -> UncertainDamage:
+        """This damage as a scenario of a `DetectabilityStudy`, each repeat with other severities within their error.
+
+        Parameters
+        ----------
+        name : str, default="identified damage"
+            Name of the scenario.
+
+        Returns
+        -------
+        UncertainDamage
+            A scenario whose severities are drawn from ``draws``.
+        """
+        return UncertainDamage(name, self.draws)
+
+    def likely_members(self, probability: float = 0.9, group: str | None = None) -> list[Hashable]:
+        """The fewest rows of the table that hold all damaged ones with a probability, given that there are any.
+
+        Parameters
+        ----------
+        probability : float, default=0.9
+            Between 0 and 1.
+        group : str, optional
+            Only damage in this group. By default in any that these modes show.
+
+        Returns
+        -------
+        list of members
+            The most probable first; none if there is no damage.
+
+        Raises
+        ------
+        ValueError
+            If the group is unknown, or the probability is not between 0 and 1.
+        """
+        if group is not None and group not in self.groups.index:
+            raise ValueError(f"unknown group {group!r}; expected one of {sorted(self.groups.index)}")
+        wanted = {group} if group is not None else set(self.groups.index).difference(self.unobservable)
+        return _fewest(self.explained, wanted, check_probability(probability, "probability"))
+
+    def _answer(self) -> Iterator[str]:
+        best, records = self.explained[0], self.records
+        if best.is_healthy:
+            shown = " observable in these modes" if self.unobservable else ""
+            yield f"Most probable: {NO_DAMAGE}{shown}, probability {chance_text(best.probability)}."
+        else:
+            texts = [self._phrase(cause) for cause in best.causes] + [SOMETHING_ELSE] * best.has_else
+            yield f"Most probable: {listed(texts)}, probability {chance_text(best.probability)}."
+        others = [one for one in self._listed[1:5] if one.probability >= 0.02]
+        if others:
+            texts = [f"{self.explanations['text'][one.name]} ({chance_text(one.probability)})" for one in others]
+            yield f"Less probable: {'; '.join(texts)}."
+        if best.is_healthy:
+            bounds = self.groups["highest_if_damaged"].drop(self.unobservable)
+            losses = [f"{_percent(bound)} in {name}" for name, bound in bounds[bounds > 0].items()]
+            yield f"95{SPACE}% upper bounds on undetected losses of stiffness: {listed(losses)}."
+        else:
+            yield f"Probability of no change: {chance_text(1 - self.probability_of_damage)}."
+        yield (
+            f"{counted(int(records['compared']), 'record')} (worth {significant(records['independent'])} independent "
+            f"ones) compared with {counted(int(records['trained']), 'training record')} (worth "
+            f"{significant(records['independent of trained'])})."
+        )
+
+    def _phrase(self, cause: Cause) -> str:
+        """A cause of the most probable explanation, with its place and the band of its amount."""
+        row = self.estimates.loc[(self.explained[0].name, cause.name)]
+        amount, (low, high) = _percent(row["severity"]), (_percent(row[end]) for end in ("ci_low", "ci_high"))
+        text = (
+            f"a loss of {amount} of stiffness in {cause.name}" if cause.kind == "damage" else f"{cause.name} {amount}"
+        )
+        return f"{text}{f', {cause.place}' if cause.place else ''} (90{SPACE}% interval {low} to {high})"
+
+    @property
+    def _open(self) -> list[str]:
+        """What the modes leave open of the answer."""
+        likely = set(self.groups.index[self.groups["probability"] >= 0.1])
+        pairs = [" and ".join(pair) for pair in self.indistinguishable if likely.intersection(pair)]
+        return [f"which of {pair} has changed" for pair in pairs] + [f"damage of {name}" for name in self.unobservable]
+
+    def _limits(self) -> Iterator[str]:
+        if self._open:
+            yield f"These modes do not show {listed(self._open, 'nor')}."
+        if self.p_value < 0.05 and self.explained[0].is_healthy:
+            yield f"Such shifts are rare in a healthy structure (p value {probability_text(self.p_value)})."
+        if self.misfit_p_value < 0.05:
+            yield (
+                "The most probable explanation does not explain all of the shifts (p value "
+                f"{probability_text(self.misfit_p_value)})."
+            )
+
+    def warnings(self) -> Iterator[SkthermoWarning]:
+        """What the answer leaves open.
+
+        Yields
+        ------
+        SkthermoWarning
+            With its ``kind``.
+        """
+        if self._open:
+            yield ResultWarning(
+                f"these modes do not show {listed(self._open, 'nor')}. Take records over a longer time, or measure "
+                "mode shapes or other modes",
+                "indistinguishable-groups",
+            )
+        if self.explained[0].has_else or self.misfit_p_value < 0.05:
+            yield ResultWarning(
+                "the causes that were sought do not explain the shifts. There may be damage outside these groups, a "
+                "stiffer part, a change of mass or of a support, a wrong sensor, modes that were exchanged, or a wrong "
+                "model. See shifts and stiffening",
+                "unexplained-shifts",
+            )
+
+    def __repr__(self) -> str:
+        best = self.explanations.iloc[0]
+        return f"IdentifiedDamage({best['text']}, probability {self.probability:.2g})"
+
+
+def _percent(size: float) -> str:
+    return percent(size, ".2g" if abs(size) < 0.995 else ".0f")

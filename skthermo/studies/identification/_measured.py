@@ -1,0 +1,321 @@
+"""Measured changes: mean shifts of frequencies from the healthy structure's in the same weather, and of mode shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
+
+from skthermo._core.arrays import Array, as_floats, check_dofs, check_noise, means_of_known, median, robust_deviation
+from skthermo._core.estimators import check_array
+from skthermo._core.text import counted, listed
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
+from skthermo.preprocessing import set_aside
+from skthermo.residuals.gaussian import Gaussian
+from skthermo.residuals.numbers import independent_records
+from skthermo.studies.identification._causes import Cause, changed
+
+Response = Callable[[Sequence[Cause], Sequence[float]], Array]
+"""Change of what is observed by some amounts of causes, (n_observed,)."""
+
+
+@dataclass(frozen=True)
+class FrequencyShift:
+    """Mean of ln(measured / expected) of each mode, NaN where it is not known, and its covariance.
+
+    Errors follow Student's law with some degrees of ``freedom``. ``n_records`` and ``n_independent`` are numbers of
+    records by mode, ``theta`` (1, n_parameters) the mean parameters of the records. ``counts`` says how many records
+    were given and compared, how many were left out for which reason, and how many independent ones they are worth.
+    """
+
+    mean: Array
+    covariance: Array
+    freedom: float
+    n_records: Array
+    n_independent: Array
+    theta: Array
+    counts: pd.Series
+    findings: list[SkthermoWarning]
+
+
+def measured_shift(fem: Any, T: ArrayLike, F: ArrayLike, noise: Any) -> FrequencyShift:
+    """The shift of records against what a chain expects in their weather."""
+    deviations = _stated(noise, len(fem.mode_names_), what="noise", mode_names=fem.mode_names_)
+    frequencies = _checked(fem, T, F)
+    expected = fem.recorder_.residuals.expected(fem.weather(T).inputs)  # what the chain leaves in such weather
+    shifts = np.log(frequencies / (as_floats(fem.predict(T)) * (1 + expected)))
+    healthy = np.log1p(fem.recorder_.residuals.values)  # out of fold, in order of time
+    healthy = np.where(np.abs(healthy - median(healthy)) > 6 * robust_deviation(healthy), np.nan, healthy)
+    healthy[:, (~np.isnan(healthy)).sum(axis=0) < 20] = np.nan
+    left_out = _left_out(fem, T, frequencies, shifts, np.nanstd(healthy, axis=0))
+    rows = ~np.any(list(left_out.values()), axis=0)
+    shifts = np.where(rows[:, np.newaxis] & ~np.isnan(healthy).all(axis=0), shifts, np.nan)
+    mean = means_of_known(shifts)
+    _check_ratios(np.exp(mean), fem.mode_names_)
+
+    n_records, n_healthy = ((~np.isnan(values)).sum(axis=0) for values in (shifts, healthy))
+    per_one = 1.0 if deviations is not None else np.array([_records_for_one(column) for column in healthy.T])
+    n_independent, n_trained = (np.maximum(number / per_one, 1.0) for number in (n_records, n_healthy))
+    known = n_records > 0
+    freedom, n_known = float(n_trained[known].mean() - 1), known.sum()
+    if deviations is not None:
+        single = np.diag(deviations[known] ** 2)
+    else:  # Hotelling: the covariance of the modes is estimated, too
+        remaining = max(freedom - n_known + 1, 3.0)
+        single = Gaussian.fitted(healthy[:, known]).covariance * max(freedom, 3.0) / remaining
+        freedom = remaining
+    roots = np.sqrt(1 / n_independent + 1 / n_trained)[known]
+    covariance = np.full((len(known), len(known)), np.nan)
+    covariance[np.ix_(known, known)] = single * np.outer(roots, roots)
+    counts = {"given": len(rows), "compared": int(rows.sum())}
+    counts |= {reason: int(some.sum()) for reason, some in left_out.items() if some.any()}
+    counts |= {"independent": n_independent[known].min(), "trained": len(healthy)}
+    counts |= {"independent of trained": n_trained[known].min()}
+    return FrequencyShift(
+        mean,
+        covariance,
+        freedom,
+        n_records,
+        np.where(known, n_independent, 0.0),
+        as_floats(fem.predict_parameters(T))[rows].mean(axis=0, keepdims=True),
+        pd.Series(counts),
+        _findings(counts, left_out),
+    )
+
+
+def _stated(noise: Any, n_modes: int, *, what: str, **options: Any) -> Array | None:
+    """Standard deviations above 0 as they are stated; None where they are fitted."""
+    if isinstance(noise, str):
+        if noise != "fitted":
+            raise ValueError(f'{what} is {noise!r}; expected "fitted" or relative standard deviations')
+        return None
+    deviations = check_noise(noise, n_modes, what=what, **options)
+    if (deviations == 0).any():
+        raise ValueError(f"{what} is {noise!r}; expected standard deviations above 0, which errors are derived from")
+    return deviations
+
+
+def _records_for_one(residuals: Array) -> float:
+    """How many records of a mode in a row are worth one independent one.
+
+    From the variance of the means of a dozen parts or, if that gives more, from the correlation of neighbours.
+    """
+    number = (~np.isnan(residuals)).sum()
+    neighbours = np.clip(np.nan_to_num(pd.Series(residuals).autocorr()), 0, 0.98) if number > 2 else 0.0
+    return max(number / independent_records(residuals), (1 + neighbours) / (1 - neighbours))
+
+
+def _left_out(fem: Any, T: Any, frequencies: Array, shifts: Array, deviations: Array) -> dict[str, Array]:
+    """Rows that cannot be compared, by the first reason that holds; an error if none is left."""
+    excess = as_floats(fem.extrapolation_distance(T))
+    usual = median(shifts)
+    scale = np.fmax(robust_deviation(shifts), np.hypot(deviations, 0.05 * usual))  # effects depend on the weather
+    outlying = (np.nan_to_num(np.abs(shifts - usual)) > 6 * scale).any(axis=1)
+    reasons = {
+        "without a frequency": np.isnan(frequencies).all(axis=1),
+        "without all temperatures and lagged ones": np.isnan(excess).any(axis=1) | np.isnan(shifts).all(axis=1),
+        "in weather far outside that of the training records": (np.nan_to_num(excess) > 0.25).any(axis=1),
+        "far from the other records": outlying & (len(shifts) >= 8 and outlying.mean() < 0.5),
+    }
+    taken = np.zeros(len(shifts), dtype=bool)
+    for reason, rows in reasons.items():
+        reasons[reason], taken = rows & ~taken, taken | rows
+    if taken.all():
+        raise ValueError(
+            f"none of {counted(len(shifts), 'record')} can be compared with the healthy structure: "
+            f"{_reasons(reasons)}; expected frequencies, and temperatures like those of the training records"
+        )
+    return reasons
+
+
+def _reasons(left_out: dict[str, Array]) -> str:
+    return listed([f"{rows.sum():,} {reason}" for reason, rows in left_out.items() if rows.any()])
+
+
+def _findings(counts: dict[str, Any], left_out: dict[str, Array]) -> list[SkthermoWarning]:
+    """What is doubtful about the records."""
+    found: list[SkthermoWarning] = []
+    if n_left := counts["given"] - counts["compared"]:
+        text = f"{n_left:,} of {counted(counts['given'], 'record')} could not be compared: {_reasons(left_out)}"
+        if left_out["far from the other records"][-3:].all():
+            text += ". The last records are among them: the structure may have just changed. Identify these alone"
+        found.append(UnevaluatedRowsWarning(text, "not-compared"))
+    if counts["independent"] < 3 or counts["independent of trained"] < 20:
+        found.append(
+            FewRecordsWarning(
+                f"the records are worth {counts['independent']:.3g} independent ones (expected 3 or more), the "
+                f"training records {counts['independent of trained']:.3g} (expected 20 or more). Probabilities and "
+                "standard errors are rough. Take records over a longer time",
+                "few-independent-records",
+            )
+        )
+    return found
+
+
+def _check_ratios(ratios: Array, names: Any) -> None:
+    """Raise an error where no change of a structure gives these ratios of measured to predicted frequencies."""
+    wrong = np.flatnonzero((ratios < 0.2) | (ratios > 3))
+    if len(wrong):
+        raise ValueError(
+            f"{len(wrong)} of {len(ratios)} modes are less than 0.2 times or more than 3 times those that are "
+            f"predicted, {names[wrong[0]]} {ratios[wrong[0]]:.3g} times; expected Hz, and modes in the order of fit"
+        )
+
+
+def _checked(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
+    """The frequencies as an array, with NaN for values that cannot be."""
+    frequencies = as_floats(check_array(F, input_name="F", dtype=np.float64, allow_infinite=True))
+    names = getattr(F, "columns", None)
+    if names is not None and list(names) != fem.mode_names_:
+        raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
+    if frequencies.shape[1] != len(fem.mode_names_):
+        raise ValueError(
+            f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
+        )
+    kinds = {"no-rows", "missing-column", "constant"}
+    return as_floats(set_aside(T, F, model=fem.model, exclude=kinds, needs_all=True, is_baseline=False).frequencies)
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Measured changes of what is observed, (n_observed,), the covariance of their errors, and the model's response."""
+
+    change: Array
+    covariance: Array
+    response: Response
+    findings: list[SkthermoWarning]
+
+
+def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any, shape_noise: Any) -> Observed:
+    """Shifts of the measured frequencies, and of mode shapes if there are any; ``model`` may be a divided one."""
+    known = ~np.isnan(shift.mean)
+    model = getattr(model, "full", model)
+
+    def frequencies(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
+        after, theta = changed(model, shift.theta, causes, amounts)
+        return np.log(as_floats(fem.aligner_.inverse_transform(after.frequencies(theta))))[0, known]
+
+    before, covariance = frequencies([], []), shift.covariance[np.ix_(known, known)]
+    if shapes is None:
+        return Observed(shift.mean[known], covariance, lambda *change: frequencies(*change) - before, [])
+    compared, change, variances, findings = _shape_changes(
+        model, shift.theta, shapes, dofs, shape_noise, fem.mode_names_
+    )
+
+    def both(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
+        after, theta = changed(model, compared.theta, causes, amounts)  # the model's own components are 0
+        components = compared.components(after.modes(theta)[1][0][compared.dofs])
+        return np.append(frequencies(causes, amounts) - before, components)
+
+    everything = block_diag(covariance, np.diag(variances))
+    return Observed(np.append(shift.mean[known], change), everything, both, findings)
+
+
+@dataclass(frozen=True)
+class ComparedShapes:
+    """Mode shapes of a model at theta, (n_sensors, n_modes), with which others are compared where both are ``known``.
+
+    Scale, sign and phase of a shape mean nothing: each is turned to the reference and scaled to its length; what
+    remains are its components along unit vectors at right angles to the reference. Independent errors of the sensors
+    are independent errors of these components.
+    """
+
+    theta: Array
+    dofs: NDArray[np.intp]
+    reference: Array
+    known: NDArray[np.bool_]
+
+    def components(self, shapes: NDArray) -> Array:
+        """Components of real or complex shapes (..., n_sensors, n_modes), mode after mode, (..., n_observed)."""
+        found = []
+        for mode in np.flatnonzero(self.known.any(axis=0)):
+            rows = self.known[:, mode]
+            reference, shape = self.reference[rows, mode], shapes[..., rows, mode]
+            turned = np.real(shape * np.exp(-1j * np.angle(shape @ reference))[..., np.newaxis])
+            turned *= np.linalg.norm(reference) / np.linalg.norm(turned, axis=-1, keepdims=True)
+            found.append(turned @ np.linalg.svd(reference[np.newaxis])[2][1:].T)
+        return np.concatenate(found, axis=-1)
+
+    def similarity(self, shapes: NDArray) -> Array:
+        """Mean MAC of records (n_records, n_sensors, n_modes) with the reference, (n_modes,); NaN without any."""
+        filled, squares = np.nan_to_num(shapes), np.where(np.isnan(shapes), 0.0, self.reference**2)
+        along = np.abs((filled.conj() * self.reference).sum(axis=1)) ** 2
+        lengths = (np.abs(filled) ** 2).sum(axis=1) * squares.sum(axis=1)
+        return means_of_known(np.divide(along, lengths, out=np.full(along.shape, np.nan), where=lengths > 0))
+
+
+def _shape_changes(
+    model: Any, theta: Array, shapes: Any, dofs: ArrayLike | None, noise: Any, names: Sequence[Any]
+) -> tuple[ComparedShapes, Array, Array, list[SkthermoWarning]]:
+    """The model's shapes, the measured change of their components, and its variances.
+
+    Of the records' parameters and the nominal ones, those count that give the measured healthy shapes better.
+    """
+    if dofs is None:
+        raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
+    if not hasattr(model, "modes"):
+        raise ValueError(f"{model!r} has no method 'modes'; expected a model with one, to compare mode shapes")
+    stated, candidates = _stated(noise, len(names), what="shape_noise", most=1), []
+    for state in (theta, np.ones_like(theta)):
+        whole = model.modes(state)[1][0]
+        places = check_dofs(dofs, len(whole), getattr(model, "dofs", ()))
+        reference = whole[places] / np.abs(whole[places]).max(axis=0)
+        healthy, later = records = read_shapes(shapes, reference.shape)
+        present = [(~np.isnan(one)).mean(axis=0) for one in records]  # at least in half of the records of its mode
+        known = np.logical_and(*(share >= np.maximum(share.max(axis=0) / 2, 1e-9) for share in present))
+        candidates.append(ComparedShapes(state, places, reference, known))
+    compared = max(candidates, key=lambda one: np.nansum(one.similarity(healthy)))
+    foreign = (compared.similarity(healthy) < 0.5) & compared.known.any(axis=0)
+    compared = replace(compared, known=compared.known & ~foreign & (compared.known.sum(axis=0) > 1))
+    if not compared.known.any():
+        raise ValueError("no mode has shapes that can be compared; expected two sensors or more with both states")
+    modes = np.repeat(np.arange(len(names)), np.maximum(compared.known.sum(axis=0) - 1, 0))  # of each component
+    states = [pd.DataFrame(compared.components(one)) for one in (healthy, later)]
+    number = np.array([one.count() for one in states])
+    squares = sum(((one - one.mean()) ** 2).sum().to_numpy() for one in states)
+    freedom = np.bincount(modes, number.sum(axis=0) - 2)
+    if stated is None and (freedom[modes] < 3).any():
+        raise ValueError(
+            'shape_noise is "fitted", which needs several records of shapes in one of the states; expected a standard '
+            f"deviation, such as 0.01, since there are {len(healthy)} and {len(later)} records"
+        )
+    scatter = (np.bincount(modes, squares) / np.maximum(freedom - 2, 1))[modes]
+    variances = np.maximum(scatter, 0.0 if stated is None else stated[modes] ** 2) * (1 / number).sum(axis=0)
+    findings: list[SkthermoWarning] = []
+    if foreign.any():
+        findings.append(
+            RecordsWarning(
+                f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below 0.5 with the "
+                f"model's, {names[np.flatnonzero(foreign)[0]]} the first. They are left out. Give shapes of the same "
+                "modes, with rows in the order of dofs",
+                "foreign-shapes",
+            )
+        )
+    return compared, (states[1].mean() - states[0].mean()).to_numpy(), variances, findings
+
+
+def read_shapes(shapes: Any, expected: tuple[int, ...]) -> list[NDArray]:
+    """Records of both states, (n_records, n_sensors, n_modes) each."""
+    if not isinstance(shapes, Sequence) or len(shapes) != 2:
+        raise ValueError("shapes is not a pair; expected measured shapes of the healthy and of the damaged structure")
+    states = []
+    for which, values in zip(("healthy", "damaged"), shapes, strict=True):
+        array = np.asarray(values)
+        array = array if np.iscomplexobj(array) else as_floats(values)
+        if array.shape[-2:] != expected or array.ndim > 3 or not len(array):
+            raise ValueError(
+                f"the {which} shapes have shape {array.shape}; expected a row for each of {expected[0]} sensors "
+                f"and a column for each of {expected[1]} modes, or several records of these"
+            )
+        records = array.reshape(-1, *expected)
+        if np.isinf(records).any() or (records == 0).all(axis=1).any():
+            raise ValueError(
+                f"the {which} shapes hold infinite values, or a shape that is zero; expected NaN where not measured"
+            )
+        states.append(records)
+    return states
