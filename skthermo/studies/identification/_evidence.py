@@ -77,12 +77,7 @@ class Evidence:
     """
 
     def __init__(
-        self,
-        observed: Observed,
-        causes: Sequence[Cause],
-        effects: Array,
-        prior: DamagePrior,
-        freedom: float,
+        self, observed: Observed, causes: Sequence[Cause], effects: Array, prior: DamagePrior, freedom: float
     ) -> None:
         self.observed, self.causes, self.prior, self.freedom = observed, causes, prior, freedom
         error = np.diag((prior.model_error * observed.change) ** 2)
@@ -168,14 +163,6 @@ class Evidence:
         self, sets: Sequence[tuple[int, ...]], log_priors: Sequence[float], offset: Array | float = 0
     ) -> list[Weight]:
         """Evidence of sets of equal size k, with effects that are linear near the most probable amounts."""
-        found: list[Weight] = []
-        for first in range(0, len(sets), 500):
-            found += self._evidence(sets[first : first + 500], log_priors[first : first + 500], offset)
-        return found
-
-    def _evidence(
-        self, sets: Sequence[tuple[int, ...]], log_priors: Sequence[float], offset: Array | float
-    ) -> list[Weight]:
         columns = np.array(sets, dtype=int).reshape(len(sets), 1, -1)
         (n_errors, n_observed), size = self.variances.shape, columns.shape[-1]
         lowest, highest, deviations = self.lowest[columns], self.highest[columns], self.deviations[columns]
@@ -194,8 +181,8 @@ class Evidence:
         logs = -volume / 2 - (self.freedom + n_observed) / 2 * np.log1p(misfit / self.freedom)
         scale = (self.freedom + misfit) / (self.freedom + n_observed)
         covariances = np.linalg.inv(precisions) * scale[..., np.newaxis, np.newaxis]
-        lattice = (0.5 + np.outer([0.8191725, 0.6710436, 0.5497005][:size], np.arange(128))) % 1
-        logs = logs + logsumexp(truncated(means, covariances, lowest, highest, lattice)[1], axis=-1) - np.log(128)
+        lattice = (0.5 + np.outer([0.8191725, 0.6710436, 0.5497005][:size], np.arange(64))) % 1
+        logs = logs + logsumexp(truncated(means, covariances, lowest, highest, lattice)[1], axis=-1) - np.log(64)
         logs = logs - np.log(ndtr(highest / deviations) - ndtr(lowest / deviations)).sum(axis=-1)
         logs = logs + np.array(log_priors)[:, np.newaxis] + self.log_errors
         return [
