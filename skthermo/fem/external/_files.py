@@ -14,8 +14,16 @@ import scipy.sparse
 
 from skthermo._core.arrays import Label, Matrix
 from skthermo._core.matlab import matlab_variables
-from skthermo.fem.external._nastran import OP4_HEADING, read_dmig, read_op4
-from skthermo.fem.external._texts import Labelled, check_size, read_dofs, read_entries, read_harwell_boeing
+from skthermo.fem.external._texts import (
+    OP4_HEADING,
+    Labelled,
+    check_size,
+    read_dmig,
+    read_dofs,
+    read_entries,
+    read_harwell_boeing,
+    read_op4,
+)
 
 MASS_OF = " (mass)"  # after the name of an export whose stiffness has that name
 FORMATS = (

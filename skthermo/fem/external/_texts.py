@@ -1,10 +1,15 @@
-"""Matrices in texts: lines of entries, Harwell-Boeing, and labels of rows. Errors name the line."""
+"""Matrices of FE programs: lines of entries, Harwell-Boeing, Nastran's DMIG and OUTPUT4, and labels of rows.
+
+Errors name the line, or the byte of a binary file.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 import re
+from array import array
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +18,15 @@ from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Words = NDArray[np.bytes_]
 
+FORTRAN = bytes.maketrans(b"Dd_", b"Ee?")  # exponents; Python would take an underscore for a part of a number
 MOST_INTEGER = 2**31 - 1  # rows, nodes and components are smaller
+
+
+OP4_HEADING = re.compile(
+    rb"([ \d]{8}|[ \d]{16})([ \d-]{8}|[ \d-]{16})([ \d]{8})([ \d]{8})([A-Z]\w{0,7})"
+    rb"[ \0]*(?:(?:1P,)?(\d{1,3})[EDed](\d{1,3})\.\d+)?(?:\|I16)?[ \t]*"
+)
 
 
 class Labelled(NamedTuple):
@@ -35,25 +46,32 @@ def lines_ended(content: bytes) -> bytes:
     return content
 
 
-def fields(lines: list[bytes], n: int, width: int) -> Words:
-    """The first n fields of a width of each line."""
-    return np.array(lines, dtype=f"S{n * width}").view(f"S{width}").reshape(len(lines), n)
-
-
-def reals(words: Words, lines: Integers) -> Numbers:
-    """Numbers as Fortran writes them; an error names the first word that is none, and its line."""
-    words = np.frombuffer(words.tobytes().translate(bytes.maketrans(b"Dd_", b"EE?")), words.dtype)
+def real(word: bytes, line: int) -> float:
+    """A number as Fortran writes it; an error names the line."""
     try:
-        return words.astype(float)
+        return float(word.translate(FORTRAN))
     except ValueError:
-        return np.array([_real(word, line) for word, line in zip(words.tolist(), lines.tolist(), strict=True)])
-
-
-def _real(word: bytes, line: int) -> float:
-    try:
-        return float(re.sub(rb"(?<=[\d.])([+-])(?=\d)", rb"E\1", word))  # Nastran leaves the letter out
+        pass
+    try:  # Nastran leaves the letter out
+        return float(re.sub(rb"(?<=[\d.])([+-])(?=\d)", rb"E\1", word.translate(FORTRAN)))
     except ValueError:
         raise ValueError(f"line {line}: {word.decode('latin-1').strip()!r} is not a number") from None
+
+
+def reals(words: list[bytes], line: int) -> list[float]:
+    """Numbers of a line that was translated by ``FORTRAN``."""
+    try:
+        return list(map(float, words))
+    except ValueError:
+        return [real(word, line) for word in words]
+
+
+def whole_word(word: bytes, line: int, what: str, least: int = 0) -> int:
+    """A whole number; a blank is zero."""
+    number = real(word.strip() or b"0", line)
+    if number % 1 or not least <= number <= MOST_INTEGER:
+        raise ValueError(f"line {line}: {what} is {number:g}; expected whole numbers from {least} to {MOST_INTEGER}")
+    return int(number)
 
 
 def whole(numbers: Numbers, what: str, least: int = -MOST_INTEGER) -> Integers:
@@ -156,8 +174,7 @@ def _table(text: bytes) -> Numbers:
         if words and (width not in (3, 5) or len(words) != width):
             expected = "three or five numbers" if width == len(words) else f"{width}, as in the others"
             raise ValueError(f"line {number} holds {len(words)} words; expected {expected}")
-        found = reals(np.array(words, dtype=bytes), np.full(len(words), number))
-        if not np.isfinite(found).all():
+        if not np.isfinite([real(word, number) for word in words]).all():
             raise ValueError(f"line {number} is {line[:40].decode('latin-1')!r}; expected finite numbers")
     raise ValueError("it holds no line of three or five numbers")
 
@@ -224,10 +241,265 @@ def read_harwell_boeing(content: bytes) -> scipy.sparse.csc_array:
 
 def _block(lines: list[bytes], first: int, n_numbers: int, n: int, width: int) -> Numbers:
     """Numbers of some lines: between spaces or, where they touch one another, in fields of a width, n in a line."""
-    words = b"\n".join(lines).split()
-    if len(words) == n_numbers:
-        return reals(np.array(words, dtype=bytes), first + np.arange(n_numbers) // n)
-    longer = [number for number, line in enumerate(lines, start=first) if line[n * width :].strip()]
-    if longer:
-        raise ValueError(f"line {longer[0]} is longer than {n} fields of {width} characters")
-    return reals(fields(lines, n, width).ravel()[:n_numbers], first + np.arange(n_numbers) // n)
+    values, are_apart = array("d"), sum(len(line.split()) for line in lines) == n_numbers
+    for number, line in enumerate(lines, start=first):
+        line, n_left = line.translate(FORTRAN), min(n, n_numbers - len(values))
+        if not are_apart and line[n * width :].strip():
+            raise ValueError(f"line {number} is longer than {n} fields of {width} characters")
+        words = line.split() if are_apart else [line[i : i + width] for i in range(0, n_left * width, width)]
+        values.extend(reals(words, number))
+    return np.frombuffer(values)
+
+
+class Cards:
+    """Entries of a matrix of DMIG cards: labels (node, component) of their rows and columns, and values."""
+
+    def __init__(self, line: int):
+        self.line, self.form, self.kind = line, 0, 0
+        self.labels, self.values = array("q"), array("d")
+
+    def matrix(self, name: str) -> Labelled | None:
+        """The matrix; None for a complex or rectangular one."""
+        if not self.form:
+            raise ValueError(f"line {self.line}: matrix {name!r} has no entry that states its form")
+        if self.form not in (1, 6) or self.kind not in (1, 2):
+            return None
+        labels = np.frombuffer(self.labels, np.int64).reshape(-1, 4)
+        return labelled(labels[:, :2], labels[:, 2:], np.frombuffer(self.values), is_symmetric=self.form == 6)
+
+
+def read_dmig(content: bytes) -> dict[str, Labelled | None]:
+    """Matrices of Nastran's DMIG entries by name, in small, large or free field; None for complex or rectangular ones.
+
+    The labels are grid point and component. MSC Nastran and OptiStruct Quick Reference Guides, bulk data entry DMIG;
+    ``EXTOUT=DMIGPCH`` writes them to the punch file. A half of a symmetric matrix (form 6) or all of it may be there.
+    """
+    found: dict[str, Cards] = {}
+    cards, column = Cards(0), (0, 0)
+    for number, is_head, groups in _groups(lines_ended(content.upper())):
+        if is_head:
+            name, *words = groups[0]
+            title = name.strip().decode("latin-1")
+            if not 0 < len(title) <= 8:
+                raise ValueError(f"line {number}: {title!r} is no name of one to eight characters")
+            cards = found.setdefault(title, Cards(number))
+            node, component, kind = (whole_word(word, number, "a node, component or form") for word in words)
+            column = node, component
+            if not node:  # the card states the form
+                cards.form, cards.kind = component, kind
+                if component not in (1, 2, 6, 9) or kind not in (1, 2, 3, 4):
+                    stated = f"form {component} and type {kind}"
+                    raise ValueError(f"line {number}: matrix {title!r} has {stated}; expected 6 and 2, or such")
+        for node, component, value, _ in groups[is_head:] if column[0] else ():
+            if node.strip() or component.strip() or value.strip():
+                row = whole_word(node, number, "a node", 1), whole_word(component, number, "a component")
+                cards.labels.extend((*row, *column))
+                cards.values.append(real(value, number))
+    if not found:
+        raise ValueError("no DMIG entry")
+    return {name: own.matrix(name) for name, own in found.items()}
+
+
+def _groups(text: bytes) -> Iterator[tuple[int, bool, list[list[bytes]]]]:
+    """Lines of DMIG cards: number, whether a card begins, and fields in groups of four.
+
+    The first group holds the name and the column, each other one node, component and value.
+    """
+    is_card = False
+    for number, line in enumerate(io.BytesIO(text), start=1):
+        first = line[:1]
+        is_head = line[:4] == b"DMIG" and line[4:5] in (b" ", b"*", b",")
+        is_card = is_head or (is_card and not b"A" <= first <= b"Z")
+        if not is_card or first not in b"D +*,":
+            continue
+        if b"," in line[:9]:
+            parts = line.partition(b"$")[0].split(b",")[1:9]
+            parts += [b""] * (-len(parts) % 4)
+        elif b"*" in line[:8]:
+            parts = [line[8:24], line[24:40], line[40:56], line[56:72]]
+        else:
+            parts = [line[i : i + 8] for i in range(8, 72, 8)]
+        yield number, is_head, [parts[i : i + 4] for i in range(0, len(parts), 4)]
+
+
+class Head(NamedTuple):
+    """Facts before a matrix of OUTPUT4."""
+
+    n_columns: int
+    n_rows: int
+    form: int
+    kind: int
+    name: str
+
+    @property
+    def is_real(self) -> bool:
+        """Whether the numbers are real, in single or double precision, and not complex."""
+        return self.kind in (1, 2)
+
+    @property
+    def is_big(self) -> bool:
+        """Whether a string's length and row are two numbers, and not one of 65536 times the first plus the second."""
+        return self.n_rows < 0 or self.n_rows >= 65536
+
+    def matrix(self, strings: Sequence[Sequence[int]], values: Numbers) -> scipy.sparse.csc_array | None:
+        """The matrix of strings of values below one another: column, first row and length of each; None if not square.
+
+        Columns and rows count from 1.
+        """
+        if self.n_columns != abs(self.n_rows) or not self.is_real:
+            return None
+        columns, rows, lengths = np.array(strings, dtype=np.int64).reshape(-1, 3).T
+        outside = (columns < 1) | (columns > self.n_columns) | (rows < 1) | (rows + lengths - 1 > self.n_columns)
+        if outside.any():
+            column, row, length = strings[int(np.argmax(outside))]
+            raise ValueError(f"{length} values from row {row} of column {column}; expected them within the matrix")
+        used = np.flatnonzero(values)
+        string = np.repeat(np.arange(len(lengths)), lengths)[used]
+        first = rows - 1 - np.cumsum(lengths) + lengths
+        entries = first[string] + used, columns[string] - 1, values[used], self.n_columns
+        return symmetric(*entries, in_order=True) if self.form == 6 else square(*entries)
+
+
+def read_op4(content: bytes) -> dict[str, scipy.sparse.csc_array | None]:
+    """Matrices of Nastran's OUTPUT4 by name, dense or sparse; None for complex or rectangular ones.
+
+    MSC Nastran DMAP Programmer's Guide, module OUTPUT4. Rows have no labels.
+    """
+    return dict(_in_records(content) if 0 in content[:4] else _in_lines(lines_ended(content)))
+
+
+def _in_lines(text: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | None]]:
+    """Matrices of a text: a heading, then a line for each column or string, and its values."""
+    lines = enumerate(io.BytesIO(text), start=1)
+    for number, line in lines:
+        if not line.strip():
+            continue
+        heading = OP4_HEADING.fullmatch(line.rstrip(b"\n"))
+        if heading is None:
+            got = line[:40].decode("latin-1").rstrip("\n")
+            raise ValueError(f"line {number} is {got!r}; expected the heading of a matrix")
+        n_columns, n_rows, form, kind = map(int, heading.groups()[:4])
+        head = Head(n_columns, n_rows, form, kind, heading[5].decode("ascii"))
+        n, width = map(int, heading.group(6, 7)) if heading[6] else (5, 16)
+        try:
+            yield head.name, _of_text(lines, head, n, width)
+        except ValueError as error:
+            raise ValueError(f"matrix {head.name!r} of line {number}: {error}") from error
+
+
+def _of_text(lines: Iterator[tuple[int, bytes]], head: Head, n: int, width: int) -> scipy.sparse.csc_array | None:
+    """The matrix whose columns are the next lines; values stand n in a line, in fields of a width."""
+    strings, stated, values, column = list[list[int]](), list[tuple[int, int, bool]](), array("d"), 0
+    for number, line in lines:
+        if b"." in line:
+            length = line.count(b".")
+            if not strings or length > n:
+                raise ValueError(
+                    f"line {number} holds {length} values; expected a column's number or at most {n} values"
+                )
+            strings[-1][2] += length
+            if head.is_real:
+                line = line.translate(FORTRAN)
+                values.extend(reals([line[i : i + width] for i in range(0, length * width, width)], number))
+            continue
+        words = _integers(line, number)
+        if len(words) == 3:
+            column, row, n_words = words
+            if column == head.n_columns + 1:
+                next(lines, None)  # a number without meaning
+                return _of_strings(head, strings, stated, values)
+            n_words = n_words if row else 0  # the strings of the column follow
+        elif column and len(words) == 2 and head.is_big:
+            n_words, row = words[0] - 1, words[1]
+        elif column and len(words) == 1 and not head.is_big:
+            n_words, row = words[0] // 65536 - 1, words[0] % 65536
+        elif words:
+            raise ValueError(f"line {number} starts neither a column nor a string")
+        else:
+            continue
+        strings.append([column, row, 0])
+        stated.append((number, n_words, len(words) == 3))
+    raise ValueError(f"no end after {head.n_columns} columns: the file seems to be cut off")
+
+
+def _of_strings(
+    head: Head, strings: list[list[int]], stated: list[tuple[int, int, bool]], values: array
+) -> scipy.sparse.csc_array | None:
+    """The matrix of strings that have as many values as their lines state."""
+    for (number, n_words, is_column), (*_, length) in zip(stated, strings, strict=True):
+        is_right = n_words == length * (1 if head.kind % 2 else 2) or (is_column and n_words == length)
+        if head.is_real and not is_right:  # some count values in place of words
+            raise ValueError(f"line {number} states {n_words} words; {length} values follow")
+    return head.matrix([string for string in strings if string[2]], np.array(values))
+
+
+def _integers(line: bytes, number: int) -> list[int]:
+    words = line.split()
+    if not all(word.isdigit() and len(word) < 20 and int(word) <= MOST_INTEGER for word in words):
+        got = line[:40].decode("latin-1").strip()
+        raise ValueError(f"line {number} is {got!r}; expected whole numbers up to {MOST_INTEGER}")
+    return [int(word) for word in words]
+
+
+def _in_records(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | None]]:
+    """Matrices of a binary file: a record for the head, one for each column that is not zero, and one beyond the last.
+
+    A record has its length before and after it, in four bytes; all other integers may have eight.
+    """
+    order = "<" if content[0] else ">"
+    records = _records(content, order)
+    for at, record in records:
+        if len(record) not in (24, 48):
+            raise ValueError(f"a record of {len(record)} bytes at byte {at}; expected 24 or 48, the head of a matrix")
+        word = len(record) // 6
+        integer = f"{order}i{word}"
+        numbers, name = np.frombuffer(record[: 4 * word], integer).tolist(), record[4 * word :].translate(None, b" \0")
+        n_columns, n_rows, form, kind = numbers
+        head = Head(n_columns, n_rows, form, kind, name.decode("latin-1"))
+        real = f"{order}f{8 if head.kind % 2 == 0 else word}"
+        try:
+            yield head.name, _of_columns(records, head, integer, real)
+        except ValueError as error:
+            raise ValueError(f"matrix {head.name!r} of byte {at}: {error}") from error
+
+
+def _records(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    at = 0
+    while at < len(content):
+        length = int.from_bytes(content[at : at + 4], "little" if order == "<" else "big")
+        end = at + 4 + length
+        if content[end : end + 4] != content[at : at + 4] or end + 4 > len(content):
+            raise ValueError(f"the record at byte {at} has no end: the file is damaged or cut off")
+        yield at, content[at + 4 : end]
+        at = end + 4
+
+
+def _of_columns(
+    records: Iterator[tuple[int, bytes]], head: Head, integer: str, real: str
+) -> scipy.sparse.csc_array | None:
+    """The matrix whose columns are the next records, each one string of values or several."""
+    strings, values, before, is_dense = list[tuple[int, int, int]](), bytearray(), 0, None
+    word, size = np.dtype(integer).itemsize, np.dtype(real).itemsize
+    for at, record in records:
+        if len(record) < 3 * word:
+            raise ValueError(f"a record of {len(record)} bytes at byte {at}; expected a column")
+        column, row, n_words = np.frombuffer(record[: 3 * word], integer).tolist()
+        if column == head.n_columns + 1:
+            return head.matrix(strings, np.frombuffer(values, real).astype(float))
+        if column <= before or len(record) != (3 + n_words) * word or is_dense not in (None, row > 0):
+            what = f"column {column} from row {row}, of {n_words} words, in {len(record)} bytes"
+            raise ValueError(f"after column {before}, {what}")
+        before, start, is_dense = column, 3 * word, row > 0
+        while head.is_real and start < len(record):
+            stop = len(record)
+            if not is_dense:  # a string's length and row
+                numbers = np.frombuffer(record[start : start + (1 + head.is_big) * word], integer).tolist()
+                length, row = numbers if head.is_big else divmod(numbers[0], 65536)
+                start, stop = start + (1 + head.is_big) * word, start + (length + head.is_big) * word
+            length, rest = divmod(stop - start, size)
+            if rest or not start < stop <= len(record):
+                raise ValueError(f"a string of {stop - start} bytes in column {column}; {len(record) - start} are left")
+            strings.append((column, row, length))
+            values += record[start:stop]
+            start = stop
+    raise ValueError(f"no end after {head.n_columns} columns: the file seems to be cut off")
