@@ -134,7 +134,7 @@ print((100 * found.shifts[["measured", "explained", "standard_error"]]).round(2)
 #    18 %, something else (9 %); abutments 8.6 %, soil 19 %, something else (9 %).
 #    Probability of no change: below 0.1 %.
 #    112 records (worth 3.9 independent ones) compared with 2,800 training records (worth 96).
-#    girder_bending and piers cannot be distinguished by these modes.
+#    These modes do not show which of girder_bending and piers has changed.
 #
 #    Every group, on average over all explanations
 #                    probability  severity  ci_low  ci_high  if_damaged

@@ -190,6 +190,12 @@ def test_stiffening_parameters_and_mass_are_causes_of_their_own(fem):
         assert found.table.loc[name, "kind"] in ("stiffening", "mass", "parameter")
 
 
+def test_a_group_is_not_both_weaker_and_stiffer(fem):
+    found = identify_damage(fem, WEATHER, simulated(fem, {"top": 0.2}), ["top"], stiffening=True, random_state=0)
+    assert found.most_probable == ("top",)
+    assert "top + top stiffer" not in found.explanations.index
+
+
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")
 def test_shifts_that_no_group_makes_are_something_else(fem):
     for change in (1.05, [1, 1, 1, 1.03, 1, 1]):

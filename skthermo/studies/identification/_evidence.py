@@ -138,7 +138,7 @@ class Evidence:
                 for some in combinations(together, size)
                 if not any(self.causes[a].excludes(self.causes[b]) for a, b in combinations(some, 2))
             ]
-            weights += self._weighed(sets, [share] * len(sets))
+            weights += self._weighed(sets, [share] * len(sets)) if sets else []
         return weights
 
     def _refined(self, weight: Weight) -> Weight:
@@ -163,7 +163,7 @@ class Evidence:
         self, sets: Sequence[tuple[int, ...]], log_priors: Sequence[float], offset: Array | float = 0
     ) -> list[Weight]:
         """Evidence of sets of equal size k, with effects that are linear near the most probable amounts."""
-        columns = np.array(sets, dtype=int).reshape(len(sets), 1, -1)
+        columns = np.array(sets, dtype=int)[:, np.newaxis]
         (n_errors, n_observed), size = self.variances.shape, columns.shape[-1]
         lowest, highest, deviations = self.lowest[columns], self.highest[columns], self.deviations[columns]
         means = np.zeros((len(sets), n_errors, size))

@@ -281,7 +281,7 @@ def _located(
     is_in = np.array(
         [[unit.name in ((*cause.of,) if cause.alone else (cause.name,)) for unit in units] for cause in causes]
     )
-    effects = np.einsum("cu,suo->sco", is_in, effects_of(seen, units, 5))
+    effects = np.einsum("cu,suo->sco", is_in, effects_of(seen, units, 7))
     table = pd.DataFrame(list(members.values()), pd.Index(list(members), name="member", tupleize_cols=False))
     return Evidence(seen, causes, effects, evidence.prior, shift.freedom), table
 
