@@ -164,3 +164,31 @@ def _swapped(model: Any, theta: Array) -> NDArray[np.bool_]:
     similar = mac(nominal, now)
     is_another = linear_sum_assignment(similar, maximize=True)[1] != np.arange(len(similar))
     return is_another | (np.diagonal(similar) < LOW_MAC)
+
+
+def doubtful_draws(
+    outcomes: Sequence[Outcome], names: Sequence[str], bounds: Array, residuals: Residuals
+) -> Iterator[ModelWarning]:
+    """Warnings about models that were drawn."""
+    n = len(outcomes)
+    if unconverged := sum(not outcome.success for outcome in outcomes):
+        yield ModelWarning(
+            f"the search has not converged for {unconverged} of {n} drawn models. They may be improbable. Raise "
+            "max_iter, or narrow the bounds to where the model has modes",
+            "not-converged",
+        )
+    at_bound = np.sum([at_bounds(one.theta, bounds) for one in outcomes], axis=0)
+    if (at_bound > 0.1 * n).any():  # 5 % are at a bound of two standard deviations
+        listed = ", ".join(f"{name!r} ({count} of {n})" for name, count in zip(names, at_bound, strict=True) if count)
+        yield ModelWarning(
+            f"drawn models lie at the bounds of {listed}. They differ less than is unknown. Widen the bounds, or "
+            "give a narrower prior",
+            "poor-fit",
+        )
+    mismatched = sum(any(false_matches(residuals.model, residuals.measured, one.theta)) for one in outcomes)
+    if mismatched:
+        yield ModelWarning(
+            f"modes change their order in {mismatched} of {n} drawn models. A measured mode is fitted with another "
+            "one there. Use a model with track=True, or give shapes",
+            "mode-order",
+        )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from numbers import Integral, Real
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from skthermo._core.arrays import (
     as_random_state,
     check_bounds,
     check_model,
+    check_names,
     check_prior,
     check_size,
     cramer_rao,
@@ -39,8 +41,10 @@ from skthermo._core.estimators import (
 from skthermo._core.frames import column_names
 from skthermo._core.parallel import run_jobs
 from skthermo._core.warnings import warn_each
-from skthermo.fem import FEModel
+from skthermo.fem import CallableModel, FEModel, ReducedModel
+from skthermo.fem.damage import read_groups
 from skthermo.updating._diagnostics import (
+    doubtful_draws,
     doubtful_optimum,
     false_matches,
     modes_table,
@@ -48,7 +52,6 @@ from skthermo.updating._diagnostics import (
     undetermined,
     unfinished,
 )
-from skthermo.updating._ensemble import Ensemble, groups_beside, rescaled
 from skthermo.updating._residuals import Measured, Outcome, Residuals, optimise, read_measured
 
 
@@ -228,7 +231,7 @@ class ModelUpdater(Estimator):
         bounds = self._read_bounds()
         prior = None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
         n_parameters = len(bounds)
-        model = self.model.quiet() if hasattr(self.model, "quiet") else self.model
+        model = quiet(self.model)
         residuals = Residuals(model, measured, prior)
         outcomes = self._run(residuals, bounds)
         best = min(outcomes, key=lambda outcome: outcome.objective)
@@ -323,15 +326,30 @@ class ModelUpdater(Estimator):
             )
         n = positive_integer(n, "n")
         check_size(spread, "spread", 0, 0.5, "a relative standard deviation above 0 and below 0.5, such as 0.15")
-        names = self.model.parameter_names
-        prior = check_prior(spread if self.prior is None else self.prior, names)
-        ensemble = Ensemble(
-            self.model, self.measured_, self._read_bounds(), prior, groups_beside(self.model, groups), spread
+        prior = check_prior(spread if self.prior is None else self.prior, self.model.parameter_names)
+        chosen = groups_beside(self.model, groups)
+        names = [*self.model.parameter_names, *chosen]
+        limits = np.tile([max(1 - 4 * spread, 0.1), 1 + 4 * spread], (len(chosen), 1))
+        bounds = np.vstack([self._read_bounds(), limits])
+        extended = quiet(_with_groups(self.model, chosen))
+        residuals = Residuals(extended, self.measured_, np.append(prior, np.full(len(chosen), spread)))
+        search = partial(
+            optimise,
+            bounds=bounds,
+            start=np.append(self.theta_, np.ones(len(chosen))),
+            method="least_squares",
+            max_iter=self.max_iter,
         )
         options = {"n_jobs": self.n_jobs, "prefer": getattr(self.model, "prefer", None)}
-        outcomes = ensemble.multipliers(n, self.theta_, as_random_state(random_state), self.max_iter, **options)
-        models = Parallel(**options)(delayed(ensemble.model_at)(outcome.theta) for outcome in outcomes)
-        warn_each(ensemble.findings(outcomes))
+        drawn = residuals.randomised(n, as_random_state(random_state))
+        outcomes = run_jobs((delayed(search)(one) for one in drawn), n, unit="models", **options)
+        models = Parallel(**options)(delayed(_changed_model)(self.model, chosen, one.theta) for one in outcomes)
+        theta = np.array([one.theta for one in outcomes])
+        findings = doubtful_draws(outcomes, names, bounds, residuals)
+        if hasattr(self.model, "findings"):  # such as bounds of a reduced model
+            own = theta[:, : len(self.theta_)]
+            findings = [*findings, *self.model.findings(own, extended.frequencies(theta))]
+        warn_each(findings)
         return models
 
     def _read(self, F, shapes, dofs, frequency_std) -> Measured:
@@ -399,3 +417,53 @@ class ModelUpdater(Estimator):
             if not is_auto(self.reduce):
                 raise
             return None
+
+
+def quiet(model: Any) -> Any:
+    """A model that gives no warnings in a search."""
+    return model.quiet() if hasattr(model, "quiet") else model
+
+
+def groups_beside(model: Any, groups: Sequence[str] | None) -> list[str]:
+    """Damage groups whose stiffness no parameters scale already; by default those that are not made up of others."""
+    if groups is None and not (hasattr(model, "groups") and hasattr(model, "with_damage_parameters")):
+        return []
+    names = None if groups is None else check_names([groups] if isinstance(groups, str) else groups, "groups")
+    if names == []:
+        return []
+    chosen = list(read_groups(model, names))
+    known = getattr(model, "parameter_terms", None)
+    if known is None:
+        return [name for name in chosen if name not in model.parameter_names]
+    parameters = [set(terms) for terms in known.values()]
+
+    def is_scaled(name: str) -> bool:
+        own = set(model.groups[name])
+        return set().union(*(terms for terms in parameters if terms <= own)) == own
+
+    return [name for name in chosen if not is_scaled(name)]
+
+
+def _with_groups(model: Any, groups: Sequence[str]) -> Any:
+    """A model with more parameters, the stiffness of damage groups; a reduced one would take longer to make."""
+    full = model.full if isinstance(model, ReducedModel) and groups else model
+    return full.with_damage_parameters(groups) if groups else full
+
+
+def _changed_model(model: Any, groups: Sequence[str], multipliers: Array) -> FEModel:
+    """The model whose theta = 1 has these multipliers of its parameters, then of its damage groups."""
+    theta, factors = np.split(multipliers, [len(model.parameter_names)])
+    changed = model.damaged(dict(zip(groups, (1 - factors).tolist(), strict=True))) if groups else model
+    return rescaled(changed, theta)
+
+
+def rescaled(model: FEModel, theta: Array) -> FEModel:
+    """A model whose nominal state is the given model at theta."""
+    if hasattr(model, "rescaled"):
+        return model.rescaled(theta)
+    function = partial(_frequencies_from, model, theta)
+    return CallableModel(function, model.parameter_names, model.n_modes, vectorized=True)
+
+
+def _frequencies_from(model: FEModel, origin: Array, theta: Array) -> Array:
+    return model.frequencies(origin * theta)
