@@ -230,11 +230,3 @@ def test_killed_in_the_middle_of_a_thousand_solves(folder, tmp_path):
     assert len(np.unique(begun(log), axis=0)) == 1000
     assert 1000 < len(begun(log)) <= 1002  # again only what was under way
     check_all_solved(folder)
-
-
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
-def test_two_processes_at_once(folder, tmp_path):
-    logs = tmp_path / "log1", tmp_path / "log2"
-    both = [run_program(folder, logs[0], 0, 700), run_program(folder, logs[1], 300, 1000)]
-    assert [ended(process) for process in both] == [0, 0]
-    check_all_solved(folder)

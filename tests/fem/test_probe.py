@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.datasets import make_truss
-from skthermo.fem import AffineModel, Beam, Structure, probe
+from skthermo.fem import AffineModel, probe
 
 N = 12
 NAMES = ("E", "A", "rho")
@@ -83,27 +83,6 @@ def test_a_models_own_matrices_give_the_model_back(track):
     found = np.sort(model.frequencies(theta))
     np.testing.assert_allclose(found, truss.frequencies(theta), rtol=1e-10)
     assert model.track is track
-
-
-def test_a_structure_of_beams_is_found_again():
-    box = {"E": 37.5e9, "G": 16e9, "A": 4.4, "I_yy": 0.56, "I_zz": 17.0, "J": 1.2, "I_p": 17.56, "density": 2500.0}
-    girder = Structure(
-        {i: (2.5 * i, 0, 0) for i in range(9)},
-        {i: Beam(i, i + 1, **box) for i in range(8)},
-        {0: "xyz rx ry rz"},
-        {"root": range(4), "tip": range(4, 8)},
-    )
-    direct = girder.assemble({"I": ("I_yy", "root"), "GJ": ("J", "tip"), "m": ("mass", "tip")})
-
-    def again(row):
-        halves = [box | {"I_yy": box["I_yy"] * row[0]}, box | {"J": box["J"] * row[1]}]
-        members = {i: Beam(i, i + 1, **halves[i // 4]) for i in range(8)}
-        rebuilt = Structure({i: (2.5 * i, 0, 0) for i in range(9)}, members, {0: "xyz rx ry rz"}, {"tip": range(4, 8)})
-        return rebuilt.assemble({"m": ("mass", "tip")}).matrices(row[2:])
-
-    theta = np.random.default_rng(0).uniform(0.7, 1.3, (5, 3))
-    model = probe(again, ["I", "GJ", "m"], random_state=0)
-    np.testing.assert_allclose(model.frequencies(theta), direct.frequencies(theta), rtol=1e-8)
 
 
 def test_a_program_may_reuse_the_arrays_it_returns():

@@ -1,7 +1,6 @@
 """Identified damage: what was put in is found again."""
 
 import copy
-import re
 import warnings
 
 import numpy as np
@@ -378,25 +377,6 @@ def test_severities_are_averages_over_models(fem):
 
 
 # What is said
-
-
-def test_what_is_most_probable_what_else_could_be_and_what_is_left_open():
-    clear = {
-        "side span": (0.85, {"side span": (0.12, 0.018)}),
-        "stays + bearings": (0.09, {"stays": (0.04, 0.01), "bearings": (0.03, 0.01)}),
-        "something else": (0.05, {}),
-    }
-    found = identified(clear, alike=[("side span", "stays")])
-    said = found.summary()
-    assert "a loss of 12 % of stiffness in side span (90 % interval" in said
-    assert "probability 85 %" in said
-    assert re.search(r"stays \S+ %, bearings \S+ % \(9 %\)", said)
-    assert "something else (5 %)" in said
-    assert "which of side span and stays has changed" in said
-    assert [one.kind for one in found.warnings()] == ["indistinguishable-groups"]
-    unsure = identified(clear, misfit_p_value=0.004)
-    assert "does not explain all of the shifts (p value 0.004)" in unsure.summary()
-    assert [one.kind for one in unsure.warnings()] == ["unexplained-shifts"]
 
 
 def test_silence_is_never_healthy():

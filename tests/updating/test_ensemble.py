@@ -61,31 +61,6 @@ def test_models_drawn_from_a_reduced_model_are_those_of_the_full_one():
 
 
 @pytest.mark.nightly
-def test_moments_on_the_truss_agree_with_importance_sampling():
-    updater = calibrated(noise=0.002)
-    drawn = multipliers(updater.sample_models(200, random_state=0))
-    random, n = np.random.default_rng(1), 20000
-    wide = 1.5**2 * updater.covariance_
-    theta = random.multivariate_normal(updater.theta_, wide, n)
-    inside = (np.abs(theta - 1) < 0.7).all(axis=1)
-    theta = theta[inside]
-    from_optimum = theta - updater.theta_
-    proposal = -0.5 * np.einsum("ni,ij,nj->n", from_optimum, np.linalg.inv(wide), from_optimum)
-    misfit = ((TRUSS.frequencies(theta) / MEASURED - 1) / 0.002) ** 2
-    target = -0.5 * (misfit.sum(axis=1) + (((theta - 1) / 0.15) ** 2).sum(axis=1))
-    weights = np.exp(target - proposal - (target - proposal).max())
-    weights /= weights.sum()
-    effective = 1 / (weights**2).sum()
-    mean = weights @ theta
-    deviations = np.sqrt(weights @ (theta - mean) ** 2)
-    print(f"{n} weighted draws, {effective:.0f} effective; means {mean.round(4)}, deviations {deviations.round(4)}")
-    print(f"models drawn: means {drawn.mean(axis=0).round(4)}, deviations {drawn.std(axis=0).round(4)}")
-    assert effective > 2000
-    assert np.abs((drawn.mean(axis=0) - mean) / deviations).max() < 0.25
-    np.testing.assert_allclose(drawn.std(axis=0) / deviations, 1, atol=0.15)
-
-
-@pytest.mark.nightly
 def test_what_frequencies_do_not_determine_stays_as_wide_as_the_prior_and_the_rest_as_measured():
     models = calibrated(noise=0.005).sample_models(150, random_state=0)
     scatter = multipliers(models).std(axis=0)
@@ -154,18 +129,6 @@ def test_same_seed_same_models_whatever_the_number_of_jobs():
     ]
     np.testing.assert_array_equal(found[0], found[1])
     assert not np.allclose(found[0], found[2], rtol=1e-4)
-
-
-@pytest.mark.nightly
-def test_shapes_make_models_alike_as_far_as_their_noise_allows():
-    dofs, noise = np.arange(0, 22, 2), 0.01
-    frequencies, shapes = (values[0] for values in TRUSS.modes([TRUTH]))
-    weight = np.sqrt(2 * (len(dofs) - 1)) / noise**2
-    updater = ModelUpdater(TRUSS, bounds=0.9, prior=0.15, shape_weight=weight)
-    updater.fit(frequencies, shapes=shapes[dofs], dofs=dofs, frequency_std=0.005 * frequencies)
-    scatter = multipliers(updater.sample_models(100, random_state=0)).std(axis=0)
-    np.testing.assert_allclose(scatter / np.sqrt(np.diag(updater.covariance_)), 1, atol=0.25)
-    assert scatter[NAMES.index("vertical")] < 0.05
 
 
 def test_each_warning_counts_the_models():

@@ -56,22 +56,6 @@ def test_an_optimum_without_modes_is_not_reached_and_said_to_be_so(method):
     ModelUpdater(TRUSS, method=method).fit(TRUSS.frequencies([OUTSIDE]))
 
 
-def test_a_start_without_derivatives_ends_where_it_is():
-    nominal = TRUSS.frequencies(np.ones((1, 4)))
-
-    def only_nominal(theta):
-        return np.where((theta == 1).all(axis=1, keepdims=True), nominal, np.nan)
-
-    model = CallableModel(only_nominal, TRUSS.parameter_names, 6, vectorized=True)
-    for method in METHODS:
-        updater = ModelUpdater(model, method=method, n_starts=2, random_state=0)
-        with pytest.warns(UserWarning, match="not-converged"):
-            updater.fit(TRUSS.frequencies([INSIDE]))
-        np.testing.assert_array_equal(updater.theta_, 1)
-        assert not updater.starts_["success"].any()
-        assert np.isnan(updater.covariance_).all()
-
-
 def test_differences_are_one_sided_beside_theta_without_modes():
     theta = [0.9501, 1.0, 1.0, 1.0]
     with pytest.warns(UserWarning, match="no-solution"):
