@@ -112,7 +112,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("updating/_residuals.py", "updating/test_ensemble.py"): [
         ("models that are all the most probable one", "* self.values - residuals.noise", "* self.values"),
     ],
-    ("updating/_ensemble.py", "updating/test_ensemble.py"): [
+    ("updating/_updater.py", "updating/test_ensemble.py"): [
         ("stiffness that a parameter scales drawn twice", "if terms <= own)) == own", "if terms < own)) == own"),
     ],
     ("updating/_residuals.py", "updating/test_updater_errors.py"): [
@@ -233,7 +233,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("parts of calibrated terms", "(self.stiffness.factors[origin])", "(np.ones(len(origin)))"),
     ],
     ("studies/identification/_evidence.py", "studies/test_identify.py"): [
-        ("probability of the bounds", "logs = logs + inside", "logs = logs + 0 * inside"),
+        ("probability of the bounds", "logs = logs + logsumexp(", "logs = logs + 0 * logsumexp("),
         ("exact effects of several causes", "self.rotation\n        added", "0 * self.rotation\n        added"),
     ],
     ("studies/detectability/_simulation.py", "studies/test_study.py"): [

@@ -5,7 +5,7 @@ import pandas as pd
 
 from skthermo.studies import IdentifiedDamage
 from skthermo.studies.identification._causes import Cause
-from skthermo.studies.identification._evidence import Explanation
+from skthermo.studies.identification._evidence import DamageExplanation
 from skthermo.studies.identification._identify import tabulated
 
 
@@ -15,7 +15,7 @@ def identified(explanations, *, groups=None, unobservable=(), alike=(), **change
     names = list(groups or dict.fromkeys(name for _, amounts in explanations.values() for name in amounts))
     causes = {name: Cause(name, of=(name,), rows=(name,), group=name) for name in names}
     explained = [
-        Explanation(
+        DamageExplanation(
             tuple(causes[group] for group in amounts),
             name.endswith("something else"),
             probability,

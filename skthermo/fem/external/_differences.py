@@ -14,12 +14,11 @@ from skthermo._core.arrays import Array, MatrixLike, RandomState, as_random_stat
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._factors import factorise
-from skthermo.fem._terms import by_name, check_different, failures_named, read_matrix, read_terms
+from skthermo.fem._terms import Key, by_name, check_different, failures_named, read_matrix, read_terms
 from skthermo.fem.affine import AffineModel
 
-Key = tuple[str, ...]
-Terms = dict[Key, scipy.sparse.csc_array]
-Pairs = list[tuple[Key, scipy.sparse.csc_array]]
+ParameterTerms = dict[Key, scipy.sparse.csc_array]
+TermPairs = list[tuple[Key, scipy.sparse.csc_array]]
 
 SAME_ENTRIES = 1e-6  # largest difference, relative to the diagonal, of entries that count as the same
 
@@ -32,10 +31,10 @@ def relative(entries: scipy.sparse.coo_array, diagonal: Array) -> Array:
 
 def split(
     base: scipy.sparse.csc_array, changed: Mapping[str, scipy.sparse.csc_array], factors: Mapping[str, float]
-) -> Terms:
+) -> ParameterTerms:
     """The term of each parameter that changes the matrix when it is multiplied, and the constant part that remains."""
     diagonal, rounding = base.diagonal(), 16 * np.finfo(float).eps * (len(changed) + 1)
-    terms: Terms = {
+    terms: ParameterTerms = {
         (name,): _without(rounding, matrix - base, diagonal) / (factors[name] - 1) for name, matrix in changed.items()
     }
     terms[()] = _without(rounding, base - reduce(add, terms.values()), diagonal)
@@ -130,7 +129,7 @@ def read_differences(
     changed: Mapping[str, MatrixLike],
     factor: float | Mapping[str, float],
     check: tuple[Mapping[str, float], MatrixLike] | None = None,
-) -> tuple[Terms, list[str]]:
+) -> tuple[ParameterTerms, list[str]]:
     """The terms of `difference_terms`, and doubts about the factors."""
     if not isinstance(changed, Mapping) or not changed:
         raise ValueError(f"changed is {changed!r:.200}; expected a mapping of parameters to stiffness matrices")
@@ -179,7 +178,7 @@ def _is_nonnegative(matrix: scipy.sparse.csc_array, base: scipy.sparse.csc_array
     return factorise(scipy.sparse.csc_array(scaled + SAME_ENTRIES * scipy.sparse.eye_array(len(rows)))) is not None
 
 
-def _check_rest(base: scipy.sparse.csc_array, terms: Terms, factors: Mapping[str, float]) -> None:
+def _check_rest(base: scipy.sparse.csc_array, terms: ParameterTerms, factors: Mapping[str, float]) -> None:
     """Refuse terms that are together more than the whole."""
     rest, parts = terms[()], {key[0]: term for key, term in terms.items() if key}
     if _is_nonnegative(rest, base):
@@ -200,7 +199,7 @@ def _check_rest(base: scipy.sparse.csc_array, terms: Terms, factors: Mapping[str
     )
 
 
-def _doubtful_factors(terms: Terms, factors: Mapping[str, float]) -> list[str]:
+def _doubtful_factors(terms: ParameterTerms, factors: Mapping[str, float]) -> list[str]:
     """Sentences about terms that seem to be less than their part of the whole."""
     doubts: list[str] = []
     rest, parts = terms.get(()), {key[0]: term for key, term in terms.items() if key}
@@ -225,7 +224,9 @@ def _doubtful_factors(terms: Terms, factors: Mapping[str, float]) -> list[str]:
     return doubts
 
 
-def _check_sum(base: scipy.sparse.csc_array, terms: Terms, check: tuple[Mapping[str, float], MatrixLike]) -> None:
+def _check_sum(
+    base: scipy.sparse.csc_array, terms: ParameterTerms, check: tuple[Mapping[str, float], MatrixLike]
+) -> None:
     """Refuse terms that do not give the stiffness at other multipliers."""
     if not isinstance(check, tuple | list) or len(check) != 2 or not isinstance(check[0], Mapping):
         raise ValueError(f"check is {check!r:.200}; expected (multipliers by parameter, stiffness at these)")
@@ -273,7 +274,7 @@ class Program:
         return matrices
 
 
-def check_affine(program: Program, terms: tuple[Pairs, Pairs], row: Array) -> None:
+def check_affine(program: Program, terms: tuple[TermPairs, TermPairs], row: Array) -> None:
     """Raise an error if the matrices of a program at a row of multipliers are not the sum of its terms."""
     if _difference(program, terms, row) is None:
         return
@@ -291,7 +292,7 @@ def check_affine(program: Program, terms: tuple[Pairs, Pairs], row: Array) -> No
         raise ValueError(f"the program is not affine: {name!r} acts together with two or more of {list(names[:j])}")
 
 
-def _difference(program: Program, terms: tuple[Pairs, Pairs], row: Array) -> tuple[str, float] | None:
+def _difference(program: Program, terms: tuple[TermPairs, TermPairs], row: Array) -> tuple[str, float] | None:
     """Which matrix of a program differs from the affine one, and by which share of the diagonal."""
     theta = by_name(row, program.parameter_names)
     for what, matrix, pairs in zip(("stiffness", "mass"), program(row), terms, strict=True):

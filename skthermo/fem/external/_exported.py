@@ -14,8 +14,9 @@ import scipy.sparse
 
 from skthermo._core.arrays import Matrix, check_names, check_path
 from skthermo._core.warnings import warn_each
+from skthermo.fem._terms import Key
 from skthermo.fem.affine import AffineModel
-from skthermo.fem.external._differences import SAME_ENTRIES, Pairs, doubtful_matrices, read_differences, relative
+from skthermo.fem.external._differences import SAME_ENTRIES, TermPairs, doubtful_matrices, read_differences, relative
 from skthermo.fem.external._files import MASS_OF, read_file, read_named_matrices
 from skthermo.fem.external._texts import Labelled
 
@@ -76,7 +77,6 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     return matrix
 
 
-Key = tuple[str, ...]
 Total = str | Literal[False] | None
 
 MASS_NAMES = ("m", "m0", "mass", "maax", "maa", "mgg")
@@ -220,7 +220,7 @@ def _roles(
     mass: str | None,
     total: Total,
     factor: float | Mapping[str, float] | None,
-) -> tuple[Pairs, Matrix, list[str]]:
+) -> tuple[TermPairs, Matrix, list[str]]:
     """Stiffness terms, mass, and doubts about the roles of matrices that nobody has named."""
     mass = mass or exports.mass_name()
     mass_matrix = exports.matrix(mass)

@@ -16,7 +16,7 @@ from skthermo.fem import Structure
 from skthermo.fem.damage import ALL_GROUPS, read_groups
 
 SOMETHING_ELSE, NO_DAMAGE = "something else", "no damage"
-Line = list[Hashable]
+MemberLine = list[Hashable]
 
 
 @dataclass(frozen=True)
@@ -178,13 +178,13 @@ def changed(model: Any, theta: Array, causes: Sequence[Cause], amounts: Sequence
     return (model.damaged({name: float(1 - by) for name, by in factors.items()}) if factors else model), theta
 
 
-def members_of(model: Any, names: Sequence[str]) -> Line:
+def members_of(model: Any, names: Sequence[str]) -> MemberLine:
     """Members of a structure whose stiffness some damage groups of a model scale."""
     positions = dict.fromkeys(position for name in names for position in model.groups[name])
     return list(dict.fromkeys(member for position in positions for member, _ in model.contents[position]))
 
 
-def lines_of(structure: Structure, members: Sequence[Hashable]) -> list[Line]:
+def lines_of(structure: Structure, members: Sequence[Hashable]) -> list[MemberLine]:
     """Members that common nodes connect, line by line, each from its end of lower coordinates.
 
     Members that no other one touches, such as stays or bearings, are one line together; so are all members where
@@ -223,7 +223,7 @@ def _by_place(line: Array, middles: Array) -> list[int]:
     return line[np.lexsort(middles[line][:, axes].round(9).T)].tolist()
 
 
-def pieces_of(lines: Sequence[Line], most: int = 24) -> list[list[Line]]:
+def pieces_of(lines: Sequence[MemberLine], most: int = 24) -> list[list[MemberLine]]:
     """Pieces of lines, about so many in all, each of members that follow each other."""
     size, found = -(-sum(map(len, lines)) // most), []
     for line in lines:
@@ -244,7 +244,12 @@ def place_of(structure: Structure, members: Sequence[Hashable], group: Sequence[
 
 
 def stretches(
-    structure: Structure, cause: Cause, lines: Sequence[Sequence[Line]], names: Sequence[str], *, whole: float = 0.25
+    structure: Structure,
+    cause: Cause,
+    lines: Sequence[Sequence[MemberLine]],
+    names: Sequence[str],
+    *,
+    whole: float = 0.25,
 ) -> list[Cause]:
     """The whole group, and each run of pieces of its lines, which have these names in the divided model, as causes.
 

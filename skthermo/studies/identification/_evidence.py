@@ -13,13 +13,13 @@ from scipy.special import log_ndtr, logsumexp, ndtr, ndtri_exp
 
 from skthermo._core.arrays import Array
 from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior
-from skthermo.studies.identification._measured import Observed
+from skthermo.studies.identification._measured import ObservedChange
 
-N_DRAWS = 500
+DRAWS_EACH = 500
 
 
 @dataclass(frozen=True)
-class Explanation:
+class DamageExplanation:
     """Causes that explain the changes: their probability, and draws of their amounts, (n_draws, n_causes).
 
     ``change``, (n_observed,), is what the most probable amounts explain, and ``misfit`` the sum of squares of the rest
@@ -59,7 +59,7 @@ class Weight:
     change: Array
 
 
-def effects_of(observed: Observed, causes: Sequence[Cause], n_solved: int = 9) -> Array:
+def effects_of(observed: ObservedChange, causes: Sequence[Cause], n_solved: int = 9) -> Array:
     """Changes by each cause alone, (n_solved, n_causes, n_observed), at shares of its bound on a logarithmic scale."""
     ends = np.linspace(0, 1, n_solved)[1:] ** 2  # small amounts are usual
     found = np.zeros((n_solved, len(causes), len(observed.change)))
@@ -77,7 +77,7 @@ class Evidence:
     """
 
     def __init__(
-        self, observed: Observed, causes: Sequence[Cause], effects: Array, prior: DamagePrior, freedom: float
+        self, observed: ObservedChange, causes: Sequence[Cause], effects: Array, prior: DamagePrior, freedom: float
     ) -> None:
         self.observed, self.causes, self.prior, self.freedom = observed, causes, prior, freedom
         error = np.diag((prior.model_error * observed.change) ** 2)
@@ -103,7 +103,7 @@ class Evidence:
         self.deviations, self.lowest, self.highest = widths, np.minimum(ends, 0), np.maximum(ends, 0)
         self.directions = directions
 
-    def explanations(self, random: np.random.RandomState) -> list[Explanation]:
+    def explanations(self, random: np.random.RandomState) -> list[DamageExplanation]:
         """All sets of up to three causes and what remains of them, the most probable first."""
         weights = self._screened()
         for _ in range(2):  # effects of several causes together are not quite their sum
@@ -192,19 +192,19 @@ class Evidence:
 
     def _explanation(
         self, weight: Weight, errors: Array, probability: float, random: np.random.RandomState
-    ) -> Explanation:
+    ) -> DamageExplanation:
         """One set of causes, with or without something else."""
         logs, columns = weight.logs[errors], list(weight.causes)
-        chosen = errors[random.choice(len(errors), size=4 * N_DRAWS, p=np.exp(logs - logsumexp(logs)))]
+        chosen = errors[random.choice(len(errors), size=4 * DRAWS_EACH, p=np.exp(logs - logsumexp(logs)))]
         lowest, highest = self.lowest[columns], self.highest[columns]
-        uniform = random.uniform(size=(len(columns), 4 * N_DRAWS, 1))
+        uniform = random.uniform(size=(len(columns), 4 * DRAWS_EACH, 1))
         draws, shares = truncated(weight.means[chosen], weight.covariances[chosen], lowest, highest, uniform)
         shares = np.exp(shares[:, 0] - shares.max())
-        draws = draws[random.choice(4 * N_DRAWS, size=N_DRAWS, p=shares / shares.sum()), :, 0]
+        draws = draws[random.choice(4 * DRAWS_EACH, size=DRAWS_EACH, p=shares / shares.sum()), :, 0]
         # an error of the effects by the same factor in all modes shows in no misfit
-        factors = np.exp(self.prior.model_error * random.standard_normal((N_DRAWS, 1)))
+        factors = np.exp(self.prior.model_error * random.standard_normal((DRAWS_EACH, 1)))
         likely = errors[logs.argmax()]
-        return Explanation(
+        return DamageExplanation(
             tuple(self.causes[place] for place in columns),
             bool(errors[0]),
             probability,
@@ -236,16 +236,16 @@ def truncated(mean: Array, covariance: Array, lowest: Array, highest: Array, uni
     return mean[..., np.newaxis] + roots @ draws, logs
 
 
-def averaged(each: Sequence[Sequence[Explanation]]) -> list[Explanation]:
+def averaged(each: Sequence[Sequence[DamageExplanation]]) -> list[DamageExplanation]:
     """The explanations of models that are equally probable, each with the draws of all of them."""
-    by_name: dict[str, list[Explanation]] = {}
+    by_name: dict[str, list[DamageExplanation]] = {}
     for one in (one for explained in each for one in explained):
         by_name.setdefault(one.name, []).append(one)
     found = []
     for some in by_name.values():
         weights = np.array([one.probability for one in some])
         shares = weights / weights.sum()
-        draws = [one.draws[: int(np.ceil(N_DRAWS * share))] for one, share in zip(some, shares, strict=True)]
+        draws = [one.draws[: int(np.ceil(DRAWS_EACH * share))] for one, share in zip(some, shares, strict=True)]
         change, misfit = shares @ [one.change for one in some], shares @ [one.misfit for one in some]
         probability = float(weights.sum()) / len(each)
         averages = {"probability": probability, "change": change, "misfit": float(misfit)}

@@ -32,7 +32,7 @@ from skthermo.studies.identification._causes import (
     read_causes,
     stretches,
 )
-from skthermo.studies.identification._evidence import N_DRAWS, Evidence, Explanation, averaged, effects_of
+from skthermo.studies.identification._evidence import DRAWS_EACH, DamageExplanation, Evidence, averaged, effects_of
 from skthermo.studies.identification._measured import FrequencyShift, measured_shift, observed
 from skthermo.surrogate import refitted
 
@@ -178,7 +178,7 @@ def identify_damage(
         whole = evidence.explanations(random)
     else:
 
-        def with_model(model: Any, seed: int) -> list[Explanation]:
+        def with_model(model: Any, seed: int) -> list[DamageExplanation]:
             with collected():  # as those of the chain itself
                 chain = refitted(fem, model=model)
                 seen = observed(chain, model, measured_shift(chain, T, F, noise), **measured)
@@ -237,7 +237,7 @@ def _errors(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def _located(
     evidence: Evidence,
-    whole: Sequence[Explanation],
+    whole: Sequence[DamageExplanation],
     shift: FrequencyShift,
     structure: Structure,
     fem: Any,
@@ -291,7 +291,7 @@ def _p_value(misfit: float, n_free: int, shift: FrequencyShift) -> float:
     return float(stats.f.sf(misfit / n_free, n_free, shift.freedom)) if n_free > 0 else float("nan")
 
 
-def _shifts(shift: FrequencyShift, explained: Sequence[Explanation], names: Sequence[Any]) -> pd.DataFrame:
+def _shifts(shift: FrequencyShift, explained: Sequence[DamageExplanation], names: Sequence[Any]) -> pd.DataFrame:
     known, values = ~np.isnan(shift.mean), np.full(len(shift.mean), np.nan)
     shares = np.array([one.probability for one in explained])
     values[known] = (shares @ np.array([one.change for one in explained]) / shares.sum())[: known.sum()]
@@ -305,7 +305,7 @@ def _shifts(shift: FrequencyShift, explained: Sequence[Explanation], names: Sequ
     return pd.DataFrame(columns, list(names))
 
 
-def _severities(one: Explanation, amounts: Array) -> dict[str, float]:
+def _severities(one: DamageExplanation, amounts: Array) -> dict[str, float]:
     """Severities of the model's groups by the amounts of an explanation's causes."""
     factors: dict[str, float] = {}
     for cause, amount in zip(one.causes, amounts, strict=True):
@@ -314,17 +314,19 @@ def _severities(one: Explanation, amounts: Array) -> dict[str, float]:
     return {name: float(1 - factor) for name, factor in factors.items()}
 
 
-def _drawn(explained: Sequence[Explanation], causes: Sequence[Cause], random: np.random.RandomState) -> pd.DataFrame:
+def _drawn(
+    explained: Sequence[DamageExplanation], causes: Sequence[Cause], random: np.random.RandomState
+) -> pd.DataFrame:
     """Severities of the model's groups, of explanations by their probability."""
     groups = dict.fromkeys(name for cause in causes if cause.direction < 0 for name in cause.of)
     probable = np.array([one.probability for one in explained])
-    chosen = random.choice(len(probable), size=N_DRAWS, p=probable / probable.sum())
-    some = [(explained[place], random.randint(N_DRAWS)) for place in chosen]
+    chosen = random.choice(len(probable), size=DRAWS_EACH, p=probable / probable.sum())
+    some = [(explained[place], random.randint(DRAWS_EACH)) for place in chosen]
     rows = [_severities(one, one.draws[number % len(one.draws)]) for one, number in some]
     return pd.DataFrame(rows, columns=list(groups)).fillna(0.0)
 
 
-def tabulated(explained: Sequence[Explanation], rows: Sequence[Hashable]) -> pd.DataFrame:
+def tabulated(explained: Sequence[DamageExplanation], rows: Sequence[Hashable]) -> pd.DataFrame:
     """Probability that each row, a cause or a member, has changed, and by how much on average."""
     found = []
     for row in rows:
@@ -356,7 +358,7 @@ def averages(values: Array, weights: Array) -> dict[str, float]:
     return {"severity": mean, "standard_error": deviation, "ci_low": float(low), "ci_high": float(high)}
 
 
-def _fewest(explained: Sequence[Explanation], groups: Collection[str], probability: float) -> list[Hashable]:
+def _fewest(explained: Sequence[DamageExplanation], groups: Collection[str], probability: float) -> list[Hashable]:
     """Rows of a table that hold all changed ones of some groups, those added first that hold most for their number."""
     sets = [
         (one.probability, rows)
@@ -440,7 +442,7 @@ class IdentifiedDamage(Sentences):
     misfit_p_value: float
     similarity: pd.DataFrame = field(repr=False)
     records: pd.Series = field(repr=False)
-    explained: Sequence[Explanation] = field(repr=False)
+    explained: Sequence[DamageExplanation] = field(repr=False)
 
     @cached_property
     def explanations(self) -> pd.DataFrame:
@@ -474,7 +476,7 @@ class IdentifiedDamage(Sentences):
         return pd.DataFrame(list(amounts.values()), index, list(averages(np.zeros(0), np.zeros(0))))
 
     @property
-    def _listed(self) -> Sequence[Explanation]:
+    def _listed(self) -> Sequence[DamageExplanation]:
         """Explanations with a probability of .1 % or more, or the most probable one."""
         return [one for one in self.explained if one.probability >= 1e-3] or self.explained[:1]
 

@@ -182,7 +182,7 @@ def _checked(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True)
-class Observed:
+class ObservedChange:
     """Measured changes of what is observed, (n_observed,), the covariance of their errors, and the model's response."""
 
     change: Array
@@ -191,7 +191,7 @@ class Observed:
     findings: list[SkthermoWarning]
 
 
-def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any, shape_noise: Any) -> Observed:
+def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any, shape_noise: Any) -> ObservedChange:
     """Shifts of the measured frequencies, and of mode shapes if there are any; ``model`` may be a divided one."""
     known = ~np.isnan(shift.mean)
     model = getattr(model, "full", model)
@@ -202,7 +202,7 @@ def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any
 
     before, covariance = frequencies([], []), shift.covariance[np.ix_(known, known)]
     if shapes is None:
-        return Observed(shift.mean[known], covariance, lambda *change: frequencies(*change) - before, [])
+        return ObservedChange(shift.mean[known], covariance, lambda *change: frequencies(*change) - before, [])
     compared, change, variances, findings = _shape_changes(
         model, shift.theta, shapes, dofs, shape_noise, fem.mode_names_
     )
@@ -213,7 +213,7 @@ def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any
         return np.append(frequencies(causes, amounts) - before, components)
 
     everything = block_diag(covariance, np.diag(variances))
-    return Observed(np.append(shift.mean[known], change), everything, both, findings)
+    return ObservedChange(np.append(shift.mean[known], change), everything, both, findings)
 
 
 @dataclass(frozen=True)
