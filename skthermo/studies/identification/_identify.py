@@ -198,7 +198,9 @@ def identify_damage(
     n_observed, best = len(seen.change), explained[0]
     by_group = tabulated(explained, errors.index).join(errors)
     found = IdentifiedDamage(
-        table=by_group if structure is None else tabulated(explained, members.index).join(members),
+        table=by_group
+        if structure is None
+        else tabulated(explained, members.index).join(members).rename_axis("member"),
         groups=by_group,
         shifts=_shifts(shift, explained, fem.mode_names_),
         draws=draws,
