@@ -300,7 +300,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("reporting/_study.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
     ],
-    ("plotting/_structures.py", "plotting/test_structures.py"): [
+    ("plotting/_structure_display.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
     ("monitoring/_files.py", "monitoring/test_files.py"): [

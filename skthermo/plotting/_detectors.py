@@ -39,7 +39,7 @@ OF_RANKING += ["within_limit", "pod_at_equal_pfa", "significantly_worse"]
 OF_CAUSES = ["probability", "severity", "ci_low", "ci_high"]
 OF_SHIFTS = ["measured", "explained", "standard_error"]
 BEST, ONE_REPEAT = "not significantly worse", "order uncertain: one repeat"
-WORSE, FAILED = "significantly lower POD", "failed"
+WORSE, BROKEN = "significantly lower POD", "failed"
 
 RATES = ["low", "high", "value", "mark"]
 
@@ -311,8 +311,8 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
     loud = f"more than {percent(limit)} false alarms"
     is_tested = np.isfinite(ranking["false_alarms"].astype(float))
     kinds = ranking["significantly_worse"].astype(bool).map({True: WORSE, False: level})
-    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, FAILED)
-    kinds = kinds.sort_values(key=lambda names: names.map([level, WORSE, loud, FAILED].index), kind="stable")
+    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, BROKEN)
+    kinds = kinds.sort_values(key=lambda names: names.map([level, WORSE, loud, BROKEN].index), kind="stable")
     tested = ranking[is_tested]
 
     def rates(name: str, mark: pd.Series | None = None) -> pd.DataFrame:

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import PolyCollection
     from matplotlib.lines import Line2D
 
-KINDS = ("time", "points", "lines", "scatter")
-
 
 @dataclass(eq=False, repr=False)
 class PredictionDisplay(Display):
@@ -282,8 +280,8 @@ class PredictionDisplay(Display):
         ValueError
             If ``kind`` is something else, or a mark is not on the axis.
         """
-        if kind not in KINDS:
-            raise ValueError(f"kind is {kind!r}; expected one of {KINDS}")
+        if kind not in (kinds := ("time", "points", "lines", "scatter")):
+            raise ValueError(f"kind is {kind!r}; expected one of {kinds}")
         columns = list(self.measured.columns)
         if titles is not None and len(titles) != len(columns):
             raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {columns}")
