@@ -165,8 +165,8 @@ def _parser() -> Parser:
         one.add_argument("--verbose", action="store_true", help="say more on stderr")
         return one
 
-    _on_records(add("check", "look at files of records, and say what was found", _check))
-    init = add("init", "look at files of records, and write settings that fit them", _init)
+    _on_records(add("check", "look at files of records, and say what was found", _look))
+    init = add("init", "look at files of records, and write settings that fit them", _look)
     _on_records(init)
     init.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
     init.add_argument("--name", dest="bridge", help="of the bridge (default: that of the folder)")
@@ -334,27 +334,20 @@ def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> in
     return code if code == ALARM else FAILED
 
 
-def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+def _look(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+    """Say what files of records hold and, of init, write settings that fit them."""
     from skthermo.commands._proposal import Proposal  # for jobs that look at files
 
     found = Proposal.found(options)
     facts["findings"] = found.findings.table.to_dict("records")
+    lines = [*found.account(), found.findings.summary()]
+    if options.name == "init":
+        file = found.write(options.into, options.bridge)
+        facts["settings"] = str(file)
+        lines += [f"chosen: {found.detectors[0]}", f"written: {file}", f"read it, then: skthermo fit {file}"]
     if not options.json:
-        _print("\n".join([*found.account(), found.findings.summary()]))
-    return HEALTHY if found.findings.table.empty else ALARM
-
-
-def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    from skthermo.commands._proposal import Proposal
-
-    found = Proposal.found(options)
-    file = found.write(options.into, options.bridge)
-    facts["findings"], facts["settings"] = found.findings.table.to_dict("records"), str(file)
-    if not options.json:
-        chosen = [f"chosen: {found.detectors[0]}", f"written: {file}"]
-        _print("\n".join([*found.account(), found.findings.summary(), *chosen]))
-        _print(f"read it, then: skthermo fit {file}")
-    return HEALTHY
+        _print("\n".join(lines))
+    return HEALTHY if options.name == "init" or found.findings.table.empty else ALARM
 
 
 def write_metrics(file: Path, bridges: Sequence[Mapping[str, Any]], now: pd.Timestamp) -> None:

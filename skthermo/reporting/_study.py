@@ -393,11 +393,11 @@ def _sensors(T: pd.DataFrame) -> list[Row]:
     for sensor, found in columns.items():
         first = min(found)[1]
         n_lags = sum(lag > 0 for lag, _ in found) if len(found) > 1 else 0
-        rows.append({**_range(sensor if n_lags else first, T[first]), "n_lags": n_lags})
+        rows.append(_range(sensor if n_lags else first, T[first], n_lags))
     return rows
 
 
-def _range(name: object, values: pd.Series) -> Row:
+def _range(name: object, values: pd.Series, n_lags: int = 0) -> Row:
     """Lowest, mean and highest value, and the share that is missing."""
     return {
         "name": name,
@@ -405,4 +405,5 @@ def _range(name: object, values: pd.Series) -> Row:
         "mean": values.mean(),
         "highest": values.max(),
         "missing": values.isna().mean(),
+        "n_lags": n_lags,
     }

@@ -338,7 +338,7 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
     notes = part_of(FakeMonitor(faults=faults, events=seen), "events").text
     assert notes.count("failed at that time") == notes.count("cold; T1 failed at that time") == 1
     assert "All sensors work." in part_of(FakeMonitor(faults=faults[1:2]), "sensors").text
-    assert "Sensors are not watched." in today_of(FakeMonitor(sensors=False)).text
+    assert "Sensors are not watched." in part_of(FakeMonitor(sensors=False), "sensors").text
 
 
 def test_damage_events_are_counted_beside_the_false_alarms_that_were_to_be_expected():
