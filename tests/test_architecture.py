@@ -45,6 +45,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "preprocessing.loggers": set(),
     "commands": {"preprocessing.loggers"},
     "surrogate": {"fem.affine", "preprocessing.checks"},  # polynomials of ln f, periods of records
+    "detection": {"preprocessing.checks"},  # misplaced columns
     "monitoring": {"preprocessing.checks"},
     "monitoring.fleet": set(),
     "reporting": {"reporting.fleet", "reporting.service"},

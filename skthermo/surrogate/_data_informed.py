@@ -54,8 +54,9 @@ from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, check_records
+from skthermo.preprocessing.checks import misplaced_columns
 from skthermo.residuals.sensors import SensorRegression
-from skthermo.residuals.weather import TrainingRange, misplaced_columns
+from skthermo.residuals.weather import TrainingRange
 from skthermo.surrogate._fit_report import few_rows, report_of
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._posterior import PosteriorInverse, ShapeInputs
