@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from numbers import Integral, Real
 from typing import Any, Literal, overload
 
@@ -729,7 +730,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
             raise ValueError(f"X has {found} columns; expected the {model.n_modes} modes of {model!r}{more}")
         self.parameter_names_, self.n_parameters_ = names, len(names)
         inputs, first = self._read(X), self._first(getattr(X, "columns", None))
-        self._check_different(inputs[:, : model.n_modes], column_names(X, "f"))
+        self._check_different(inputs[:, : model.n_modes], column_names(X, "f")[: model.n_modes])
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
@@ -858,14 +859,12 @@ class PosteriorInverse(FrequencyInverse, Estimator):
 
     def _check_different(self, frequencies: Array, names: Sequence[Any]) -> None:
         """Refuse a mode that is there twice: all its records would count twice."""
-        if len(frequencies) < 2:
-            return
-        _, first, which = np.unique(np.nan_to_num(frequencies), axis=1, return_index=True, return_inverse=True)
-        for column, kind in enumerate(which):
-            if first[kind] != column and not np.isnan(frequencies[:, column]).all():
+        for one, other in combinations(range(len(names)) if len(frequencies) > 1 else (), 2):
+            values = frequencies[:, one]
+            if np.array_equal(values, frequencies[:, other], equal_nan=True) and not np.isnan(values).all():
                 raise ValueError(
-                    f"{names[column]!r} has the values of {names[first[kind]]!r} in all {len(frequencies)} rows; "
-                    "expected each mode once"
+                    f"{names[other]!r} has the values of {names[one]!r} in all {len(values)} rows; expected each mode "
+                    "once"
                 )
 
 
