@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import KFold, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
@@ -211,15 +210,6 @@ class TestWarningsOfFit:
         assert not caught(fem.fit, z24.temperatures[healthy], z24.frequencies[healthy])
         assert fem.report_.rows.trained > 2500
 
-    @pytest.mark.nightly
-    def test_one_warning_for_all_folds(self):
-        estimator, records = chain(mapper=TemperatureMapper(Ridge())), (T[::3], 1.5 * F[::3])
-        record = caught(lambda: cross_val_score(estimator, *records, cv=KFold(3)))
-        assert sum(warning.message.kind == "uncalibrated-model" for warning in record) == 1
-        again = caught(lambda: cross_val_score(estimator, *records, cv=KFold(3)))
-        assert len(again) == len(record)
-        assert {warning.filename for warning in record} == {__file__}
-
 
 class TestForeignWeather:
     @pytest.mark.parametrize(
@@ -251,15 +241,6 @@ class TestForeignWeather:
         np.testing.assert_allclose([table["T1_lag0"].iloc[5], table["T1_lag2"].iloc[7]], 1)
         assert table["T2_lag0"].isna().tolist() == [row == 9 for row in range(365)]
         assert table.index.equals(weather.index)
-
-    @pytest.mark.parametrize("extreme", [-60.0, 90.0])
-    def test_the_default_mapper_stays_sane_fifty_degrees_beyond(self, fitted, extreme):
-        """Its network is piecewise linear in the temperatures and learns ln theta, so theta stays positive."""
-        theta = fitted.extrapolation_distance(LATER)  # fitted
-        with pytest.warns(UserWarning, match="outside-training-weather"):
-            theta = fitted.predict_parameters(pd.DataFrame(np.full((1, 3), extreme), columns=T.columns))
-        assert theta.to_numpy().min() > 0.3
-        assert theta.to_numpy().max() < 3
 
 
 class TestReduced:

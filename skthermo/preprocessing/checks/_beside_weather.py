@@ -10,10 +10,10 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
-from skthermo._core.arrays import NORMAL, Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
+from skthermo._core.arrays import Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
 from skthermo._core.frames import Table, column_names, columns_by_sensor
 from skthermo.exceptions import RecordsWarning
-from skthermo.preprocessing._weather_lines import WeatherLines, predicted_by_weather
+from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, predicted_by_weather
 from skthermo.preprocessing.checks._columns import Reading
 from skthermo.preprocessing.checks._record_findings import period_of
 from skthermo.preprocessing.folds import BlockedKFold
@@ -97,12 +97,12 @@ def find_outliers(F: Reading, values: Array, lines: Array | None, folds: Rows | 
             has_weather, floor = ~np.isnan(lines).any(axis=1)[:, np.newaxis], 0.1 * deviation
             rest = values - np.where(has_weather, predicted_by_weather(lines, values, folds), middle)
             scatter = np.fmax(robust_deviation(rest), floor)
-            some = spread_evenly(np.arange(len(rest)), 4000)
-            usual = np.fmax(robust_deviation(beside_neighbours(rest, some)[0]), floor)
             far = (np.abs(rest - median(rest)) > 8 * scatter) & (scatter > 0) & (has_weather | far)
-            rows = np.flatnonzero(far.any(axis=1))
-            distances, local = beside_neighbours(rest, rows)
-            far[rows] &= np.abs(distances) > 8 * np.fmax(local, usual)
+            doubtful = np.flatnonzero(far.any(axis=0))
+            if doubtful.size:
+                distances, local = distances_from_neighbours(rest[:, doubtful], np.arange(len(rest)), 25)
+                usual = np.fmax(robust_deviation(distances), floor[doubtful])
+                far[:, doubtful] &= np.abs(distances) > 8 * np.fmax(local, usual)
     for place in np.flatnonzero(far.any(axis=0)):
         first, name = np.flatnonzero(far[:, place])[:1], F.columns[place]
         n_known = np.count_nonzero(~np.isnan(values[:, place]))
@@ -112,18 +112,6 @@ def find_outliers(F: Reading, values: Array, lines: Array | None, folds: Rows | 
         )
         F.found("frequency-outliers", name, far[:, place], detail, period=False)
     return far
-
-
-def beside_neighbours(values: Array, rows: Rows) -> tuple[Array, Array]:
-    """Distances of some rows from the median of the 25 rows around, and the standard deviation of these rows, by the
-    median of their distances."""
-    padded = np.pad(values, ((12, 12), (0, 0)), constant_values=np.nan)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 25, axis=0)[rows]
-    n_known = np.count_nonzero(~np.isnan(around), axis=2)[..., np.newaxis]
-    ends = np.maximum(np.concatenate([n_known - 1, n_known], axis=2) // 2, 0)
-    middle = np.take_along_axis(np.sort(around, axis=2), ends, axis=2).mean(axis=2)
-    distances = np.sort(np.abs(around - middle[..., np.newaxis]), axis=2)
-    return values[rows] - middle, NORMAL * np.take_along_axis(distances, ends, axis=2).mean(axis=2)
 
 
 def compare_times(
