@@ -44,8 +44,7 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "preprocessing.checks": set(),
     "preprocessing.loggers": set(),
     "commands": {"preprocessing.loggers"},
-    "surrogate.inverse": {"fem.affine"},  # polynomials of ln f
-    "surrogate.chain": {"surrogate.inverse"},
+    "surrogate": {"fem.affine", "preprocessing.checks"},  # polynomials of ln f, periods of records
     "monitoring": {"preprocessing.checks"},
     "monitoring.fleet": set(),
     "reporting": {"reporting.fleet", "reporting.service"},

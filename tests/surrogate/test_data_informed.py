@@ -50,7 +50,7 @@ def test_frequencies_are_those_of_the_model_times_the_discrepancy(discrepancy, d
     assert (discrepancy is None) == (np.nanmax(np.abs(fem.discrepancy_(air))) == 0)
 
 
-@pytest.mark.filterwarnings("ignore:.*large-discrepancy")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_the_discrepancy_is_what_the_model_cannot_follow():
     """Modes that the weather moves unlike any parameter does."""
     slope = np.linspace(-0.002, 0.002, 6)
@@ -318,7 +318,7 @@ def test_seed_fills_only_what_has_none():
     assert seeded.mapper is None
 
 
-@pytest.mark.filterwarnings("ignore:.*hidden-offsets")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_large_models_work_in_worker_processes():
     """Matrices above 1 MB reach workers as read-only memory maps."""
     n = 380

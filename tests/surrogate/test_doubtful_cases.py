@@ -47,7 +47,7 @@ def test_wrong_modes_do_not_make_every_prediction_impossible():
 def test_a_chain_that_misses_its_own_records_by_more_than_their_mean_says_so():
     paper = {"aligner": "passthrough", "discrepancy": None}
     fem = DataInformedFEM(TRUSS, mapper=PLAIN, random_state=0, **paper)
-    with pytest.warns(UserWarning, match="by more than their mean does.*worse-than-mean"):
+    with pytest.warns(UserWarning, match="by more than their mean does.*uncalibrated-model"):
         fem.fit(T, F * [1.08, 0.94, 1.07, 0.95, 1.06, 0.94])
 
 
@@ -62,8 +62,8 @@ def test_labels_that_have_no_order():
     assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).recorder_.residuals.values) == 365
 
 
-@pytest.mark.filterwarnings("ignore:.*hidden-offsets")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_records_with_hardly_any_mode_are_named():
     gaps = np.random.default_rng(0).random(F.shape) < 0.85
-    with pytest.warns(UserWarning, match="sparse-modes"):
+    with pytest.warns(UserWarning, match="few-rows"):
         DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.001), mapper=PLAIN).fit(T, F.mask(gaps))

@@ -172,7 +172,7 @@ class TestFindings:
             for memory in (str(tmp_path), str(tmp_path), None)
         )
         assert first == again == fresh
-        assert "sparse-modes" in first
+        assert "few-rows" in first
 
 
 class TestBounded:

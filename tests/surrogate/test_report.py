@@ -100,7 +100,7 @@ class TestTheReport:
         air = T.copy()
         air.iloc[:200, 1] = np.nan
         texts = [str(warning.message) for warning in caught(chain(mapper=TemperatureMapper(Ridge())).fit, air, F)]
-        assert any("of the rows: 'T2'. Repair" in text and "mostly-filled" in text for text in texts)
+        assert any("of the rows: 'T2'. Repair" in text and "filled-temperatures" in text for text in texts)
 
     def test_lagged_columns_count_as_one_sensor(self):
         girder = T.rename(columns={"T1": "girder"}).astype(float)
@@ -130,7 +130,7 @@ class TestWarningsOfFit:
     @pytest.mark.parametrize(
         ("air", "measured", "messages"),
         [
-            (T, F * 1.5, ["by more than 15 %: 'f1', 'f2', .*mode-offsets"]),
+            (T, F * 1.5, ["by more than 15 %: 'f1', 'f2', .*uncalibrated-model"]),
             (
                 T[::3],
                 F[["f1", "f2", "f3", "f5", "f4", "f6"]][::3],
@@ -156,7 +156,7 @@ class TestWarningsOfFit:
     def test_gaps_that_lags_multiply_are_counted(self):
         gappy = T.mask(np.tile(np.random.default_rng(0).random((365, 1)) < 0.05, 3))
         lagged = chain(mapper=make_pipeline(LagFeatures(24), TemperatureMapper(Ridge())))
-        assert "rows-left-out" in [warning.message.kind for warning in caught(lagged.fit, gappy, F)]
+        assert "few-rows" in [warning.message.kind for warning in caught(lagged.fit, gappy, F)]
         assert any(reason.startswith("a lag reaches into a gap") for reason in lagged.report_.rows.left_out.index)
         complete = KNNGapImputer().set_output(transform="pandas").fit_transform(T.mask(T.quantile(0.98) < T))
         assert not caught(lagged.fit, complete, F)
@@ -187,7 +187,7 @@ class TestWarningsOfFit:
         assert "['f0', 'f1'] look like other modes" in text
         assert "with_modes([1, 0, 2, 3])" in text
 
-    @pytest.mark.filterwarnings("ignore:.*(round-trip-error|large-discrepancy)")
+    @pytest.mark.filterwarnings("ignore:.*(round-trip-error|uncalibrated-model)")
     def test_a_narrow_box_is_named(self):
         with pytest.warns(UserWarning, match="'bottom'.*outside-bounds"):
             chain(inverse=trained(bounds=0.05)).fit(T, F)
@@ -215,7 +215,7 @@ class TestWarningsOfFit:
     def test_one_warning_for_all_folds(self):
         estimator, records = chain(mapper=TemperatureMapper(Ridge())), (T[::3], 1.5 * F[::3])
         record = caught(lambda: cross_val_score(estimator, *records, cv=KFold(3)))
-        assert sum(warning.message.kind == "mode-offsets" for warning in record) == 1
+        assert sum(warning.message.kind == "uncalibrated-model" for warning in record) == 1
         again = caught(lambda: cross_val_score(estimator, *records, cv=KFold(3)))
         assert len(again) == len(record)
         assert {warning.filename for warning in record} == {__file__}
@@ -285,11 +285,11 @@ def aligned(model, n=365, factor=1.0):
 @pytest.mark.nightly
 def test_offsets_that_an_aligner_hides_are_named_unless_weather_or_a_common_factor_explains_them():
     wrong = TRUSS.rescaled([0.95, 1.0, 1.05, 1.0])
-    with pytest.warns(UserWarning, match="of 'f1', .*hidden-offsets") as given:
+    with pytest.warns(UserWarning, match="of 'f1', .*uncalibrated-model") as given:
         fem = aligned(wrong)
-    assert len([w for w in given if w.message.kind == "hidden-offsets"]) == 1
+    assert len([w for w in given if w.message.kind == "uncalibrated-model"]) == 1
     assert fem.report_.has_hidden_offsets
-    text = next(str(w.message) for w in given if w.message.kind == "hidden-offsets")
+    text = next(str(w.message) for w in given if w.message.kind == "uncalibrated-model")
     assert text[1:] in repr(fem.report_)
     np.testing.assert_allclose(fem.report_.modes["hidden offset"], fem.report_.modes["offset"], atol=1e-9)
     calibrated = ModelUpdater(wrong, bounds=0.5, prior=0.3).fit(F, frequency_std=0.005 * F.mean()).model_

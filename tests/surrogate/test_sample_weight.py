@@ -70,7 +70,7 @@ def test_a_record_of_weight_0_counts_as_left_out():
     np.testing.assert_allclose(fit.predict_parameters(T), alone.predict(T), rtol=1e-9)
     assert fit.report_.rows.trained == kept.sum()
     ((reason, count),) = fit.report_.rows.left_out.items()
-    assert reason.startswith("their weight is 0, in ")
+    assert reason.startswith("their weight is 0, ")
     assert count == (~kept).sum()
     assert len(fit.recorder_.residuals.values) == kept.sum()
     assert fit.training_range_.excess(T[kept]).max() == 0

@@ -289,7 +289,10 @@ def test_right_shapes_of_any_scale_and_phase_give_no_warning():
     ids=["gain", "sign", "sensors swapped", "modes swapped"],
 )
 def test_shapes_of_other_sensors_are_named(change):
-    assert re.search(r"measured shapes of 'f\d' are unlike those of the model .*foreign-shapes", chain_of(change)[1][0])
+    texts = chain_of(change)[1]
+    assert any(
+        re.search(r"measured shapes of 'f\d' are unlike those of the model .*foreign-shapes", text) for text in texts
+    )
 
 
 def test_a_failed_sensor_is_counted():
@@ -299,7 +302,7 @@ def test_a_failed_sensor_is_counted():
 
 # The parameters are random: no weather moves them.
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(no-thermal-effect|large-discrepancy)")
+@pytest.mark.filterwarnings("ignore:.*(no-thermal-effect|uncalibrated-model)")
 def test_modes_may_have_numbers_as_names():
     frequencies, shapes = MEASURED
     air = pd.DataFrame({"air": np.linspace(-5, 30, len(THETA))})

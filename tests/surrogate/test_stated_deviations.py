@@ -23,8 +23,8 @@ pytestmark = [
         "outside-(prior|training-weather)",
         "weather-of-one-fold",
         "few-rows",
-        "hidden-offsets",
-        "mode-offsets",
+        "uncalibrated-model",
+        "uncalibrated-model",
         "few-(independent|baseline)-records",
     )
 ]
