@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.arrays import Array, means_of_known, median
+from skthermo._core.arrays import Array, means_of_known
 from skthermo._core.frames import correlation_times
 from skthermo.exceptions import WeatherWarning
 from skthermo.preprocessing import HampelFilter
@@ -84,7 +84,7 @@ class BaselineResiduals:
         A block bootstrap by weather: each block of rows takes records that follow each other, one of the 15 blocks
         whose mean weather is most similar. Rows of unknown weather are NaN.
         """
-        return self._where_known(weather, lambda known: self.drawn[self._taken(known, random_state)])
+        return self._where_known(weather, lambda known: self.values[self._taken(known, random_state)])
 
     def draw_complete(self, weather: Array, random_state: np.random.RandomState, without_outliers: bool) -> Array:
         """The same, with missing modes, and outliers if asked, drawn anew given the modes that are there.
@@ -92,7 +92,7 @@ class BaselineResiduals:
         They follow the normal distribution of residuals without outliers. Without gaps and outliers, `draw` gives the
         same.
         """
-        values = self.usual if without_outliers else self.drawn
+        values = self.usual if without_outliers else self.values
 
         def of_known(known: Array) -> Array:
             return self._completed(values[self._taken(known, random_state)], random_state)
@@ -102,7 +102,7 @@ class BaselineResiduals:
     def draw_records(self, weather: Array, random_state: np.random.RandomState) -> tuple[NDArray[np.intp], Array]:
         """Positions of the records drawn for rows of known weather, and their residuals."""
         taken = self._taken(weather, random_state)
-        return taken, self.drawn[taken]
+        return taken, self.values[taken]
 
     def _taken(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records whose residuals rows of known weather take, in blocks."""
@@ -133,20 +133,8 @@ class BaselineResiduals:
 
     @cached_property
     def usual(self) -> Array:
-        """The drawn residuals, NaN where one is an outlier: far from its neighbours in time."""
-        return HampelFilter().fit(self.drawn).transform(self.drawn)
-
-    @cached_property
-    def drawn(self) -> Array:
-        """Residuals for drawing noise: the mean of the residuals out of fold and of the mapper of all records.
-
-        The former hold the errors of mappers of fewer records besides the errors of the mapper that simulates. The
-        latter are too small, and do not count where the mapper has learned noise: where they change from record to
-        record by less than three quarters of the former.
-        """
-        own, out_of_fold = np.abs(np.diff(self.own, axis=0)), np.abs(np.diff(self.values, axis=0))
-        is_overfitted = np.nansum(median(own)) < 0.75 * np.nansum(median(out_of_fold))
-        return self.values if is_overfitted else (self.values + self.own) / 2
+        """The residuals, NaN where one is an outlier: far from its neighbours in time."""
+        return HampelFilter().fit(self.values).transform(self.values)
 
     @cached_property
     def level_errors(self) -> Array:
