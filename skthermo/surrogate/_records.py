@@ -86,9 +86,9 @@ class TrainingRecords(SavesFrames):
         known = ~np.isnan(self.inputs).any(axis=1)
         order = np.argsort(row_times(self.temperatures), kind="stable")
         order = order[known[order]]
-        taken, (values, ratios) = residuals.draw_records(self.inputs[order], random_state)
+        taken, values = residuals.draw_records(self.inputs[order], random_state)
         targets, measured = np.full_like(self.targets, np.nan), np.full(np.shape(self.frequencies), np.nan)
-        targets[order] = self.learned[order] * ratios
+        targets[order] = self.learned[order] * residuals.ratios[taken]
         expected = self.modelled[order] * np.exp(discrepancy.at(self.inputs[order]))
         measured[order] = expected * (1 + values)
         weights = None
