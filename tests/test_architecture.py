@@ -44,13 +44,10 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "preprocessing.checks": set(),
     "preprocessing.loggers": set(),
     "commands": {"preprocessing.loggers"},
-    "surrogate.inverse": {"fem.affine"},  # polynomials of ln f
-    "surrogate.chain": {"surrogate.inverse"},
+    "surrogate": {"fem.affine", "preprocessing.checks"},  # polynomials of ln f, periods of records
+    "detection": {"preprocessing.checks"},  # misplaced columns
     "monitoring": {"preprocessing.checks"},
     "monitoring.fleet": set(),
-    "reporting": {"reporting.fleet", "reporting.service"},
-    "reporting.fleet": {"reporting.service"},
-    "reporting.service": set(),
     "studies.detectability": set(),
     "studies.identification": set(),
 }

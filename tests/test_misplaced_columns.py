@@ -12,7 +12,7 @@ from sklearn.linear_model import Ridge
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss, make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning
-from skthermo.residuals.weather import misplaced_columns
+from skthermo.preprocessing.checks import misplaced_columns
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 YEAR = make_truss_campaign(random_state=0)

@@ -29,6 +29,7 @@ from skthermo.detection._base import mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
 from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing import set_aside
+from skthermo.preprocessing.checks import misplaced_columns
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.sensors import SensorRegression, filled_text
@@ -36,7 +37,6 @@ from skthermo.residuals.weather import (
     BEYOND,
     Extrapolation,
     TrainingRange,
-    misplaced_columns,
     unpredicted_text,
     unseen_weather,
 )

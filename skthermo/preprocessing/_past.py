@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
-from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
+from skthermo._core.estimators import Interval, StrOptions
 from skthermo._core.frames import Table, as_stamps, check_duration, frame_like
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import warn_each
@@ -436,24 +436,6 @@ class ExponentialMeans(PastFeatures):
             mean, share = trailing_means(times, records, half_life, self.step_, begun)
             means.append(np.where(share < self.recorded, np.nan, mean)[rows])
         return np.hstack([values, *means]), self._doubts_of_past(values, own, times, means)
-
-    def lacks_past(self, X: pd.DataFrame) -> NDArray[np.bool_]:
-        """Which rows follow the first record by less than two half-lives: their means lack the weather before.
-
-        Parameters
-        ----------
-        X : DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius on a DatetimeIndex.
-
-        Returns
-        -------
-        ndarray of bool of shape (n_samples,)
-            By the longest half-life; records of `fit` count.
-        """
-        check_is_fitted(self)
-        own = self._stamps_as_in_fit(X).as_unit("ns").asi8
-        first = min(int(own.min()), int(self.stamps_.view(np.int64).min()))
-        return own - first < 2 * self._longest
 
     @property
     def lookback_(self) -> int | np.timedelta64:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from skthermo._core.arrays import (
     NORMAL,
     Array,
+    means_of_known,
     median,
     piecewise_linear,
     robust_deviation,
@@ -21,7 +22,8 @@ from skthermo.preprocessing.folds import out_of_fold
 
 @dataclass(frozen=True)
 class WeatherLines:
-    """Principal components of the temperatures, gaps filled by them, and piecewise-linear functions of each."""
+    """Principal components of the temperatures, gaps filled by the other sensors, and piecewise-linear functions of
+    each."""
 
     centre: Array
     scale: Array
@@ -32,32 +34,26 @@ class WeatherLines:
     def learned(cls, temperatures: Array) -> WeatherLines:
         """As many components, up to three, as explain 99 % of the variance; the lines break at their quartiles."""
         values = temperatures[spread_evenly(np.arange(len(temperatures)), 20_000)]
-        known = ~np.isnan(values)
-        counts = np.maximum(known.sum(axis=0), 1)
-        centre = np.where(known, values, 0.0).sum(axis=0) / counts
-        scale = np.sqrt(np.where(known, (values - centre) ** 2, 0.0).sum(axis=0) / counts)
+        centre = np.nan_to_num(means_of_known(values))
+        scale = np.sqrt(means_of_known((values - centre) ** 2))
         scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1.0), scale, np.inf)
-        standard = (values - centre) / scale
-        filled = np.where(known, standard, 0.0)
-        for _ in range(1 if known.all() else 20):  # steps in which the components fill gaps
-            variances, vectors = np.linalg.eigh(filled.T @ filled)
-            variances, vectors = variances[::-1], vectors[:, ::-1]
-            n_needed = 1 + np.searchsorted(np.cumsum(variances), 0.99 * max(variances.sum(), 1e-300))
-            components = vectors[:, : min(3, n_needed)].T
-            filled = np.where(known, standard, filled @ components.T @ components)
-        return cls(centre, scale, components, np.quantile(filled @ components.T, (0.25, 0.5, 0.75), axis=0))
+        standard = filled_by_row((values - centre) / scale)
+        standard = standard[~np.isnan(standard).any(axis=1)]
+        variances, vectors = np.linalg.eigh(standard.T @ standard)
+        n_needed = 1 + np.searchsorted(np.cumsum(variances[::-1]), 0.99 * max(variances.sum(), 1e-300))
+        components = vectors[:, ::-1][:, : min(3, n_needed)].T
+        return cls(centre, scale, components, np.quantile(standard @ components.T, (0.25, 0.5, 0.75), axis=0))
 
     def inputs(self, temperatures: Array) -> tuple[Array, Array]:
         """Components of each row, (n_samples, n_components), NaN where no sensor has a value; and a constant beside
         piecewise-linear functions of them."""
-        known = ~np.isnan(temperatures)
-        standard = np.where(known, (temperatures - self.centre) / self.scale, 0.0)
-        places = standard @ self.components.T
-        gaps = ~known.all(axis=1)
-        for _ in range(20 if gaps.any() else 0):
-            places[gaps] = np.where(known[gaps], standard[gaps], places[gaps] @ self.components) @ self.components.T
-        places[~known.any(axis=1)] = np.nan
+        places = filled_by_row((temperatures - self.centre) / self.scale) @ self.components.T
         return places, np.hstack([np.ones((len(places), 1)), piecewise_linear(places, self.knots)])
+
+
+def filled_by_row(standard: Array) -> Array:
+    """Standardised values with gaps filled by the mean of the other sensors; NaN in rows without any."""
+    return np.where(np.isnan(standard), means_of_known(standard, axis=1)[:, np.newaxis], standard)
 
 
 def ridge(inputs: Array, values: Array) -> Array:

@@ -1,22 +1,20 @@
-"""Weather of records: its range, similar records, sensors that predict each other, columns that are no weather."""
+"""Weather of records: its range, and similar records."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from sklearn.decomposition import PCA
 from sklearn.neighbors import NearestNeighbors
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skthermo._core.arrays import Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
-from skthermo._core.frames import Table, column_names
+from skthermo._core.arrays import Array, as_floats, means_of_known
+from skthermo._core.frames import column_names
 from skthermo.exceptions import RecordsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
 
@@ -182,29 +180,6 @@ def weather_coordinates(weather: Array, explained: float = 0.99) -> Pipeline:
         return make_pipeline(StandardScaler(), PCA(explained)).fit(weather)
 
 
-class NearestPlaces:
-    """Places among which the nearest to each wanted one are searched for."""
-
-    def __init__(self, places: Array, number: int) -> None:
-        self.places, self.number = places, min(number, len(places))
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"places": self.places, "number": self.number}
-
-    @cached_property
-    def _tree(self) -> NearestNeighbors:
-        return NearestNeighbors(n_neighbors=self.number).fit(self.places)
-
-    def nearest(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
-        """Mean distance (n_wanted,) to the places nearest to each wanted one, and their positions, nearest first,
-        (n_wanted, number)."""
-        distances, near = np.empty(len(wanted)), np.empty((len(wanted), self.number), dtype=np.int32)
-        for part in parts(len(wanted), self.number):
-            lengths, near[part] = self._tree.kneighbors(wanted[part])
-            distances[part] = lengths.mean(axis=1)
-        return distances, near
-
-
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
     """Distances and positions of the places nearest to each wanted one, (n_wanted, number)."""
     none = np.empty((0, min(number, len(places))))
@@ -265,69 +240,3 @@ def one_in_each_part(n_records: int, most: int) -> NDArray[np.intp]:
         return np.arange(n_records)
     shares = np.arange(most) + np.random.RandomState(0).uniform(size=most)
     return (shares * n_records / most).astype(np.intp)
-
-
-def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[RecordsWarning]:
-    """A warning about temperatures that behave like frequencies, and one about frequencies that behave like
-    temperatures.
-
-    Frequencies are positive, vary by a few percent of their median, at most 15, and rise and fall together (rank
-    correlation above .1). Temperatures in degrees Celsius vary five times as much, and are nearly equal (rank
-    correlation above .6).
-    """
-    if len(temperatures) < 30:
-        return
-    T, F = TypicalColumns(temperatures, "T"), TypicalColumns(frequencies, "f")
-    steady = F.variation[F.variation <= 0.15]
-    usual = np.median(steady) if len(steady) else np.min(T.variation, initial=0.15)
-    is_temperature = (F.variation >= 5.0 * usual) & (len(steady) > 0 or (T.variation <= 0.15).any())
-    is_mode = (T.variation <= 3.0 * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
-    is_mode &= T.variation <= 0.15
-    if not is_mode.any() and not is_temperature.any():
-        return
-    ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=30).fillna(0).to_numpy()
-    n_sensors = len(T.names)
-    among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
-    together = across[:, ~is_temperature].mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
-    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), 0.1)
-    is_temperature &= ((across > 0.6) & T.nearly(F))[~is_mode].any(axis=0)
-    if is_mode.any():
-        yield RecordsWarning(
-            f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
-            "A mode that predicts the others hides damage. Put all modes among the targets, and only temperatures "
-            "beside them",
-            "modes-among-temperatures",
-        )
-    if is_temperature.any():
-        yield RecordsWarning(
-            f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
-            "and are nearly equal to other temperatures. A detector would evaluate the weather. Give only frequencies "
-            "as targets",
-            "temperatures-among-modes",
-        )
-
-
-class TypicalColumns:
-    """TypicalColumns of a table, of rows evenly spread, with their robust statistics."""
-
-    def __init__(self, table: Table, default: str):
-        values = as_floats(table)[spread_evenly(np.arange(len(table)), 2000)]
-        self.values, self.names = values, column_names(table, default)
-        self.median, self.deviation = median(values), robust_deviation(values)
-        positive = (np.fmin.reduce(values) > 0) & (self.deviation > 0)
-        self.variation = np.divide(self.deviation, self.median, out=np.full(values.shape[1], np.inf), where=positive)
-
-    def named(self, chosen: NDArray[np.bool_]) -> list:
-        return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
-
-    def reach(self, others: TypicalColumns) -> NDArray[np.bool_]:
-        """Which others have about the magnitude of some of these."""
-        lowest, highest = np.nanmin(self.median) / 10, np.nanmax(self.median) * 10
-        return (others.median >= lowest) & (others.median <= highest)
-
-    def nearly(self, others: TypicalColumns) -> NDArray[np.bool_]:
-        """Which pairs with others could be temperatures of the same place, (n_columns, n_others)."""
-        difference = np.abs(self.median[:, np.newaxis] - others.median)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = self.deviation[:, np.newaxis] / others.deviation
-        return (difference <= 20) & (ratio >= 1 / 3) & (ratio <= 3)

@@ -10,9 +10,9 @@ pytestmark = pytest.mark.nightly
 
 SAID = {
     "rad/s instead of Hz": "are about those in rad/s",
-    "frequencies 1.5 times too high": "mode-offsets",
+    "frequencies 1.5 times too high": "uncalibrated-model",
     "two modes swapped": "mode-order",
-    "a thermometer that died": "mostly-filled",
+    "a thermometer that died": "filled-temperatures",
     "a thermometer that got stuck": "'T1' is 10 °C in 250 of 400 rows",
     "30 records": "few-rows",
     "kelvin in fit": "look like kelvin",

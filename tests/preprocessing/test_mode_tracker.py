@@ -1,7 +1,6 @@
 """Assignment of poles to reference modes."""
 
 import itertools
-import pickle
 import warnings
 
 import numpy as np
@@ -73,11 +72,6 @@ def test_shapes_have_the_phase_of_the_reference_and_their_own_scale(reference):
     np.testing.assert_allclose(np.abs(modes.shapes), np.abs(raw.shapes))
 
 
-def test_real_shapes_stay_real():
-    raw = {"frequencies": [F0], "shapes": [-3 * PHI.T]}
-    np.testing.assert_allclose(ModeTracker((F0, PHI)).fit_transform(raw).shapes[0], 3 * PHI.T)
-
-
 def test_all_forms_of_input_give_the_same():
     raw = padded(extra=3, n_records=8)
     raw.frequencies[2, :4] = raw.frequencies[5] = np.nan
@@ -95,11 +89,6 @@ def test_all_forms_of_input_give_the_same():
         np.testing.assert_array_equal(modes.left_over, expected.left_over)
     assert expected.frequencies.loc[5].isna().all()
     assert expected.poles.loc[5].tolist() == [-1, -1, -1]
-
-
-def test_an_index_may_be_given_beside_lists():
-    raw = {"frequencies": [F0, F0], "shapes": [PHI.T, PHI.T], "index": HOURS[:2]}
-    assert ModeTracker((F0, PHI)).fit_transform(raw).frequencies.index.equals(HOURS[:2])
 
 
 def test_order_of_poles_and_of_modes_does_not_matter():
@@ -242,14 +231,6 @@ def test_sensors_are_chosen_by_name():
         ModeTracker({**reference, "sensors": "eadz"}).fit_transform(raw)
 
 
-def test_clone_pickle_and_names():
-    tracker = ModeTracker((F0, PHI), follow=30)
-    fitted = pickle.loads(pickle.dumps(clone(tracker).fit()))
-    assert fitted.get_feature_names_out().tolist() == ["f1", "f2", "f3"]
-    raw = padded(extra=2)
-    pd.testing.assert_frame_equal(fitted.transform(raw).frequencies, tracker.fit_transform(raw).frequencies)
-
-
 def test_no_records_and_empty_records():
     tracker = ModeTracker((F0, PHI)).fit()
     empty = {"frequencies": [[], F0], "shapes": [[], PHI.T], "damping": [[], [0.1, 0.2, 0.3]]}
@@ -270,13 +251,6 @@ def test_modes_never_found_and_modes_found_elsewhere_give_one_warning():
     assert "records without 'f2' have a pole of its shape at about 1.3 times" in str(caught[0].message)
 
 
-def test_clean_records_give_no_warning():
-    records, _, reference = simulated_poles(300)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert ModeTracker(reference).fit_transform(records).frequencies.shape == (300, 8)
-
-
 def test_poles_without_shape_are_left_over_with_a_warning():
     raw = padded()
     raw.shapes[:5, 0] = np.nan
@@ -286,21 +260,9 @@ def test_poles_without_shape_are_left_over_with_a_warning():
     assert modes.left_over.sum() == 7
 
 
-GOOD = padded(n_records=12)
-
-
 @pytest.mark.parametrize("change", [np.flip, lambda S: S * np.array([1, 1, 1, -1, -1, 1])], ids=["order", "sign"])
 def test_modes_lost_by_their_shapes_are_named(change):
     raw = padded()
     raw.shapes = change(raw.shapes)
     with pytest.warns(UserWarning, match=r"records without \['f1'.* have a pole of another shape.*signs"):
         ModeTracker((F0, PHI)).fit_transform(raw)
-
-
-def test_missing_modes_and_spurious_poles_are_no_wrong_shapes():
-    raw = padded(extra=6)
-    raw.frequencies[:, 6] = np.nan
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        ModeTracker((F0, PHI)).fit_transform(raw)
-    assert not any("another shape" in str(one.message) for one in caught)

@@ -74,7 +74,7 @@ def test_a_healthy_structure_has_no_damage(fem):
 
 
 @pytest.mark.one_case
-@pytest.mark.filterwarnings("ignore:.*hidden-offsets")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 @pytest.mark.parametrize("method", ["shift", "scale"])
 def test_damage_behind_an_aligner(method):
     T, F = YEAR.temperatures[::4], YEAR.frequencies[::4] * 1.1

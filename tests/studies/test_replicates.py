@@ -148,7 +148,7 @@ def test_a_refitted_chain_finds_the_same_parameters(fem):
     pd.testing.assert_frame_equal(refitted(fem).parameters_, fem.parameters_)
 
 
-@pytest.mark.filterwarnings("ignore:.*hidden-offsets")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_a_chain_with_another_model_is_that_of_the_other_model(fem):
     plain = clone(fem).set_params(aligner="passthrough", inverse__prior=0.3).fit(YEAR.temperatures, YEAR.frequencies)
     other = refitted(plain, model=MODELS[0])

@@ -4,8 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.multioutput import MultiOutputRegressor
+from sklearn.linear_model import LinearRegression
 
 from skthermo.fem import CallableModel
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
@@ -36,24 +35,11 @@ def test_rows_that_never_had_frequencies_are_counted_and_weigh_a_number(place):
     assert np.isfinite(fem.report_.modes["MAPE"]).all()
 
 
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_wrong_modes_do_not_make_every_prediction_impossible():
-    fem = DataInformedFEM(TRUSS, mapper=TemperatureMapper(Ridge()), random_state=0).fit(
-        T, F.iloc[:, [0, 1, 3, 2, 4, 5]]
-    )
-    assert fem.predict(T).notna().all(axis=None)
-
-
 def test_a_chain_that_misses_its_own_records_by_more_than_their_mean_says_so():
     paper = {"aligner": "passthrough", "discrepancy": None}
     fem = DataInformedFEM(TRUSS, mapper=PLAIN, random_state=0, **paper)
-    with pytest.warns(UserWarning, match="by more than their mean does.*worse-than-mean"):
+    with pytest.warns(UserWarning, match="by more than their mean does.*uncalibrated-model"):
         fem.fit(T, F * [1.08, 0.94, 1.07, 0.95, 1.06, 0.94])
-
-
-def test_mappers_of_one_parameter_each():
-    fem = DataInformedFEM(TRUSS, mapper=MultiOutputRegressor(PLAIN), random_state=0).fit(T, F)
-    assert fem.score(T, F) > 0.5
 
 
 def test_labels_that_have_no_order():
@@ -62,8 +48,8 @@ def test_labels_that_have_no_order():
     assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).recorder_.residuals.values) == 365
 
 
-@pytest.mark.filterwarnings("ignore:.*hidden-offsets")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_records_with_hardly_any_mode_are_named():
     gaps = np.random.default_rng(0).random(F.shape) < 0.85
-    with pytest.warns(UserWarning, match="sparse-modes"):
+    with pytest.warns(UserWarning, match="few-rows"):
         DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.001), mapper=PLAIN).fit(T, F.mask(gaps))

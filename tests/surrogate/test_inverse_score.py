@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.metrics import r2_score
-from sklearn.model_selection import GridSearchCV, KFold, ShuffleSplit
+from sklearn.model_selection import GridSearchCV, ShuffleSplit
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo.datasets import make_truss
 from skthermo.fem import add_noise, sample
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate
-from tests.surrogate.chains import TRUSS, F, T
+from skthermo.surrogate import InverseSurrogate
+from tests.surrogate.chains import TRUSS, F
 
 ONE_FOLD = ShuffleSplit(1, random_state=0)
 QUADRATIC = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
@@ -44,12 +43,3 @@ def test_an_inverse_of_given_parameters_needs_targets():
     with pytest.raises(ValueError, match="expected y to score"):
         learned.score(given.frequencies)
     assert learned.score(given.frequencies, given.theta) > 0.5
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(outside-training-weather|round-trip-error)")
-def test_a_search_within_a_chain_tunes_the_regressor_that_is_used():
-    chain = DataInformedFEM(make_truss(), inverse=inverse(model=None, noise=0.01), random_state=0)
-    search = GridSearchCV(chain, {"inverse__regressor": [LinearRegression(), QUADRATIC]}, cv=KFold(2), refit=False)
-    search.fit(T, F)
-    assert abs(np.diff(search.cv_results_["mean_test_score"])) > 1e-4

@@ -6,9 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.base import clone
-from sklearn.ensemble import StackingRegressor, VotingRegressor
-from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import KFold, cross_val_score
 
 from skthermo.detection import TemperatureCompensator
 from skthermo.fem import CallableModel
@@ -47,29 +44,9 @@ def test_a_vector_gives_the_vectors_of_a_table_of_one_column():
     pd.testing.assert_frame_equal(of_vector().simulate(T), of_table().simulate(T))
 
 
-@pytest.mark.nightly
-def test_scores_take_vectors_and_tables():
-    assert of_vector().score(T, F["f1"]) == of_vector().score(T, F[["f1"]]) == of_table().score(T, F["f1"])
-    scores = [cross_val_score(CHAIN, T, y, cv=KFold(3)) for y in (F["f1"], F["f1"].to_numpy(), F[["f1"]])]
-    np.testing.assert_array_equal(scores[0], scores[1])
-    np.testing.assert_array_equal(scores[0], scores[2])
-
-
 def test_names_come_from_the_series():
     assert of_vector().mode_names_ == clone(CHAIN).fit(T, F["f1"].rename(None)).mode_names_ == ["f1"]
     assert clone(CHAIN).fit(T, F["f1"].rename("bending")).mode_names_ == ["bending"]
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("ensemble", [StackingRegressor, VotingRegressor])
-@pytest.mark.parametrize("weights", [None, np.linspace(0.5, 1.5, len(T))])
-def test_scikit_learns_ensembles_of_regressors(ensemble, weights):
-    together = ensemble([("chain", CHAIN), ("lines", LinearRegression())])
-    together.fit(T, F["f1"], **({} if weights is None else {"sample_weight": weights}))
-    assert together.predict(T).shape == (len(T),)
-    assert together.score(T, F["f1"]) > LinearRegression().fit(T, F["f1"]).score(T, F["f1"])
-    alone = clone(CHAIN).set_params(random_state=0).fit(T, F["f1"], sample_weight=weights)
-    np.testing.assert_array_equal(together.named_estimators_["chain"].predict(T), alone.predict(T))
 
 
 def test_compensators_and_displays_take_it():

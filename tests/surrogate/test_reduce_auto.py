@@ -1,18 +1,15 @@
 """Laws of ``reduce="auto"``: what is reduced, that results stay the same, and that the report says so."""
 
-import pickle
 import warnings
-from copy import deepcopy
 
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import clone
 from sklearn.linear_model import Ridge
 
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper, refitted
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 from tests.fem.frames import portal
 
 LARGE, SMALL = portal(4), make_truss()
@@ -75,14 +72,6 @@ def test_the_decision_is_monotone_in_rows_and_in_size():
     assert table[-1, -1]
 
 
-@pytest.mark.filterwarnings("ignore:.*few-rows")
-def test_few_rows_do_not_pay_for_a_basis():
-    T, F = records(LARGE, 12)
-    fem = chain(LARGE).fit(T, F)
-    assert fem.inverse_.simulator_.reduced is None
-    assert fem.report_.solved == "Solved by the full model: a reduced model would save no time."
-
-
 @pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*few-rows")
 def test_an_inverse_follows_the_chain_unless_it_says_otherwise():
@@ -92,31 +81,6 @@ def test_an_inverse_follows_the_chain_unless_it_says_otherwise():
     own = chain(LARGE, reduce=True).set_params(inverse__reduce=False).fit(T, F)
     assert own.inverse_.simulator_.reduced is None
     assert own.simulator_.reduced is not None
-
-
-@pytest.mark.nightly
-def test_without_an_accurate_basis_the_full_model_solves_without_a_warning(monkeypatch):
-    def fails(*args, **options):
-        raise RuntimeError("after 4 rounds 9 basis vectors do not give frequencies to 1e-05")
-
-    T, F = records(LARGE)
-    full = chain(LARGE, reduce=False).fit(T, F)
-    monkeypatch.setattr("skthermo.fem.affine._affine.grow_basis", fails)
-    auto = chain(LARGE).fit(T, F)
-    np.testing.assert_array_equal(predictions(auto, T), predictions(full, T))
-    assert "no reduced model is accurate" in auto.report_.solved
-    with pytest.warns(UserWarning, match="no-reduced-model"):
-        chain(LARGE, reduce=True).fit(T, F)
-
-
-@pytest.mark.nightly
-def test_clones_memory_and_refits_decide_alike(tmp_path):
-    T, F = records(LARGE)
-    fem = chain(LARGE).fit(T, F)
-    stored = clone(fem).set_params(memory=str(tmp_path))
-    for again in (clone(fem).fit(T, F), stored.fit(T, F), clone(stored).fit(T, F)):
-        np.testing.assert_array_equal(predictions(again, T), predictions(fem, T))
-    np.testing.assert_allclose(refitted(fem).predict(T), fem.predict(T), rtol=1e-4)
 
 
 TRUSS = make_truss()
@@ -159,12 +123,6 @@ def test_changes_are_those_of_the_model(simulator, change):
     theta = np.hstack([THETA, np.full((5, len(made.box) - 4), 0.95)])
     np.testing.assert_allclose(made.frequencies(theta), made.model.frequencies(theta), rtol=1e-6)
     np.testing.assert_array_equal(made.frequencies(theta), change(simulator).frequencies(theta))
-
-
-def test_copies_make_the_same(simulator):
-    damaged = simulator.damaged({"bottom": 0.1})
-    for twin in (pickle.loads(pickle.dumps(simulator)), deepcopy(simulator)):
-        np.testing.assert_array_equal(twin.damaged({"bottom": 0.1}).frequencies(THETA), damaged.frequencies(THETA))
 
 
 USUAL = np.exp(np.random.default_rng(1).normal(0, 1, (300, 1)) * [0.02, -0.01, 0.015, 0.01])

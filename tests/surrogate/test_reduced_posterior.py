@@ -82,7 +82,7 @@ def test_one_reduced_model_serves_the_inverse_and_predictions(made):
     assert fem.simulator_.reduced is fem.inverse_.simulator_.reduced
     assert len(made) == 1
     np.testing.assert_allclose(fem.predict(T), FRAME.frequencies(fem.predict_parameters(T)), rtol=1e-5)
-    assert fem.report_.parameters.n_full_solves == 0
+    assert fem.report_.parameters.n_by_full_model == 0
 
 
 @pytest.mark.nightly
@@ -92,7 +92,7 @@ def test_the_box_is_where_records_are():
     theta = exact.transform(F).to_numpy()
     assert not found.simulator_.outside(theta).any()
     assert np.abs(np.log(found.simulator_.box / np.array([theta.min(axis=0), theta.max(axis=0)]).T)).max() < 0.3
-    assert not found.invert(F).full_solves.any()
+    assert not found.invert(F).by_full_model.any()
     assert is_same(found.invert(F), exact.invert(F))
 
 
@@ -104,8 +104,7 @@ def test_rows_that_end_outside_the_box_are_solved_by_the_full_model_and_counted(
     found = reduced.invert(F)
     outside = reduced.simulator_.outside(found.theta.to_numpy())
     np.testing.assert_array_equal(np.flatnonzero(outside), [4, 7, 9])
-    np.testing.assert_array_equal(found.full_solves > 0, outside)
-    assert (found.solves > found.full_solves).all()
+    np.testing.assert_array_equal(found.by_full_model, outside)
     assert is_same(found, exact)
     with pytest.warns(UserWarning, match="outside the box of the reduced model.*outside-reduced-model"):
         reduced.transform(F)
@@ -120,6 +119,6 @@ def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
     assert "expected errors up to 1e-05" in text
     found = fem.inverse_.invert(F)
     assert fem.inverse_.simulator_.reduced is fem.simulator_.reduced is None
-    assert fem.report_.parameters.n_full_solves == 0  # beside a reduced model
+    assert fem.report_.parameters.n_by_full_model == 0  # beside a reduced model
     assert is_same(found, inverse(reduce=False).fit(F).invert(F))
     np.testing.assert_allclose(fem.predict(T), FRAME.frequencies(fem.predict_parameters(T)), rtol=1e-9)

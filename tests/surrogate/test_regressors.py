@@ -89,7 +89,7 @@ def test_nested_estimators_are_checked(parts, message):
         DataInformedFEM(TRUSS, **(defaults | parts)).fit(YEAR.temperatures, YEAR.frequencies)
 
 
-@pytest.mark.filterwarnings("ignore:.*large-discrepancy")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_parameters_of_new_records_are_what_the_chain_learned_from():
     inverse = InverseSurrogate(regressor=LinearRegression(), bounds=0.1, n_samples=50, random_state=0)
     chain = DataInformedFEM(TRUSS, inverse=inverse, mapper=TemperatureMapper(Ridge()), aligner=BiasAligner(TRUSS))

@@ -5,11 +5,10 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.spatial import cKDTree
 
 from skthermo.preprocessing import HampelFilter
 from skthermo.surrogate import resampled
-from skthermo.surrogate.chain._service import ServiceRecords
+from skthermo.surrogate._records import ServiceRecords
 from tests.surrogate.chains import F, T, chain
 
 
@@ -55,21 +54,6 @@ def in_service(spoiled):
 @pytest.fixture(scope="module")
 def flawless():
     return chain(random_state=0).fit(T, F)
-
-
-def test_trees_find_the_same_records_of_similar_weather():
-    missing = np.column_stack([lasting(2000, 0.2, 8, seed=1), lasting(2000, 0.05, 2, seed=2)])
-    records, shares = records_with(missing), np.linspace(0, 1, 200, endpoint=False)
-    trees = {joint: cKDTree(records.places[rows]) for joint, rows in records._joints.items()}
-    for joint in records._joints:
-        for place in np.random.default_rng(3).normal(size=(5, 2)):
-            found = [{records._similar(joint, place, share, some) for share in shares} for some in (trees, {})]
-            assert found[0] == found[1]
-    drawn = []
-    for few in (0, 10**6):
-        taken = [records.draw(records.places, np.random.RandomState(seed), many=few) for seed in range(15)]
-        drawn.append(missing[np.concatenate(taken)].mean(axis=0))
-    np.testing.assert_allclose(drawn[0], drawn[1], atol=0.05)  # some four standard deviations
 
 
 def test_numbers_of_outliers_of_other_training_records_scatter_as_those_of_another_year_do():

@@ -9,10 +9,8 @@ import pytest
 from sklearn.linear_model import BayesianRidge, Ridge
 from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import AffineModel
 from skthermo.preprocessing import BiasAligner, LagFeatures
-from skthermo.studies import DetectabilityStudy, identify_damage
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 from tests.bayesian import MEAN as FLEET_MEAN
 from tests.bayesian import NOISE, WIDTH, BayesianLogs, Logs, basis, weather
@@ -23,8 +21,8 @@ pytestmark = [
         "outside-(prior|training-weather)",
         "weather-of-one-fold",
         "few-rows",
-        "hidden-offsets",
-        "mode-offsets",
+        "uncalibrated-model",
+        "uncalibrated-model",
         "few-(independent|baseline)-records",
     )
 ]
@@ -132,16 +130,3 @@ def test_lags_before_the_mapper_and_chains_in_a_compensator_are_seen_through():
     assert stated(fem, T).shape == (120, 2)
     assert list(fem.extrapolation_distance(T)) == list(fem.training_range_.names)
     assert len(fem.training_range_.names) == 4
-
-
-@pytest.mark.filterwarnings("ignore:.*not-compared")
-def test_damage_is_identified_and_studies_run_on_a_chain_that_learned_from_a_fleet():
-    fem, T, F = fitted()
-    damaged = fem.simulate(T[30:], damage={"pier": 0.15}, noise="fitted", random_state=0)
-    found = identify_damage(fem, T[30:], damaged)
-    assert found.table["probability"].idxmax() == "pier"
-    assert abs(found.table.loc["pier", "severity"] - 0.15) < 0.05
-    detector = make_pipeline(TemperatureCompensator(fem, targets=list(F)), MahalanobisDetector())
-    study = DetectabilityStudy(fem, detector, [{"pier": 0.15}], n_repeats=1, uncertainty="noise", random_state=0)
-    rates = study.run(T[:60]).groupby("measure")["rate"].mean()
-    assert rates["POD"] > 0.9

@@ -1,20 +1,17 @@
 """M1 and M2, each on its own."""
 
-import warnings
-
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import BaseEstimator
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, add_noise, sample
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper, paper_network
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
 
 TRUSS = make_truss()
 QUADRATIC = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
@@ -51,14 +48,6 @@ def test_inverse_transform_is_the_fe_model():
     )
     with pytest.raises(ValueError, match=r"row 200, parameter 'bottom' is -1\.0"):
         inverse.inverse_transform(frame.fillna(-1.0))
-
-
-def test_refitting_forgets_what_the_last_fit_saw():
-    F = pd.DataFrame(HELD_OUT.frequencies, columns=[f"f{i}" for i in range(6)])
-    inverse = InverseSurrogate(TRUSS, LinearRegression(), bounds=0.2, random_state=0).fit(F)
-    assert not hasattr(inverse.fit(), "feature_names_in_")
-    inverse.fit(F, HELD_OUT.theta)
-    np.testing.assert_array_equal(inverse.samples_.theta, HELD_OUT.theta)
 
 
 @pytest.mark.nightly
@@ -115,14 +104,6 @@ def test_a_chain_reports_the_round_trip_and_warns_where_records_scatter_less():
     assert DataInformedFEM(TRUSS, mapper=linear).fit(air, healthy).report_.modes.get("round trip") is None
 
 
-def test_only_what_can_be_reduced_is():
-    program = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6, vectorized=True)
-    with pytest.raises(ValueError, match=r"reduce is True, but CallableModel.* has no method 'reduced'; expected"):
-        PosteriorInverse(program, reduce=True).fit(HELD_OUT.frequencies)
-    with pytest.raises(ValueError, match="'reduce' parameter of PosteriorInverse must be"):
-        PosteriorInverse(TRUSS, reduce=2.0).fit(HELD_OUT.frequencies)
-
-
 def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
     model = CallableModel(lambda theta: TRUSS.frequencies(theta), TRUSS.parameter_names, 6)
     with pytest.raises(
@@ -134,13 +115,6 @@ def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
 def test_more_parameters_than_modes_warns():
     with pytest.warns(UserWarning, match="more parameters than modes.*underdetermined"):
         InverseSurrogate(make_truss(n_modes=3), LinearRegression(), bounds=0.2, n_samples=20, random_state=0).fit()
-
-
-def test_inverse_without_a_model_has_no_way_back():
-    inverse = InverseSurrogate(regressor=LinearRegression()).fit(HELD_OUT.frequencies, HELD_OUT.theta)
-    with pytest.raises(ValueError, match="InverseSurrogate has no model"):
-        inverse.inverse_transform(HELD_OUT.theta)
-    assert list(inverse.get_feature_names_out()) == ["theta1", "theta2", "theta3", "theta4"]
 
 
 def test_mapper_learns_positive_multipliers_and_keeps_names():
@@ -230,22 +204,3 @@ def test_bounds_go_by_name():
     np.testing.assert_allclose(drawn.theta.max(axis=0), [1.2, 1.3, 1.1, 2.0], atol=0.01)
     with pytest.raises(ValueError, match=r"bounds: \['vertical'\] are missing; expected each of the parameters"):
         InverseSurrogate(TRUSS, bounds={"top": 0.3, "bottom": 0.2, "diagonal": 0.1}).fit()
-
-
-def test_a_model_that_is_an_estimator_keeps_its_seed():
-    class EstimatorModel(BaseEstimator):
-        parameter_names, n_modes = TRUSS.parameter_names, 6
-
-        def __init__(self, random_state=None):
-            self.random_state = random_state
-
-        def frequencies(self, theta):
-            return TRUSS.frequencies(theta)
-
-    model = EstimatorModel()
-    chain = DataInformedFEM(model, inverse=InverseSurrogate(model, LinearRegression(), noise=0.01), random_state=0)
-    year = make_truss_campaign(random_state=0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        chain.fit(year.temperatures, year.frequencies)
-    assert model.random_state is None

@@ -13,7 +13,7 @@ TRUSS = make_truss()
 T = make_truss_campaign(random_state=0).temperatures
 
 
-@pytest.mark.filterwarnings("ignore:.*large-discrepancy")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_predictions_are_free_of_the_shrinkage_of_the_prior():
     truth = 0.85 * np.exp(-0.002 * (T.to_numpy()[:, :1] - 10)) * np.ones(4)
     clean = TRUSS.frequencies(truth)

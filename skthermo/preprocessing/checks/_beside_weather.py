@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
 import pandas as pd
-import scipy.fft
 from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
 
-from skthermo._core.arrays import NORMAL, Array, means_of_known, median, range_sums, robust_deviation, spread_evenly
-from skthermo._core.frames import columns_by_sensor
-from skthermo.preprocessing._weather_lines import WeatherLines, predicted_by_weather
-from skthermo.preprocessing.checks._reading import Reading
+from skthermo._core.arrays import Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
+from skthermo._core.frames import Table, column_names, columns_by_sensor
+from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, predicted_by_weather
+from skthermo.preprocessing.checks._columns import Reading
 from skthermo.preprocessing.checks._record_findings import period_of
 from skthermo.preprocessing.folds import BlockedKFold
 
@@ -95,12 +97,12 @@ def find_outliers(F: Reading, values: Array, lines: Array | None, folds: Rows | 
             has_weather, floor = ~np.isnan(lines).any(axis=1)[:, np.newaxis], 0.1 * deviation
             rest = values - np.where(has_weather, predicted_by_weather(lines, values, folds), middle)
             scatter = np.fmax(robust_deviation(rest), floor)
-            some = spread_evenly(np.arange(len(rest)), 4000)
-            usual = np.fmax(robust_deviation(beside_neighbours(rest, some)[0]), floor)
             far = (np.abs(rest - median(rest)) > 8 * scatter) & (scatter > 0) & (has_weather | far)
-            rows = np.flatnonzero(far.any(axis=1))
-            distances, local = beside_neighbours(rest, rows)
-            far[rows] &= np.abs(distances) > 8 * np.fmax(local, usual)
+            doubtful = np.flatnonzero(far.any(axis=0))
+            if doubtful.size:
+                distances, local = distances_from_neighbours(rest[:, doubtful], np.arange(len(rest)), 25)
+                usual = np.fmax(robust_deviation(distances), floor[doubtful])
+                far[:, doubtful] &= np.abs(distances) > 8 * np.fmax(local, usual)
     for place in np.flatnonzero(far.any(axis=0)):
         first, name = np.flatnonzero(far[:, place])[:1], F.columns[place]
         n_known = np.count_nonzero(~np.isnan(values[:, place]))
@@ -112,62 +114,48 @@ def find_outliers(F: Reading, values: Array, lines: Array | None, folds: Rows | 
     return far
 
 
-def beside_neighbours(values: Array, rows: Rows) -> tuple[Array, Array]:
-    """Distances of some rows from the median of the 25 rows around, and the standard deviation of these rows, by the
-    median of their distances."""
-    padded = np.pad(values, ((12, 12), (0, 0)), constant_values=np.nan)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 25, axis=0)[rows]
-    n_known = np.count_nonzero(~np.isnan(around), axis=2)[..., np.newaxis]
-    ends = np.maximum(np.concatenate([n_known - 1, n_known], axis=2) // 2, 0)
-    middle = np.take_along_axis(np.sort(around, axis=2), ends, axis=2).mean(axis=2)
-    distances = np.sort(np.abs(around - middle[..., np.newaxis]), axis=2)
-    return values[rows] - middle, NORMAL * np.take_along_axis(distances, ends, axis=2).mean(axis=2)
-
-
 def compare_times(
     T: Reading, F: Reading, values: Array, places: Array, lines: Array, folds: Rows, hours: float | None
 ) -> None:
     """Name temperatures that explain nothing, or clearly less than temperatures of other rows do.
 
-    A structure may follow the weather of up to a day before. Temperatures of other rows have to explain more in four
-    parts of the records, too, so that a change of the structure does not look like the season of another time.
+    A structure may follow the weather of up to a day before, or its means. Temperatures of other rows have to explain
+    more in four parts of the records, too, so that a change of the structure does not look like the season of another
+    time.
     """
-    inertia = 24 if hours is None else max(int(24 / hours), 1)
-    n_rows, left, shift = len(values), {}, 0
-    for other in [0, *proposed_shifts(places, values, inertia)]:
-        rows = spread_evenly(np.arange(max(other, 0), n_rows + min(other, 0)), 4000)
-        left[other] = unexplained(lines[rows - other], values[rows], folds[rows])
-        if not left[other].size:
+    n_rows, inertia, past = len(values), 24 if hours is None else max(int(24 / hours), 1), pd.DataFrame(places)
+    means = [past.rolling(length, min_periods=1).mean() for length in (6, 24, 168) if 10 * length <= n_rows]
+    inputs = np.hstack([lines, *(table.fillna(0.0) for table in (past.shift(fill_value=0.0), *means))])
+
+    def left(columns: Array, shift: int, own: int, n_parts: int = 1) -> Array:
+        """Share of the variance of modes that is left by temperatures of ``own`` rows before, where both are there."""
+        rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
+        return unexplained(columns[rows - own], values[rows], folds[rows], n_parts)
+
+    shares = {}
+    for shift in (0, *proposed_shifts(places, values, inertia)):
+        of_modes = left(lines, shift, shift)
+        if not of_modes.size:
             return
-        shift = other if np.mean(left[other]) < np.mean(left[shift]) else shift
-    rows = spread_evenly(np.arange(max(shift, 0), n_rows + min(shift, 0)), 4000)
-    columns, filled, ratios = [lines, np.roll(np.nan_to_num(places), 1, axis=0)], np.nan_to_num(places), []
-    for period in (6, 24, 168):  # means of the weather over more of the past
-        if 10 * period <= n_rows:
-            ends = np.arange(1, n_rows + 1)
-            starts = np.maximum(ends - period, 0)
-            columns.append(range_sums(filled, starts, ends) / (ends - starts)[:, np.newaxis])
-    inputs = np.hstack(columns)
-    for n_parts in (4, 1):
-        own = unexplained(inputs[rows], values[rows], folds[rows], n_parts)
-        other = unexplained(inputs[rows - shift], values[rows], folds[rows], n_parts)
-        ratios.append(np.exp(np.mean(np.log(np.maximum(other, 1e-300) / own))))
-    own, other = np.mean(own), np.mean(other)
-    is_better = ratios[0] < 1 and ratios[1] < 0.9 and 1 - other > max(0.1, 1 - own + 0.01)
-    if is_better and np.mean(left[shift]) < 0.95:  # means of the past may follow a season by chance
-        length = ""
-        if hours is not None:
-            late = abs(shift) * hours
-            length = f" (about {late:.3g} hours)" if late < 48 else f" (about {late / 24:.3g} days)"
+        shares[shift] = of_modes.mean()
+    shift = min(shares, key=lambda one: shares[one])
+    own, other = ([left(inputs, shift, rows, n_parts) for n_parts in (4, 1)] for rows in (0, shift))
+    if not all(share.size for share in (*own, *other)):
+        return
+    in_parts, whole = (np.log(np.maximum(there, 1e-300) / here).mean() for here, there in zip(own, other, strict=True))
+    explained, without = 1 - other[1].mean(), 1 - own[1].mean()
+    # means of the past may follow a season by chance
+    if in_parts < 0 and whole < np.log(0.9) and explained > max(0.1, without + 0.01) and shares[shift] < 0.95:
+        late = "" if hours is None else abs(shift) * hours
+        length = late and (f" (about {late:.3g} hours)" if late < 48 else f" (about {late / 24:.3g} days)")
         detail = (
-            f"those of {abs(shift)} rows {'before' if shift > 0 else 'after'}{length} explain {1 - other:.0%} of the "
-            f"variance in periods held out, those of the same rows {max(1 - own, 0.0):.0%}"
+            f"those of {abs(shift)} rows {'before' if shift > 0 else 'after'}{length} explain {explained:.0%} of the "
+            f"variance in periods held out, those of the same rows {max(without, 0.0):.0%}"
         )
         is_there = (np.arange(n_rows) >= shift) & (np.arange(n_rows) < n_rows + shift)
         F.found("time-shift", "", is_there, detail, period=False)
         return
-    rows = spread_evenly(np.arange(n_rows), 4000)
-    least = min(left[0].min(), unexplained(lines[rows], values[rows], folds[rows], 4).min(initial=1.0))
+    least = min(left(lines, 0, 0, n_parts).min(initial=1.0) for n_parts in (1, 4))
     if least > 0.98 and np.isnan(T.values[~np.isnan(T.before)]).mean() < 0.01:
         usable = ~np.isnan(values).all(axis=1) & ~np.isnan(places).any(axis=1)
         detail = f"at most {max(1 - least, 0.0):.1%} of the variance of a mode, in periods held out"
@@ -193,24 +181,88 @@ def proposed_shifts(places: Array, values: Array, inertia: int) -> list[int]:
     n_rows, found = len(places), set()
     farthest = n_rows // 4
     for length in (0, 1, inertia):
-        if 2 * length > n_rows:
-            continue
         spectra = []
-        for table in (places, values):
-            standard = np.nan_to_num(table - means_of_known(table))
-            if length:
-                sums = np.cumsum(np.pad(standard, ((1, 0), (0, 0))), axis=0)
-                standard = sums[2 * length :] - 2 * sums[length:-length] + sums[: -2 * length]
-            deviations = standard.std(axis=0)
-            standard = np.clip(standard / np.where(deviations > 0, deviations, np.inf), -5, 5)
-            spectra.append(scipy.fft.rfft(standard.astype(np.float32).T, 2 * n_rows))
-        strength = np.zeros(2 * n_rows)
-        for weather in spectra[0]:
-            strength += (scipy.fft.irfft(spectra[1] * weather.conj(), 2 * n_rows) ** 2).sum(axis=0)
+        for table in map(pd.DataFrame, (places, values)):
+            changes = table.rolling(length, min_periods=1).mean().diff(length) if length else table
+            standard = ((changes - changes.mean()) / changes.std()).clip(-5, 5).fillna(0.0)
+            spectra.append(rfft(standard.to_numpy(np.float32).T, 2 * n_rows))
+        strength = sum((irfft(spectra[1] * weather.conj(), 2 * n_rows) ** 2).sum(axis=0) for weather in spectra[0])
         strength = np.concatenate([strength[-farthest:], strength[: farthest + 1]])
         strength[farthest - 1 : farthest + inertia + 1] = 0
-        for _ in range(3):
-            peak = int(strength.argmax())
-            found.add(peak - farthest)
-            strength[max(peak - 2, 0) : peak + 3] = 0
+        found.update((np.argsort(strength)[-6:] - farthest).tolist())
     return sorted(found)
+
+
+def looks_exchanged(temperatures: Array, frequencies: Array) -> bool:
+    """Whether temperatures are frequencies: most vary by far less, relative to their median, than the frequencies."""
+    T, F = TypicalColumns(temperatures, "T"), TypicalColumns(frequencies, "f")
+    vary = [columns.variation[columns.deviation > 0] for columns in (T, F)]
+    if min(map(len, (temperatures, frequencies))) < 50 or not all(map(len, vary)):
+        return False
+    return bool(np.median(vary[0]) < min(0.075, np.median(vary[1]) / 4))
+
+
+def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[RecordsWarning]:
+    """A warning about temperatures that behave like frequencies, and one about frequencies that behave like
+    temperatures.
+
+    Frequencies are positive, vary by a few percent of their median, at most 15, and rise and fall together (rank
+    correlation above .1). Temperatures in degrees Celsius vary five times as much, and are nearly equal (rank
+    correlation above .6).
+    """
+    if len(temperatures) < 30:
+        return
+    T, F = TypicalColumns(temperatures, "T"), TypicalColumns(frequencies, "f")
+    steady = F.variation[F.variation <= 0.15]
+    usual = np.median(steady) if len(steady) else np.min(T.variation, initial=0.15)
+    is_temperature = (F.variation >= 5.0 * usual) & (len(steady) > 0 or (T.variation <= 0.15).any())
+    is_mode = (T.variation <= 3.0 * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
+    is_mode &= T.variation <= 0.15
+    if not is_mode.any() and not is_temperature.any():
+        return
+    ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=30).fillna(0).to_numpy()
+    n_sensors = len(T.names)
+    among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
+    together = across[:, ~is_temperature].mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
+    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), 0.1)
+    is_temperature &= ((across > 0.6) & T.nearly(F))[~is_mode].any(axis=0)
+    if is_mode.any():
+        yield RecordsWarning(
+            f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
+            "A mode that predicts the others hides damage. Put all modes among the targets, and only temperatures "
+            "beside them",
+            "modes-among-temperatures",
+        )
+    if is_temperature.any():
+        yield RecordsWarning(
+            f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
+            "and are nearly equal to other temperatures. A detector would evaluate the weather. Give only frequencies "
+            "as targets",
+            "temperatures-among-modes",
+        )
+
+
+class TypicalColumns:
+    """TypicalColumns of a table, of rows evenly spread, with their robust statistics."""
+
+    def __init__(self, table: Table, default: str):
+        values = as_floats(table)[spread_evenly(np.arange(len(table)), 2000)]
+        self.values, self.names = values, column_names(table, default)
+        self.median, self.deviation = median(values), robust_deviation(values)
+        positive = (np.fmin.reduce(values) > 0) & (self.deviation > 0)
+        self.variation = np.divide(self.deviation, self.median, out=np.full(values.shape[1], np.inf), where=positive)
+
+    def named(self, chosen: NDArray[np.bool_]) -> list:
+        return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
+
+    def reach(self, others: TypicalColumns) -> NDArray[np.bool_]:
+        """Which others have about the magnitude of some of these."""
+        lowest, highest = np.nanmin(self.median) / 10, np.nanmax(self.median) * 10
+        return (others.median >= lowest) & (others.median <= highest)
+
+    def nearly(self, others: TypicalColumns) -> NDArray[np.bool_]:
+        """Which pairs with others could be temperatures of the same place, (n_columns, n_others)."""
+        difference = np.abs(self.median[:, np.newaxis] - others.median)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = self.deviation[:, np.newaxis] / others.deviation
+        return (difference <= 20) & (ratio >= 1 / 3) & (ratio <= 3)

@@ -1,12 +1,14 @@
-"""The posterior mode of parameters given frequencies, by steps on the FE model; records teach prior and noise."""
+"""The posterior mode of parameters given frequencies and mode shapes, by steps on the FE model; records teach prior and
+noise."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from numbers import Integral, Real
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 import pandas as pd
@@ -18,11 +20,16 @@ from sklearn.utils import Bunch
 from skthermo._core.arrays import (
     Array,
     Reduce,
+    as_floats,
+    by_mode,
+    check_dofs,
     check_flag,
     check_model,
     check_noise,
     check_prior,
     is_auto,
+    median,
+    real_array,
     robust_deviation,
     spread_evenly,
     tolerance,
@@ -36,18 +43,16 @@ from skthermo._core.estimators import (
     check_is_fitted,
     validate_data,
 )
-from skthermo._core.frames import column_names, frame_like, row_times
+from skthermo._core.frames import Table, column_names, frame_like, row_times
 from skthermo._core.memory import remembered
 from skthermo._core.text import listed, percent
 from skthermo._core.warnings import collected, warn_each
-from skthermo.exceptions import FewRecordsWarning, ModelWarning
-from skthermo.fem import FEModel, evaluate
+from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
+from skthermo.fem import FEModel, evaluate, evaluate_modes, shape_components
 from skthermo.fem.affine import ResponseSurface, n_terms
 from skthermo.surrogate._regression import FrequencyInverse
 from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.inverse._shapes import ShapeInputs, shape_misfit
 
-LEAST_NOISE, MOST_NOISE = 1e-5, 0.3  # range of the relative noise that records teach
 Linearise = Callable[[Array], tuple[Array, ...]]
 """Frequencies, (n_rows, n_modes), and d ln f / d ln theta, (n_rows, n_modes, n_parameters), at rows of theta; with
 sensors also shapes, (n_rows, n_sensors, n_modes), and d phi / d ln theta."""
@@ -72,9 +77,7 @@ class ThermalPrior:
     @property
     def precision(self) -> Array:
         """The inverse of the covariance."""
-        weights = self.own**-2.0
-        together = self.common**2 / (1 + self.common**2 * weights.sum())
-        return np.diag(weights) - together * np.outer(weights, weights)
+        return np.linalg.inv(self.covariance)
 
     @property
     def deviations(self) -> Array:
@@ -112,15 +115,7 @@ class LinearRecords:
         with np.errstate(invalid="ignore"):
             return LinearRecords(np.where(self.values**2 <= far**2 * variances, self.values, np.nan), self.slopes)
 
-    def posterior(self, prior: ThermalPrior, noise: Array) -> tuple[Array, Array]:
-        """Means, (n_records, n_parameters), and covariances of ln theta given each record."""
-        known = ~np.isnan(self.values)
-        spread = np.where(known, noise, np.inf)
-        covariances = np.linalg.inv(information(self.slopes, spread, prior.precision))
-        pulls = np.einsum("smp,sm->sp", self.slopes, np.where(known, self.values, 0.0) / spread**2)
-        return np.einsum("spq,sq->sp", covariances, pulls), covariances
-
-    def learned(
+    def taught(
         self,
         prior: ThermalPrior,
         noise: Array,
@@ -129,50 +124,45 @@ class LinearRecords:
         learns_prior: bool,
         learns_noise: NDArray[np.bool_],
         moved: tuple[float, float] = (1e-3, 3.0),
-    ) -> tuple[ThermalPrior, Array]:
-        """The most likely prior and noise, by steps from given ones.
+    ) -> tuple[ThermalPrior, Array, Array]:
+        """The most likely prior and noise, by steps from given ones, and the means of ln theta given each record.
 
-        Noise is relative, one number for each observation, (n_observations,), and no smaller than the least. What the
-        model cannot follow counts as noise. The deviations of the prior lie in the range ``moved``.
+        ln theta of a record is the sum of a common factor and of one of each parameter, which are independent. Noise is
+        relative, (n_observations,), and no smaller than the least; what the model cannot follow counts as noise. The
+        deviations of the prior lie in the range ``moved``.
         """
-        n_own = 1 + len(prior.own)
+        known, deviations = ~np.isnan(self.values), np.append(prior.common, prior.own)
+        values, has_size = np.where(known, self.values, 0.0), deviations > 0
+        parts = np.column_stack([np.ones(len(prior.own)), np.eye(len(prior.own))])[:, has_size]
+        effects, n_parts = self.slopes @ parts, parts.shape[1]
 
-        def read(logs: Array) -> tuple[ThermalPrior, Array]:
-            values, found = np.exp(logs), noise.copy()
-            found[learns_noise] = values[n_own * learns_prior :]
-            return ThermalPrior(prior.names, values[0], values[1:n_own]) if learns_prior else prior, found
+        def loss(logs: Array) -> tuple[float, Array, Array]:
+            """Minus the logarithm of the likelihood, its derivatives, those expected given each record (Fisher's
+            identity), and the means of the factors."""
+            sizes, scatter = np.exp(logs[:n_parts]), np.exp(logs[n_parts:])
+            weights = known / scatter**2
+            covariances = np.linalg.inv(information(effects, weights, np.diag(sizes**-2.0)))
+            pulls = np.einsum("smq,sm->sq", effects, weights * values)
+            factors = np.einsum("spq,sq->sp", covariances, pulls)
+            left = values - np.einsum("smp,sp->sm", effects, factors)
+            moments = factors**2 + np.einsum("spp->sp", covariances)
+            squares = known * (left**2 + ((effects @ covariances) * effects).sum(axis=2))
+            volumes = np.log(sizes).sum() * len(values) - 0.5 * np.linalg.slogdet(covariances)[1].sum()
+            misfits = 0.5 * ((weights * left**2).sum() + ((factors / sizes) ** 2).sum())
+            of_sizes, of_scatter = (1 - moments / sizes**2).sum(axis=0), (known - squares / scatter**2).sum(axis=0)
+            total = misfits + volumes + (known @ np.log(scatter)).sum()
+            return float(total), np.append(of_sizes, of_scatter), factors
 
-        def loss(logs: Array) -> tuple[float, Array]:
-            likelihood, of_prior, of_noise = self._likelihood(*read(logs))
-            return -likelihood, -np.append(of_prior if learns_prior else [], of_noise[learns_noise])
-
-        learns_noise = learns_noise & ~np.isnan(self.values).all(axis=0)
-        start = np.log(np.append([prior.common, *prior.own] if learns_prior else [], noise[learns_noise]))
-        if not len(start):
-            return prior, noise
-        lowest = np.append([moved[0]] * (n_own * learns_prior), least[learns_noise])
-        highest = np.append([moved[1]] * (n_own * learns_prior), [MOST_NOISE] * learns_noise.sum())
-        bounds = np.log(np.column_stack([lowest, highest]))
-        return read(minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x)
-
-    def _likelihood(self, prior: ThermalPrior, noise: Array) -> tuple[float, Array, Array]:
-        """Logarithm of the likelihood, and its derivatives by the logarithms of the prior's deviations and the noise.
-
-        The derivatives are those expected given each record (Fisher's identity).
-        """
-        known, precision = ~np.isnan(self.values), prior.precision
-        x, covariances = self.posterior(prior, noise)
-        values, spread = np.where(known, self.values, 0.0), np.where(known, noise, np.inf)
-        left = values - np.einsum("smp,sp->sm", self.slopes, x)
-        variances = np.einsum("smp,spq,smq->sm", self.slopes, covariances, self.slopes)
-        volumes = np.linalg.slogdet(covariances)[1].sum() + len(x) * np.linalg.slogdet(precision)[1]
-        squares = ((left / spread) ** 2).sum() + np.einsum("sp,pq,sq->", x, precision, x)
-        likelihood = 0.5 * (volumes - squares) - (known @ np.log(noise)).sum()
-        moments = x.T @ x + covariances.sum(axis=0)
-        slope = precision @ moments @ precision - len(x) * precision
-        of_prior = np.append(prior.common**2 * slope.sum(), prior.own**2 * np.diag(slope))
-        of_noise = (np.where(known, left**2 + variances, 0.0) / noise**2 - known).sum(axis=0)
-        return float(likelihood), of_prior, of_noise
+        start = np.log(np.append(deviations[has_size], noise))
+        learns = np.append(np.full(n_parts, learns_prior), learns_noise & known.any(axis=0))
+        lowest = np.where(learns, np.log(np.append(np.full(n_parts, moved[0]), least)), start)
+        highest = np.where(learns, np.log(np.append(np.full(n_parts, moved[1]), np.full(len(noise), 0.3))), start)
+        bounds = np.column_stack([lowest, highest])
+        best = minimize(lambda logs: loss(logs)[:2], start, jac=True, method="L-BFGS-B", bounds=bounds).x
+        found = np.exp(best)
+        if learns_prior:
+            prior = ThermalPrior(prior.names, float(found[0]), found[1:n_parts])
+        return prior, np.where(learns[n_parts:], found[n_parts:], noise), loss(best)[2] @ parts.T
 
 
 def least_noise(log_frequencies: Array) -> Array:
@@ -183,7 +173,7 @@ def least_noise(log_frequencies: Array) -> Array:
     """
     steps = robust_deviation(np.diff(log_frequencies, axis=0)) if len(log_frequencies) > 1 else np.zeros(1)
     share = 0.1 / np.sqrt(2) * np.nan_to_num(steps)
-    return np.clip(np.broadcast_to(share, log_frequencies.shape[1:]), LEAST_NOISE, MOST_NOISE / 2)
+    return np.clip(np.broadcast_to(share, log_frequencies.shape[1:]), 1e-5, 0.15)
 
 
 @dataclass(frozen=True)
@@ -198,25 +188,25 @@ class ThermalPosterior:
     simulator: Simulator
     prior: ThermalPrior
     noise: Array
-    n_modes: int
     shapes: ShapeInputs | None
     surface: ResponseSurface | None
     is_program: bool
     n_runs: int = 0
 
-    def observed(self, inputs: Array) -> Observed:
-        """What rows of inputs tell.
+    def observed(self, inputs: Array) -> tuple[Array, Array]:
+        """Observations of rows of inputs, ln f and components of shapes of unit length, (n_rows, n_observations), and
+        their weights, 1 / noise^2, 0 where one is missing.
 
         Frequencies count as exact to 1e-6 at most. Where modes are missing, many parameters fit the others, and a noise
         of 1e-3 lets steps move along the curve of these parameters.
         """
-        frequencies = inputs[:, : self.n_modes]
-        units = np.empty((*frequencies.shape, 0)) if self.shapes is None else self.shapes.unit_shapes(inputs)
+        n_modes = self.simulator.model.n_modes
+        values = inputs if self.shapes is None else inputs / np.sqrt(self.shapes.n_sensors)
+        values = np.hstack([np.log(inputs[:, :n_modes]), values[:, n_modes:]])
         noise = np.tile(self.noise, (len(inputs), 1))
-        has_gaps = np.isnan(frequencies).any(axis=1, keepdims=True)
-        noise[:, : self.n_modes] = np.maximum(noise[:, : self.n_modes], np.where(has_gaps, 1e-3, 1e-6))
-        missing = np.isnan(np.hstack([frequencies, units.reshape(len(units), -1)]))
-        return Observed(np.log(frequencies), units, np.where(missing, np.inf, noise))
+        has_gaps = np.isnan(values[:, :n_modes]).any(axis=1, keepdims=True)
+        noise[:, :n_modes] = np.maximum(noise[:, :n_modes], np.where(has_gaps, 1e-3, 1e-6))
+        return values, np.where(np.isnan(values), 0.0, noise**-2.0)
 
     def linearised(self, theta: Array, n_jobs: int | None, *, exactly: bool = False) -> tuple[Array, ...]:
         """The model at rows of theta, relative derivatives included; unless ``exactly``, the reduced one if there is
@@ -224,74 +214,47 @@ class ThermalPosterior:
         simulator = Simulator(self.simulator.model) if exactly else self.simulator.approximate
         return simulator.linearise(theta, n_jobs, None if self.shapes is None else self.shapes.dofs, relative=True)
 
-    def modes(self, observed: Observed, n_jobs: int | None) -> PosteriorModes:
-        """Posterior modes of rows: by the surface, then by the model, and by the full one outside the reduced one's
-        box."""
-        precision, start = self.prior.precision, np.zeros((len(observed.noise), len(self.prior.own)))
+    def modes(self, values: Array, weights: Array, n_jobs: int | None) -> Bunch:
+        """Posterior modes of rows, and which of them the full model has solved, being outside the box of the reduced
+        one."""
+        precision, n_rows = self.prior.precision, len(values)
+        x, by_full = np.zeros((n_rows, len(self.prior.own))), np.zeros(n_rows, dtype=bool)
         if self.surface is not None:
-            found = posterior_modes(self.surface.linearise, observed, precision, start)
-            if self.is_program:
-                return found
-            start = found.x
-        model = partial(self.linearised, n_jobs=n_jobs)
-        found = posterior_modes(model, observed, precision, start)
-        if not getattr(self.simulator.model, "track", False):
-            found = beyond_crossings(model, observed, precision, found)
-        outside = self.simulator.outside(np.exp(found.x)) if self.simulator.reduced is not None else np.zeros(1, bool)
-        if (rows := np.flatnonzero(outside)).size:
+            found = posterior_modes(self.surface.linearise, values, weights, precision, x)
+            x = found.x
+        if self.surface is None or not self.is_program:
+            model = partial(self.linearised, n_jobs=n_jobs)
+            found = posterior_modes(model, values, weights, precision, x)
+            if not getattr(self.simulator.model, "track", False):
+                pass_crossings(model, self.simulator.model.n_modes, values, weights, precision, found)
+            if self.simulator.reduced is not None:
+                by_full = self.simulator.outside(np.exp(found.x))
+        if by_full.any():
             exact = partial(self.linearised, n_jobs=n_jobs, exactly=True)
-            last = posterior_modes(exact, observed.some(rows), precision, found.x[rows])
-            last.full_solves[:] = last.solves
-            found.put(rows, last)
-        return found
+            put(found, by_full, posterior_modes(exact, values[by_full], weights[by_full], precision, found.x[by_full]))
+        return Bunch(**found, by_full_model=by_full)
 
 
-class Observed(NamedTuple):
-    """Measured ln f, (n_rows, n_modes), mode shapes of unit length, (n_rows, n_modes, n_sensors), and standard
-    deviations of both, (n_rows, n_observations), infinite where one is missing."""
+def beside(
+    values: Array, frequencies: Array, slopes: Array, shapes: Array | None = None, of_shapes: Array | None = None
+) -> tuple[Array, Array]:
+    """Residuals of observations beside a solved model, 0 where one is missing, and derivatives of the model's by ln
+    theta.
 
-    log_frequencies: Array
-    units: Array
-    noise: Array
-
-    def some(self, rows: NDArray[np.intp]) -> Observed:
-        """Some of the rows."""
-        return Observed(self.log_frequencies[rows], self.units[rows], self.noise[rows])
-
-    def beside(self, frequencies: Array, slopes: Array, *shapes: Array) -> tuple[Array, Array]:
-        """Residuals beside a solved model, 0 where one is missing, and derivatives of the observations by ln theta.
-
-        A model that gives no shapes, such as a surface, is compared with the frequencies alone.
-        """
-        residual = self.log_frequencies - np.log(frequencies)
-        if shapes:
-            misfit, change = shape_misfit(self.units, *shapes)
-            residual, slopes = np.hstack([residual, misfit]), np.hstack([slopes, change])
-        return np.where(np.isinf(self.noise[:, : residual.shape[1]]), 0.0, residual), slopes
-
-
-class PosteriorModes(NamedTuple):
-    """Where the steps of each row end, ln theta = x, with objective, residuals and derivatives there; how they end."""
-
-    x: Array
-    value: Array
-    residual: Array
-    slopes: Array
-    converged: NDArray[np.bool_]
-    stalled: NDArray[np.bool_]
-    solves: NDArray[np.intp]
-    full_solves: NDArray[np.intp]
-
-    def put(self, rows: NDArray[np.intp], other: PosteriorModes) -> None:
-        """Put other ends of some rows in place; solves of both count."""
-        for name, values in zip(self._fields, other, strict=True):
-            mine = getattr(self, name)
-            mine[rows] = values + (mine[rows] if name.endswith("solves") else 0)
+    A model that gives no shapes, such as a surface, is compared with the frequencies alone.
+    """
+    n_rows, n_modes = frequencies.shape
+    residual = values[:, :n_modes] - np.log(frequencies)
+    if shapes is not None:
+        misfit, change = shape_misfit(values[:, n_modes:].reshape(n_rows, n_modes, -1), shapes, of_shapes)
+        residual, slopes = np.hstack([residual, misfit]), np.hstack([slopes, change])
+    return np.where(np.isnan(values[:, : residual.shape[1]]), 0.0, residual), slopes
 
 
 def posterior_modes(
     linearise: Linearise,
-    observed: Observed,
+    values: Array,
+    weights: Array,
     precision: Array,
     start: Array,
     *,
@@ -299,47 +262,44 @@ def posterior_modes(
     share: float = 0.01,
     least: float = 1e-6,
     last_damping: float = 1e8,
-) -> PosteriorModes:
+) -> Bunch:
     """Posterior modes of ln theta by Gauss-Newton steps, each damped more where one would raise the objective.
 
-    The objective is half of the squared residuals over the noise and of ln theta in its prior. A step is a row's last
-    one if it is less than a share of the posterior standard deviations and curvature along it is less than a tenth of
-    that share of the noise, or if it is less than ``least``, or would gain less than rounding hides. At
+    The objective is the sum of the weighted squares of the residuals and of ln theta in its prior. A step is a row's
+    last one if it is less than a share of the posterior standard deviations and curvature along it is less than a tenth
+    of that share of the noise, or if it is less than ``least``, or would gain less than rounding hides. At
     ``last_damping``, a share of the diagonal of the Hessian, a row stalls.
     """
+    x = start.copy()
+    residual, slopes = beside(values, *linearise(np.exp(x)))
+    weights = weights[:, : residual.shape[1]]
 
-    def objective(x: Array, residual: Array, noise: Array) -> Array:
-        value = 0.5 * (((residual / noise) ** 2).sum(axis=1) + ((x @ precision) * x).sum(axis=1))
+    def objective(x: Array, residual: Array, weights: Array) -> Array:
+        value = (weights * residual**2).sum(axis=1) + ((x @ precision) * x).sum(axis=1)
         return np.where(np.isfinite(value), value, np.inf)
 
-    x = start.copy()
-    residual, slopes = observed.beside(*linearise(np.exp(x)))
-    noise = observed.noise[:, : residual.shape[1]]
-    value, damping = objective(x, residual, noise), np.zeros(len(x))
-    converged, solves, active = np.zeros(len(x), dtype=bool), np.ones(len(x), dtype=np.intp), np.arange(len(x))
-    active = active[np.isfinite(value)]
+    value, damping = objective(x, residual, weights), np.zeros(len(x))
+    curvature = np.sqrt(0.1 * share / np.sqrt(np.maximum(weights.max(axis=1, keepdims=True), np.finfo(float).tiny)))
+    converged, active = np.zeros(len(x), dtype=bool), np.flatnonzero(np.isfinite(value))
     for _ in range(n_steps):
-        hessian = information(slopes[active], noise[active], precision)
-        pull = np.einsum("smp,sm->sp", slopes[active], residual[active] / noise[active] ** 2) - x[active] @ precision
+        hessian = information(slopes[active], weights[active], precision)
+        pull = np.einsum("smp,sm->sp", slopes[active], weights[active] * residual[active]) - x[active] @ precision
         step = gauss_newton(hessian, pull, np.zeros(len(active)))
-        gain = 0.5 * (pull * step).sum(axis=1)
-        smallest = np.minimum(
-            share * deviations(hessian), np.sqrt(0.1 * share * noise[active].min(axis=1, keepdims=True))
-        )
-        is_last = (np.abs(step) <= np.maximum(least, smallest)).all(axis=1) | (gain <= 1e-10 * value[active])
+        gain = (pull * step).sum(axis=1)
+        smallest = np.maximum(least, np.minimum(share * deviations(hessian), curvature[active]))
+        is_last = (np.abs(step) <= smallest).all(axis=1) | (gain <= 1e-10 * value[active])
         ended = active[is_last]
         x[ended] += step[is_last]
-        residual[ended] -= np.einsum("smp,sp->sm", slopes[ended], step[is_last]) * np.isfinite(noise[ended])
+        residual[ended] -= np.einsum("smp,sp->sm", slopes[ended], step[is_last]) * (weights[ended] > 0)
         value[ended] -= gain[is_last]
         converged[ended] = True
         goes_on = ~is_last & (damping[active] < last_damping)
-        active, hessian, pull = active[goes_on], hessian[goes_on], pull[goes_on]
+        active = active[goes_on]
         if not len(active):
             break
-        tried = x[active] + gauss_newton(hessian, pull, damping[active])
-        there, slopes_there = observed.some(active).beside(*linearise(np.exp(tried)))
-        solves[active] += 1
-        value_there = objective(tried, there, noise[active])
+        tried = x[active] + gauss_newton(hessian[goes_on], pull[goes_on], damping[active])
+        there, slopes_there = beside(values[active], *linearise(np.exp(tried)))
+        value_there = objective(tried, there, weights[active])
         is_lower = value_there < value[active]
         damping[active] = np.where(is_lower, damping[active] / 30, np.maximum(1e-3, 5 * damping[active]))
         damping[damping < 1e-4] = 0.0
@@ -347,41 +307,50 @@ def posterior_modes(
         x[rows], residual[rows], slopes[rows] = tried[is_lower], there[is_lower], slopes_there[is_lower]
         value[rows] = value_there[is_lower]
     stalled = ~converged & ((damping > 0) | np.isinf(value))
-    return PosteriorModes(x, value, residual, slopes, converged, stalled, solves, np.zeros_like(solves))
+    return Bunch(x=x, value=value, residual=residual, slopes=slopes, converged=converged, stalled=stalled)
 
 
-def beyond_crossings(
-    linearise: Linearise, observed: Observed, precision: Array, found: PosteriorModes, *, large: float = 3.0
-) -> PosteriorModes:
-    """Posterior modes of a model that sorts its modes, some of them beyond a crossing of two of these.
+def pass_crossings(
+    linearise: Linearise,
+    n_modes: int,
+    values: Array,
+    weights: Array,
+    precision: Array,
+    found: Bunch,
+    *,
+    large: float = 3.0,
+) -> None:
+    """Put better posterior modes in place where two modes of a model that sorts them have crossed.
 
     A row whose root mean square misfit is ``large``, in standard deviations of the noise, starts again where the two
-    modes fit in exchanged order, and ends there if that is better.
+    modes fit in exchanged order.
     """
-    n_modes = observed.log_frequencies.shape[1]
     for lower in range(n_modes - 1):
-        squares = (found.residual / observed.noise[:, : found.residual.shape[1]]) ** 2
-        rows = np.flatnonzero(~found.converged | (squares.mean(axis=1) > large**2))
+        misfits = (weights[:, : found.residual.shape[1]] * found.residual**2).mean(axis=1)
+        rows = np.flatnonzero(~found.converged | (misfits > large**2))
         if not rows.size:
-            break
+            return
         order = np.arange(n_modes)
-        order[[lower, lower + 1]] = order[[lower + 1, lower]]
-        some, slopes = observed.some(rows), found.slopes[rows, :n_modes]
-        fitted = some.log_frequencies - found.residual[rows, :n_modes]
-        noise = some.noise[:, order]
-        residual = np.where(np.isinf(noise), 0.0, some.log_frequencies[:, order] - fitted)
-        pull = np.einsum("smp,sm->sp", slopes, residual / noise**2) - found.x[rows] @ precision
-        start = found.x[rows] + gauss_newton(information(slopes, noise, precision), pull, np.zeros(len(rows)))
-        again = posterior_modes(linearise, some, precision, start)
-        is_better = np.flatnonzero(again.value < found.value[rows])
-        found.put(rows[is_better], PosteriorModes(*(values[is_better] for values in again)))
-    return found
+        order[[lower, lower + 1]] = lower + 1, lower
+        at, slopes, own = found.x[rows], found.slopes[rows, :n_modes], weights[np.ix_(rows, order)]
+        fitted = values[rows, :n_modes] - found.residual[rows, :n_modes]
+        residual = np.nan_to_num(values[np.ix_(rows, order)] - fitted)
+        pull = np.einsum("smp,sm->sp", slopes, own * residual) - at @ precision
+        start = at + gauss_newton(information(slopes, own, precision), pull, np.zeros(len(rows)))
+        again = posterior_modes(linearise, values[rows], weights[rows], precision, start)
+        is_better = again.value < found.value[rows]
+        put(found, rows[is_better], Bunch(**{name: array[is_better] for name, array in again.items()}))
 
 
-def information(slopes: Array, noise: Array, precision: Array) -> Array:
-    """Precision of ln theta given derivatives of observations and their noise, infinite where one is missing."""
-    scaled = slopes / noise[:, :, np.newaxis]
-    return scaled.swapaxes(1, 2) @ scaled + precision
+def put(found: Bunch, rows: NDArray, others: Bunch) -> None:
+    """Put other posterior modes of some rows in place."""
+    for name, array in others.items():
+        found[name][rows] = array
+
+
+def information(slopes: Array, weights: Array, precision: Array) -> Array:
+    """Precision of ln theta given derivatives of observations and their weights."""
+    return slopes.swapaxes(1, 2) @ (slopes * weights[:, :, np.newaxis]) + precision
 
 
 def gauss_newton(hessian: Array, pull: Array, damping: Array, *, longest: float = 0.5) -> Array:
@@ -400,23 +369,22 @@ def deviations(hessian: Array) -> Array:
 
 def inverted(taught_by: Any, inputs: Array, posterior: ThermalPosterior, n_jobs: int | None) -> Bunch:
     """What `PosteriorInverse.invert` gives, for rows of inputs; a memory knows a posterior by what has taught it."""
-    observed, precision = posterior.observed(inputs), posterior.prior.precision
-    found = posterior.modes(observed, n_jobs)
-    slopes = np.nan_to_num(found.slopes)
-    noise, stated = observed.noise[:, : slopes.shape[1]], posterior.noise[: slopes.shape[1]]
-    std = deviations(information(slopes, noise, precision))
-    at_best = deviations(information(slopes, np.where(np.isinf(noise), stated, noise), precision))
+    values, weights = posterior.observed(inputs)
+    found = posterior.modes(values, weights, n_jobs)
+    slopes, precision = np.nan_to_num(found.slopes), posterior.prior.precision
+    weights, stated = weights[:, : slopes.shape[1]], posterior.noise[: slopes.shape[1]] ** -2.0
+    std = deviations(information(slopes, weights, precision))
+    at_best = deviations(information(slopes, np.where(weights > 0, weights, stated), precision))
     is_empty = np.isnan(inputs).all(axis=1)
     unknown = (is_empty | found.stalled)[:, np.newaxis]
     theta = np.where(unknown, np.nan, np.exp(found.x))
     return Bunch(
         theta=theta,
         std=std * theta,
-        residuals=np.where(unknown | np.isinf(noise), np.nan, found.residual)[:, : posterior.n_modes],
+        residuals=np.where(unknown | (weights == 0), np.nan, found.residual)[:, : posterior.simulator.model.n_modes],
         weight=np.where(is_empty, 0.0, ((at_best / std) ** 2).mean(axis=1)),
         converged=found.converged & ~is_empty,
-        solves=found.solves,
-        full_solves=found.full_solves,
+        by_full_model=found.by_full_model,
     )
 
 
@@ -439,18 +407,18 @@ def taught(
     rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), n_teaching)
     if not len(rows):
         return first
-    now, observed, x = first, first.observed(inputs[rows]), np.zeros((len(rows), len(first.prior.own)))
+    now, x, n_modes = first, np.zeros((len(rows), len(first.prior.own))), first.simulator.model.n_modes
+    values = first.observed(inputs[rows])[0]
     solved = tuple(np.repeat(part, len(rows), axis=0) for part in first.linearised(np.exp(x[:1]), n_jobs))
     least = first.noise.copy()
-    least[: first.n_modes] = least_noise(np.log(inputs[:, : first.n_modes]))
+    least[:n_modes] = least_noise(np.log(inputs[:, :n_modes]))
+    learns = {"least": least, "learns_prior": learns_prior, "learns_noise": learns_noise}
     runs: list[tuple[Array, Array]] = []
     for number in range(n_passes):
-        records = LinearRecords.around(x, *observed.beside(*solved), np.isinf(observed.noise))
+        records = LinearRecords.around(x, *beside(values, *solved), np.isnan(values))
         records = records.near(now.prior, now.noise) if number else records
-        prior, noise = records.learned(
-            now.prior, now.noise, least, learns_prior=learns_prior, learns_noise=learns_noise
-        )
-        x = x + np.clip(records.posterior(prior, noise)[0] - x, -1.0, 1.0)
+        prior, noise, means = records.taught(now.prior, now.noise, **learns)
+        x = x + np.clip(means - x, -1.0, 1.0)
         now = replace(now, prior=prior, noise=noise)
         if now.is_program:
             now = with_runs(now, x, runs, n_jobs) if number < 2 else now
@@ -481,6 +449,132 @@ def with_runs(
     surface = ResponseSurface.fitted(*(np.concatenate(part) for part in zip(*runs, strict=True)))
     at_nominal = (2 * n_parameters + 1) * (len(runs) == 1)
     return replace(posterior, surface=surface, n_runs=posterior.n_runs + number + at_nominal)
+
+
+@dataclass(frozen=True)
+class ShapeInputs:
+    """Columns of frequencies, and of the components of mode shapes, mode by mode.
+
+    ``dofs`` are the sensors' degrees of freedom, ``reference`` the nominal shapes there, (n_sensors, n_modes), which
+    set the signs, and ``noise`` standard deviations of components as a share of their shape's root mean square.
+    """
+
+    dofs: NDArray[np.intp]
+    reference: Array
+    noise: Array
+
+    @classmethod
+    def read(cls, model: FEModel, dofs: ArrayLike, noise: ArrayLike) -> ShapeInputs:
+        """The columns for a model and sensors, each mode of which must move a sensor."""
+        if not hasattr(model, "modes"):
+            raise ValueError(f"dofs are given, but {model!r} has no method 'modes'; expected a model that gives shapes")
+        shapes = np.asarray(model.modes(np.ones((1, len(model.parameter_names))))[1])[0]
+        places = check_dofs(dofs, len(shapes), getattr(model, "dofs", ()))
+        largest = np.abs(shapes[places]).max(axis=0) / np.abs(shapes).max(axis=0)
+        if (largest < 1e-6).any():  # rounding errors at a node
+            raise ValueError(
+                f"mode {largest.argmin()} does not move the degrees of freedom {places.tolist()}; expected one that "
+                "it moves, or model.with_modes without this mode"
+            )
+        deviations = real_array(by_mode(noise, model.n_modes, None, "shape_noise"), "shape_noise")
+        if deviations.shape not in ((), (model.n_modes,)) or not ((deviations > 0) & (deviations < 1)).all():
+            raise ValueError(
+                f"shape_noise is {deviations}; expected standard deviations between 0 and 1, one number or "
+                f"{model.n_modes}. 0.01 means 1 % of the root mean square of a shape"
+            )
+        return cls(places, shapes[places], np.broadcast_to(deviations, (model.n_modes,)))
+
+    @property
+    def n_sensors(self) -> int:
+        return len(self.dofs)
+
+    @property
+    def n_modes(self) -> int:
+        return self.reference.shape[1]
+
+    @property
+    def n_columns(self) -> int:
+        return self.n_modes * (1 + self.n_sensors)
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the components of shapes of unit length, mode by mode, (n_modes * n_sensors,)."""
+        return np.repeat(self.noise / np.sqrt(self.n_sensors), self.n_sensors)
+
+    def normalised(self, inputs: Array) -> Array:
+        """Inputs with components of a root mean square of 1 and the signs of the nominal shapes."""
+        shapes = inputs[:, self.n_modes :].reshape(len(inputs), self.n_modes, self.n_sensors)
+        return np.hstack([inputs[:, : self.n_modes], shape_components(shapes, self.reference)])
+
+    def joined(self, F: Table, shapes: ArrayLike | None) -> Table:
+        """Frequencies beside the components of measured shapes, NaN there without shapes."""
+        components = np.full((len(F), self.n_columns - self.n_modes), np.nan)
+        if shapes is not None:
+            components = shape_components(shapes, self.reference)
+            if len(components) != len(F):
+                raise ValueError(
+                    f"shapes have {len(components)} rows and frequencies {len(F)}; expected the same number"
+                )
+        modes = [str(name) for name in column_names(F, "f")]
+        names = [*modes, *(f"{mode}_dof{dof}" for mode in modes for dof in self.dofs)]
+        return frame_like(F, np.hstack([as_floats(F), components]), names)
+
+    def doubts(self, model: FEModel, inputs: Table, theta: Array) -> list[SkthermoWarning]:
+        """Findings that most measured shapes lack a sensor, or that a median component is five standard deviations of
+        the noise from all shapes of the model at the parameters of 100 records."""
+        values, shape, findings = as_floats(inputs), (-1, self.n_modes, self.n_sensors), []
+        found = ~np.isnan(values[:, : self.n_modes])
+        n_shapes = (found & ~np.isnan(values[:, self.n_modes :].reshape(shape)).any(axis=2)).sum()
+        if n_shapes < 0.5 * found.sum():
+            findings.append(
+                RecordsWarning(
+                    "most measured modes lack a component of their shape at some sensor. Their shapes are not used. "
+                    "Leave sensors that failed out of dofs",
+                    "few-shapes",
+                )
+            )
+        rows = spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), 100)
+        if not n_shapes or not len(rows):
+            return findings
+        simulated = self.simulated(model, theta[rows])[:, self.n_modes :].reshape(shape)
+        middle = median(values[:, self.n_modes :]).reshape(shape[1:])
+        beyond = np.maximum(simulated.min(axis=0) - middle, middle - simulated.max(axis=0))
+        excess = np.nan_to_num(beyond / self.noise[:, np.newaxis])
+        mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
+        if excess[mode, sensor] > 5:
+            findings.append(
+                ModelWarning(
+                    f"measured shapes of {column_names(inputs, 'f')[mode]!r} are unlike those of the model at the "
+                    f"parameters of the records, the most at sensor {sensor}. They distort the parameters. Check the "
+                    "modes, and order, signs and gains of the sensors (dofs), or raise shape_noise",
+                    "foreign-shapes",
+                )
+            )
+        return findings
+
+    def simulated(self, model: FEModel, theta: Array, n_jobs: int | None = None) -> Array:
+        """Inputs that the model gives for rows of theta, without noise."""
+        frequencies, shapes = evaluate_modes(model, theta, self.dofs, n_jobs=n_jobs)
+        return np.hstack([frequencies, shape_components(shapes.swapaxes(1, 2), self.reference)])
+
+
+def shape_misfit(units: Array, shapes: Array, slopes: Array) -> tuple[Array, Array]:
+    """Differences u - v of measured shapes u, (n_samples, n_modes, n_sensors), and computed shapes v of unit length,
+    and the derivatives of v.
+
+    Computed shapes, (n_samples, n_sensors, n_modes), get the signs of the measured ones. Where a mode is missing, the
+    difference is 0.
+    """
+    phi, d_phi = shapes.swapaxes(1, 2), slopes.swapaxes(1, 2)
+    length = np.linalg.norm(phi, axis=2, keepdims=True)
+    v = phi / length
+    along = np.einsum("smd,smdp->smp", v, d_phi)
+    dv = (d_phi - v[:, :, :, np.newaxis] * along[:, :, np.newaxis]) / length[:, :, :, np.newaxis]
+    u = np.where(np.isnan(units), v, units)
+    signs = np.where(np.einsum("smd,smd->sm", u, v) < 0, -1.0, 1.0)[:, :, np.newaxis]
+    n_samples, n_parameters = len(u), slopes.shape[3]
+    residual = (u - signs * v).reshape(n_samples, -1)
+    return residual, (signs[:, :, :, np.newaxis] * dv).reshape(n_samples, -1, n_parameters)
 
 
 class PosteriorInverse(FrequencyInverse, Estimator):
@@ -636,7 +730,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
             raise ValueError(f"X has {found} columns; expected the {model.n_modes} modes of {model!r}{more}")
         self.parameter_names_, self.n_parameters_ = names, len(names)
         inputs, first = self._read(X), self._first(getattr(X, "columns", None))
-        self._check_different(inputs[:, : model.n_modes], column_names(X, "f"))
+        self._check_different(inputs[:, : model.n_modes], column_names(X, "f")[: model.n_modes])
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
@@ -713,8 +807,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
               complete rows and 0 in rows without any mode;
             - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
               they have reached;
-            - ``solves``, ``full_solves`` (n_samples,): how often a model was solved with its derivatives for the row,
-              and how many of these were of the full model because steps ended outside the box of the reduced one;
+            - ``by_full_model`` (n_samples,): whether the full model was solved for the row because steps ended outside
+              the box of the reduced one;
             - ``findings``, a list: warnings that more than 1 % of the rows have not converged, or were solved by the
               full model.
 
@@ -756,7 +850,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         noise = stated if shapes is None else np.append(stated, shapes.deviations)
         has_derivatives = hasattr(model, "linearised") or hasattr(model, "jacobian")
         is_program = not (has_derivatives if shapes is None else hasattr(model, "linearised_modes"))
-        return ThermalPosterior(Simulator(model), prior, noise, model.n_modes, shapes, None, is_program)
+        return ThermalPosterior(Simulator(model), prior, noise, shapes, None, is_program)
 
     def _read(self, X: ArrayLike) -> Array:
         """Measured columns, with shapes normalised."""
@@ -765,14 +859,12 @@ class PosteriorInverse(FrequencyInverse, Estimator):
 
     def _check_different(self, frequencies: Array, names: Sequence[Any]) -> None:
         """Refuse a mode that is there twice: all its records would count twice."""
-        if len(frequencies) < 2:
-            return
-        _, first, which = np.unique(np.nan_to_num(frequencies), axis=1, return_index=True, return_inverse=True)
-        for column, kind in enumerate(which):
-            if first[kind] != column and not np.isnan(frequencies[:, column]).all():
+        for one, other in combinations(range(len(names)) if len(frequencies) > 1 else (), 2):
+            values = frequencies[:, one]
+            if np.array_equal(values, frequencies[:, other], equal_nan=True) and not np.isnan(values).all():
                 raise ValueError(
-                    f"{names[column]!r} has the values of {names[first[kind]]!r} in all {len(frequencies)} rows; "
-                    "expected each mode once"
+                    f"{names[other]!r} has the values of {names[one]!r} in all {len(values)} rows; expected each mode "
+                    "once"
                 )
 
 
@@ -792,11 +884,11 @@ def doubts_of(found: Bunch, *, many: float = 0.01) -> list[ModelWarning]:
                 "not-converged",
             )
         )
-    if (found.full_solves > 0).sum() > many * len(found.weight):
+    if found.by_full_model.sum() > many * len(found.weight):
         findings.append(
             ModelWarning(
                 "parameters of many records are outside the box of the reduced model, and the full one was solved for "
-                "them, which takes longer (invert says how often). Fit to records of such weather",
+                "them, which takes longer (invert says for which). Fit to records of such weather",
                 "outside-reduced-model",
             )
         )

@@ -1,30 +1,31 @@
-"""The report of a fit: rows, modes, parameters and warnings."""
+"""The report of a fit: rows, modes, parameters and findings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from html import escape
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._core.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
 from skthermo._core.estimators import last_step
-from skthermo._core.frames import Table, column_names, columns_by_sensor, has_stamps, midnights, row_times
+from skthermo._core.frames import Table, column_names, columns_by_sensor, has_stamps
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import capital
 from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import linearise
 from skthermo.metrics import mape
 from skthermo.preprocessing import RecordFindings
+from skthermo.preprocessing.checks import period_of
 from skthermo.residuals.sensors import SensorRegression
 from skthermo.surrogate._fleet_mapper import FleetMapper
-from skthermo.surrogate.chain._records import TrainingRecords, mode_offsets
-from skthermo.surrogate.inverse import InverseSurrogate, PosteriorInverse, ThermalPrior, unconverged
+from skthermo.surrogate._inverse import InverseSurrogate
+from skthermo.surrogate._posterior import PosteriorInverse, ThermalPrior, unconverged
+from skthermo.surrogate._records import TrainingRecords
 
 MOST_SCORED = 365  # largest number of rows that errors are computed for
 
@@ -38,77 +39,73 @@ class FittedRows(SavesFrames):
     scored: int
     left_out: pd.Series
     filled: pd.DataFrame
-    expected: int
 
     @classmethod
-    def counted(cls, records: TrainingRecords, sensors: SensorRegression, expected: int) -> FittedRows:
-        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found.
-
-        With fewer than ``expected`` ones the fit is unreliable.
-        """
+    def counted(cls, records: TrainingRecords, sensors: SensorRegression) -> FittedRows:
+        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found."""
         T, trained = records.temperatures, records.trained
-        inputs, F = as_floats(T), as_floats(records.frequencies)
+        index = T.index if isinstance(T, pd.DataFrame) else pd.RangeIndex(len(T))
+        temperatures, F = as_floats(T), as_floats(records.frequencies)
         deviations, filled, missing = sensors.fill(T)[1], {}, {}
         for sensor, columns in columns_by_sensor(T).items():
-            missing[f"temperature {sensor!r} is missing"] = np.isnan(inputs[:, columns]).any(axis=1) & ~trained
+            missing[f"temperature {sensor!r} is missing"] = np.isnan(temperatures[:, columns]).any(axis=1) & ~trained
             values = deviations[:, columns]
             if (rows := (values > 0).any(axis=1)).any():
-                filled[sensor] = [int(rows.sum()), float(values[values > 0].mean()), periods(T, rows)]
+                when = period_of(index, np.flatnonzero(rows))
+                filled[sensor] = [int(rows.sum()), float(values[values > 0].mean()), when]
         without_theta = np.isnan(records.targets).any(axis=1)  # a posterior needs some modes only
         for name, column in zip(column_names(records.frequencies, "f"), F.T, strict=True):
             missing[f"frequency {name!r} is missing"] = np.isnan(column) & without_theta
-        has_lags = ~np.isnan(inputs).any(axis=1) & np.isnan(records.inputs).any(axis=1)
-        missing["a lag reaches into a gap"] = has_lags
+        missing["a lag reaches into a gap"] = ~np.isnan(temperatures).any(axis=1) & np.isnan(records.inputs).any(axis=1)
         missing["their weight is 0"] = ~records.counted
         missing["no parameters were found"] = ~np.isnan(F).any(axis=1) & without_theta
-        left_out = {f"{what}, {periods(T, rows)}": int(rows.sum()) for what, rows in missing.items() if rows.any()}
-        n_trained = int(trained.sum())
+        left_out = {}
+        for what, rows in missing.items():
+            if rows.any():
+                left_out[f"{what}, {period_of(index, np.flatnonzero(rows))}"] = int(rows.sum())
         return cls(
             given=len(F),
-            trained=n_trained,
-            scored=min(n_trained, MOST_SCORED),
+            trained=int(trained.sum()),
+            scored=min(int(trained.sum()), MOST_SCORED),
             left_out=pd.Series(left_out, dtype=int),
             filled=pd.DataFrame.from_dict(filled, orient="index", columns=["rows", "standard deviation", "when"]),
-            expected=expected,
         )
 
     def __repr__(self) -> str:
-        return "\n".join(self.sentences)
-
-    @property
-    def sentences(self) -> list[str]:
-        """How many rows trained, and what was left out and filled."""
         lines = [f"{self.trained} of {self.given} rows trained the temperature mapper."]
         lines += [f"Left out: {count} rows, {reason}." for reason, count in self.left_out.items()]
-        lines += [
-            f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
-            f"{when}."
-            for name, rows, deviation, when in self.filled.itertuples()
-        ]
-        return lines
+        for name, rows, deviation, when in self.filled.itertuples():
+            lines.append(
+                f"Filled from the other sensors: {rows} temperatures of {name!r} (standard deviation {deviation:.2g}), "
+                f"{when}."
+            )
+        return "\n".join(lines)
 
-    def warnings(self) -> Iterator[SkthermoWarning]:
-        """Warnings that few rows train, or that most have a filled sensor."""
-        if 2 * self.trained < self.given:
-            yield FewRecordsWarning(
-                "most rows did not train the temperature mapper (report_.rows says why). The chain has learned little "
-                "of their weather. Fill gaps of temperatures, use fewer lags, or fill missing modes by "
-                "imputer=KNNGapImputer()",
-                "rows-left-out",
+    def doubts(self, expected: int) -> Iterator[SkthermoWarning]:
+        """Findings that few rows train, fewer than ``expected`` ones, or that most have a filled sensor."""
+        if 2 * self.trained < self.given or self.trained < expected:
+            few = (
+                "fewer than 10 complete rows for each parameter"
+                if self.trained < expected
+                else "less than half of them"
             )
-        if self.trained < self.expected:
-            yield FewRecordsWarning(
-                "fewer than 10 complete rows for each parameter train the temperature mapper. The fit is "
-                "unreliable. Give a season or a year of records",
-                "few-rows",
-            )
+            yield few_rows(f"{few} train the temperature mapper (report_.rows says why)")
         mostly = self.filled.index[2 * self.filled["rows"] > self.given]
         if len(mostly):
             yield RecordsWarning(
                 f"temperatures were filled from the other sensors in more than half of the rows: {named(mostly)}. "
                 "Repair these sensors, or leave them out",
-                "mostly-filled",
+                "filled-temperatures",
             )
+
+
+def few_rows(what: str) -> FewRecordsWarning:
+    """The finding that records are few, or carry little."""
+    return FewRecordsWarning(
+        f"there are few records: {what}. The fit is unreliable. Give a year of records and fill their gaps, such as by "
+        "imputer=KNNGapImputer(), or use fewer lags",
+        "few-rows",
+    )
 
 
 @dataclass(frozen=True, repr=False)
@@ -117,9 +114,8 @@ class FittedParameters(SavesFrames):
 
     deviations: pd.Series
     prior: ThermalPrior | None
-    n_unconverged: int | None
+    n_unconverged: int
     n_by_full_model: int
-    n_full_solves: int
 
     @classmethod
     def found(cls, chain: Any, found: Bunch, scatter: Array) -> FittedParameters:
@@ -127,13 +123,11 @@ class FittedParameters(SavesFrames):
         theta = found.theta[~np.isnan(found.theta).any(axis=1)]
         sensitivity = linearise(chain.model, np.median(theta, axis=0), relative=True)[1][0]
         information = (sensitivity.T / np.maximum(scatter, 1e-12) ** 2) @ sensitivity
-        full_solves = found.get("full_solves", np.zeros(0))
         return cls(
             deviations=pd.Series(np.sqrt(np.diagonal(cramer_rao(information))), index=chain.parameter_names_),
             prior=getattr(last_step(chain.inverse_), "prior_", None),
-            n_unconverged=int(unconverged(found).sum()) if "converged" in found else None,
-            n_by_full_model=int((full_solves > 0).sum()),
-            n_full_solves=int(full_solves.sum()),
+            n_unconverged=int(unconverged(found).sum()) if "converged" in found else 0,
+            n_by_full_model=int(np.sum(found.get("by_full_model", 0))),
         )
 
     @property
@@ -144,9 +138,6 @@ class FittedParameters(SavesFrames):
             percent["moved by itself (%)"] = (100 * self.prior.own).round(2)
         return percent
 
-    def __repr__(self) -> str:
-        return "\n".join([*self.sentences, self.table.to_string()])
-
     @property
     def sentences(self) -> list[str]:
         """What temperature does to the parameters, and which rows were hard to solve."""
@@ -156,9 +147,12 @@ class FittedParameters(SavesFrames):
         if self.n_by_full_model:
             lines.append(
                 f"The parameters of {self.n_by_full_model} rows are outside the box of the reduced model; the full "
-                f"model was solved {self.n_full_solves} times."
+                "model was solved for them."
             )
         return lines
+
+    def __repr__(self) -> str:
+        return "\n".join([*self.sentences, self.table.to_string()])
 
 
 @dataclass(frozen=True, repr=False)
@@ -170,9 +164,9 @@ class FitReport(SavesFrames):
     rows : FittedRows
         Numbers of rows: all that were ``given``, rows that ``trained`` the temperature mapper, and rows that are
         ``scored`` by the errors, spread evenly over the training rows. ``left_out``, a series, has the rows that did
-        not train by reason; a row may have several reasons. ``filled``, a frame by sensor, says in how many ``rows``
-        temperatures were filled from the other sensors, the ``standard deviation`` of what was filled, in degrees, and
-        ``when`` they are missing.
+        not train by reason and period; a row may have several reasons. ``filled``, a frame by sensor, says in how many
+        ``rows`` temperatures were filled from the other sensors, the ``standard deviation`` of what was filled, in
+        degrees, and ``when`` they are missing.
     modes : DataFrame
         By mode, in percent:
 
@@ -194,14 +188,14 @@ class FitReport(SavesFrames):
         ``deviations``, a series: smallest possible relative standard deviation of each parameter estimated from one
         record (Cramer-Rao bound), infinite where the modes do not determine it. With a `PosteriorInverse`: ``prior``,
         how much temperature moves the parameters, as the records teach it or as it was given; ``n_unconverged``, rows
-        whose parameters have not converged; ``n_by_full_model`` and ``n_full_solves``, rows whose parameters are
-        outside the box of the reduced model, and how often the full model was solved for them.
+        whose parameters have not converged; ``n_by_full_model``, rows whose parameters are outside the box of the
+        reduced model, for which the full model was solved.
     solved : str
         Whether predictions are solved by a reduced model, of which size and accuracy, or by the full model, and why.
     findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
     doubts : list of SkthermoWarning
-        What `fit` has found doubtful in the records and by its parts, a finding of each kind.
+        What `fit` warns of: doubtful records, parts of the chain, rows and modes; a finding of each kind.
 
     Examples
     --------
@@ -231,10 +225,10 @@ class FitReport(SavesFrames):
         return text + self._printed_modes().to_html() + self.parameters.table.to_html()
 
     def _sentences(self) -> list[str]:
-        trained, *others = self.rows.sentences
+        trained, *others = repr(self.rows).splitlines()
         lines = [trained, self.solved, *others]
         kinds = set(self.findings.table["what"])  # the summary lists them
-        lines += [f"{capital(str(doubt))}." for doubt in self.warnings() if doubt.kind not in kinds]
+        lines += [f"{capital(str(doubt))}." for doubt in self.doubts if doubt.kind not in kinds]
         n_parameters, n_modes = len(self.parameters.deviations), len(self.modes)
         if n_parameters > n_modes:
             lines.append(
@@ -256,7 +250,7 @@ class FitReport(SavesFrames):
         return self.unexplained_offset > 1
 
     def warnings(self) -> Iterator[SkthermoWarning]:
-        """Warnings of `fit`, one of each kind: its doubts, and those about the rows, the modes and the outliers.
+        """Warnings of `fit`, one of each kind.
 
         Yields
         ------
@@ -264,69 +258,22 @@ class FitReport(SavesFrames):
             Its text stands in the report, too.
         """
         yield from self.doubts
-        yield from self.rows.warnings()
-        modes, far = self.modes, self.findings.outliers.to_numpy()
-        if modes["MAPE"].mean() > 1.2 * modes["MAPE of the mean"].mean():
-            worst = (modes["MAPE"] / modes["MAPE of the mean"]).idxmax()
-            yield ModelWarning(
-                f"the chain misses its own training frequencies by more than their mean does, {worst!r} the most. Its "
-                "parameters cannot follow these modes. See the offsets in report_.modes, update the model, or use the "
-                "default aligner and discrepancy",
-                "worse-than-mean",
-            )
-        if self.unexplained_offset > 1:
-            large = modes.index[modes["hidden offset"].abs() >= 0.3]
-            yield ModelWarning(
-                "the aligner hides offsets between measurement and model that weather does not explain, of "
-                f"{named(large)} (see report_.modes). Simulated damage moves the modes too much or too little, so that "
-                "detection rates and severities are wrong by more than their noise. Update the model to these records "
-                "(ModelUpdater). Give studies models=updater.sample_models(20) or uncertainty=(..., 'model')",
-                "hidden-offsets",
-            )
-        if far.sum() > 0.05 * far.size:
-            yield RecordsWarning(
-                "more than 5 % of the frequencies are outliers and train nothing. They may be of other modes, or of "
-                "another state. See report_.findings",
-                "many-outliers",
-            )
-        # on nine bridges with models that are 2 to 5 % off, the discrepancy is up to 0.26 of what weather does to the
-        # model; on the truss, whose thermal zones cut across the groups of its parameters, 1.4 of it
-        is_large = modes["discrepancy"] > np.maximum(2 * modes["weather"], 0.5)
-        if is_large.any():
-            yield ModelWarning(
-                f"the FE model cannot follow what the weather does to {named(modes.index[is_large])} (see "
-                "report_.modes). Predictions rely on the discrepancy, and simulated damage on a model that is not "
-                "calibrated. Update the model (ModelUpdater), or give it parameters that this weather changes",
-                "large-discrepancy",
-            )
-        if "round trip" in modes:
-            shares = modes["round trip"].abs() / modes["scatter"].clip(lower=0.1)  # less is not seen in single records
-            if shares.max() > 1:
-                yield ModelWarning(
-                    f"the inverse turns the model's nominal frequencies into parameters that miss {shares.idxmax()!r} "
-                    "by more than measurements scatter around the predictions (see report_.modes). Detectors take this "
-                    "error for damage. Raise n_samples, or use the default inverse",
-                    "round-trip-error",
-                )
 
 
-def named(columns: Iterable[Any]) -> str:
-    """Names of columns, one after the other."""
-    return ", ".join(map(repr, columns))
-
-
-def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Sequence[SkthermoWarning]) -> FitReport:
+def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Iterable[SkthermoWarning]) -> FitReport:
     """The report of a chain that is fitted otherwise; its inverse has ``found`` parameters of the records."""
     modes, unexplained = modes_of(chain)
+    rows = FittedRows.counted(chain.records_, chain.sensors_)
     expected = 0 if isinstance(last_step(chain.mapper_), FleetMapper) else 10 * len(chain.parameter_names_)
+    doubts = [*doubts, *rows.doubts(expected), *doubts_of_modes(modes, unexplained)]
     return FitReport(
-        rows=FittedRows.counted(chain.records_, chain.sensors_, expected),
+        rows=rows,
         modes=modes,
         unexplained_offset=unexplained,
         parameters=FittedParameters.found(chain, found, modes["scatter"].to_numpy() / 100),
         solved=chain.simulator_.described,
         findings=findings,
-        doubts=list({doubt.kind: doubt for doubt in doubts}.values()),
+        doubts=list({doubt.kind: doubt for doubt in reversed(doubts)}.values())[::-1],
     )
 
 
@@ -334,13 +281,12 @@ def modes_of(chain: Any) -> tuple[pd.DataFrame, float]:
     """What `FitReport` says of each mode, and the share of the hidden offsets that nothing explains."""
     records, last, F = chain.records_, last_step(chain.inverse_), as_floats(chain.records_.frequencies)
     rows = spread_evenly(np.flatnonzero(records.trained), MOST_SCORED)
-    of_model = chain.simulator_.frequencies(records.learned[rows], chain.n_jobs)
-    measured = F[rows]
-    predicted = records.modelled[rows] * np.exp(chain.discrepancy_.at(records.inputs[rows]))
+    nominal = as_floats(chain.model.frequencies(np.ones((1, len(chain.parameter_names_)))))[0]
+    measured, delta = F[rows], chain.discrepancy_.at(records.inputs)
+    predicted = records.modelled[rows] * np.exp(delta[rows])
     mean, seen = np.nanmean(F, axis=0), np.nanmean(as_floats(chain.aligner_.transform(records.frequencies)), axis=0)
-    discrepancy = chain.discrepancy_.at(records.inputs[records.trained])
     table = {
-        "offset": mode_offsets(chain.model, records.frequencies),
+        "offset": 100 * (mean / nominal - 1),
         "hidden offset": 100 * (mean / seen - 1),
         "MAPE": mape(measured, predicted),
         "MAPE of the mean": mape(measured, np.broadcast_to(mean, measured.shape)),
@@ -348,33 +294,55 @@ def modes_of(chain: Any) -> tuple[pd.DataFrame, float]:
         "noise": 100 * chain.noise_,
         "misfit": 100 * last.noise_ if isinstance(last, PosteriorInverse) else np.nan,
         "weather": 100 * np.nanstd(np.log(records.modelled[records.trained]), axis=0),
-        "discrepancy": 100 * np.sqrt((discrepancy**2).mean(axis=0)),
+        "discrepancy": 100 * np.sqrt((delta[records.trained] ** 2).mean(axis=0)),
     }
     if isinstance(last, InverseSurrogate):
         table["round trip"] = 100 * last.round_trip()
     errors = 100 * chain.noise_ / np.sqrt(np.maximum((~np.isnan(F)).sum(axis=0), 1))
+    of_model = chain.simulator_.frequencies(records.learned[rows], chain.n_jobs)
     unexplained = unexplained_offset(table["hidden offset"], of_model, records.temperatures, errors)
     return pd.DataFrame(table, index=chain.mode_names_), unexplained
 
 
-def periods(T: Table, rows: NDArray[np.bool_]) -> str:
-    """When some rows of a table were taken: their period, or the longest one and how many there are."""
-    order = np.argsort(row_times(T), kind="stable")
-    places = np.flatnonzero(rows[order])
-    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    longest = max(runs, key=len)
-    label = _labels(T, order[longest[[0, -1]]])
-    text = label[0] if label[0] == label[1] else f"{label[0]} to {label[1]}"
-    return text if len(runs) == 1 else f"in {len(runs)} periods, the longest {text}"
+def doubts_of_modes(modes: pd.DataFrame, unexplained_offset: float) -> Iterator[ModelWarning]:
+    """Findings that the model is not calibrated to the records, or that a trained inverse is inexact."""
+    reasons, offsets = [], modes["offset"].abs()
+    if (offsets > 15).any():
+        far = named(modes.index[offsets > 15])
+        reasons.append(f"measured modes differ from its nominal frequencies by more than 15 %: {far}")
+    if unexplained_offset > 1:
+        hidden = named(modes.index[modes["hidden offset"].abs() >= 0.3])
+        reasons.append(f"the aligner hides offsets that weather does not explain, of {hidden}")
+    # on nine bridges with models that are 2 to 5 % off, the discrepancy is up to 0.26 of what weather does to the
+    # model; on the truss, whose thermal zones cut across the groups of its parameters, 1.4 of it
+    is_large = modes["discrepancy"] > np.maximum(2 * modes["weather"], 0.5)
+    if is_large.any():
+        reasons.append(f"it cannot follow what the weather does to {named(modes.index[is_large])}")
+    if modes["MAPE"].mean() > 1.2 * modes["MAPE of the mean"].mean():
+        worst = (modes["MAPE"] / modes["MAPE of the mean"]).idxmax()
+        reasons.append(f"the chain misses its training frequencies by more than their mean does, {worst!r} the most")
+    if reasons:
+        yield ModelWarning(
+            f"the model is not calibrated to these records: {', and '.join(reasons)} (see report_.modes). Simulated "
+            "damage moves the modes too much or too little, so that detection rates and severities are wrong by more "
+            "than their noise. Give Hz and the modes of the model in their order, update the model (ModelUpdater), and "
+            "give studies models=updater.sample_models(20) or uncertainty=(..., 'model')",
+            "uncalibrated-model",
+        )
+    if "round trip" in modes:
+        shares = modes["round trip"].abs() / modes["scatter"].clip(lower=0.1)  # less is not seen in single records
+        if shares.max() > 1:
+            yield ModelWarning(
+                f"the inverse turns the model's nominal frequencies into parameters that miss {shares.idxmax()!r} "
+                "by more than measurements scatter around the predictions (see report_.modes). Detectors take this "
+                "error for damage. Raise n_samples, or use the default inverse",
+                "round-trip-error",
+            )
 
 
-def _labels(T: Table, rows: NDArray[np.intp]) -> list[str]:
-    """What rows are called: their stamps, or their numbers."""
-    if not has_stamps(T):
-        return [f"row {row}" for row in rows]
-    stamps = T.index[rows]
-    at_midnight = (T.index == midnights(T.index)).all()
-    return [f"{stamp:%Y-%m-%d}" if at_midnight else f"{stamp:%Y-%m-%d %H:%M}" for stamp in stamps]
+def named(columns: Iterable[Any]) -> str:
+    """Names of columns, one after the other."""
+    return ", ".join(map(repr, columns))
 
 
 def unexplained_offset(hidden: Array, predicted: Array, T: Table, errors: Array) -> float:

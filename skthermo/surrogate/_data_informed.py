@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils import Bunch
 
 from skthermo._core.arrays import (
     Array,
@@ -52,22 +53,23 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import BiasAligner
+from skthermo.preprocessing import BiasAligner, check_records
+from skthermo.preprocessing.checks import misplaced_columns
 from skthermo.residuals.sensors import SensorRegression
 from skthermo.residuals.weather import TrainingRange
-from skthermo.surrogate._regression import TemperatureMapper, fit_checked
-from skthermo.surrogate._simulator import Simulator
-from skthermo.surrogate.chain._fit_report import report_of
-from skthermo.surrogate.chain._inverting import doubts_of_shapes, invert, prepare, take_noise, with_shapes
-from skthermo.surrogate.chain._records import (
-    CheckedRecords,
+from skthermo.surrogate._fit_report import few_rows, report_of
+from skthermo.surrogate._inverse import InverseSurrogate
+from skthermo.surrogate._posterior import PosteriorInverse, ShapeInputs
+from skthermo.surrogate._records import (
+    RecordSimulator,
     TrainingRecords,
-    checked_records,
+    doubts_of_order,
     frequency_table,
     measurement_noise,
 )
-from skthermo.surrogate.chain._service import RecordSimulator
-from skthermo.surrogate.chain._thermal import (
+from skthermo.surrogate._regression import FrequencyInverse, TemperatureMapper, fit_checked
+from skthermo.surrogate._simulator import Simulator
+from skthermo.surrogate._thermal import (
     Discrepancy,
     ThermalModel,
     Weather,
@@ -77,7 +79,6 @@ from skthermo.surrogate.chain._thermal import (
     ratio_regressor,
 )
 from skthermo.surrogate.effects import damage_directions
-from skthermo.surrogate.inverse import PosteriorInverse
 
 
 class Simulated(TypedDict, total=False):
@@ -282,11 +283,18 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         F, self.y_is_vector_ = frequency_table(y)
-        records = checked_records(T, frame_like(F, check_array(F, **options)), self.model)
-        T, F, usable = records.temperatures, records.frequencies, records.usable
+        gate = check_records(T, frame_like(F, check_array(F, **options)), model=self.model)
+        gate.refuse_meaningless(needs_all=True)
+        T, F, far, weights = (
+            gate.temperatures,
+            gate.frequencies,
+            gate.outliers.to_numpy(),
+            row_weights(sample_weight, X),
+        )
+        usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))  # outliers train nothing
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
-        self._clone_parts(records, has_shapes=shapes is not None)
-        inverse, mapper, weights = self.inverse_, self.mapper_, row_weights(sample_weight, X)
+        self._clone_parts(has_shapes=shapes is not None)
+        inverse, mapper = self.inverse_, self.mapper_
         if weights is not None:
             check_takes_weights(mapper)
         stages = Stages(self, 5, X, y)
@@ -298,22 +306,34 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with collected() as findings, stages.stage("inverse", inverse):
             complete = usable if self.imputer_ is None else imputed(self.imputer_, T, usable)
             aligned = with_shapes(inverse, self.aligner_.fit(complete).transform(complete), shapes)
-            take_noise(inverse, self.noise_)
+            for part in inverses_within(inverse):
+                if isinstance(part, InverseSurrogate) and isinstance(part.noise, str):
+                    part.set_params(noise=self.noise_)
             inverse.fit(aligned)
         with stages.stage("parameters of the records"):
             found = invert(inverse, aligned, self.parameter_names_)
-            findings += found.findings
             if shapes is not None:
-                findings += doubts_of_shapes(last_step(inverse), aligned, found.theta)
+                posterior: Any = last_step(inverse)
+                findings += posterior.shape_inputs_.doubts(posterior.model, aligned, found.theta)
         with collected() as of_mapper, stages.stage("temperature mapper", mapper):
             fit_checked(mapper, filled, named(filled, found.theta, self.parameter_names_), weights)
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
-            findings = [*records.doubts, *findings, *of_mapper, *of_model]
-            findings += [] if is_auto(self.reduce) else self.simulator_.doubts()
-            self.report_ = report_of(self, found, records.findings, findings)
+            findings += [
+                *found.findings,
+                *of_mapper,
+                *of_model,
+                *([] if is_auto(self.reduce) else self.simulator_.doubts()),
+            ]
+            few_outliers = {"frequency-outliers"} if far.mean() <= 0.05 else ()
+            of_records = [
+                *gate.warnings(exclude=few_outliers),
+                *misplaced_columns(T, F),
+                *doubts_of_order(self.model, F),
+            ]
+            self.report_ = report_of(self, found, gate, [*of_records, *findings])
         stages.end()
-        warn_each(self.report_.warnings())
+        warn_each(self.report_.doubts)
         return self
 
     @overload
@@ -660,13 +680,26 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         part = getattr(self, name)
         return self._default_part(name) if part is None or is_auto(part) else clone(part)
 
-    def _clone_parts(self, records: CheckedRecords, *, has_shapes: bool) -> None:
-        """Clone inverse, mapper, aligner and imputer, with the model, and seeds."""
+    def _clone_parts(self, *, has_shapes: bool) -> None:
+        """Clone inverse, mapper, aligner and imputer, with model, memory, choice of a reduced model, and seeds."""
         tolerance(self.model, self.reduce)
         self.inverse_, self.mapper_ = self._part("inverse"), self._part("mapper")
         self.aligner_ = with_reference(None if self.aligner == "passthrough" else self._part("aligner"), self.model)
         self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
-        prepare(self.inverse_, self.model, self.memory, self.reduce, has_shapes=has_shapes)
+        names = list(self.model.parameter_names)
+        for part in inverses_within(self.inverse_):
+            given = {"model": self.model, "memory": self.memory}
+            part.set_params(**{name: value for name, value in given.items() if getattr(part, name) is None})
+            if list(part.model.parameter_names) != names:
+                raise ValueError(
+                    f"the inverse's model has the parameters {list(part.model.parameter_names)}; expected {names}, as "
+                    f"{self.model!r} has"
+                )
+            may_reduce = isinstance(part, PosteriorInverse) and is_auto(part.reduce)
+            if may_reduce and (not self.reduce or hasattr(part.model, "reduced")):
+                part.set_params(reduce=self.reduce)
+        if not has_shapes and getattr(last_step(self.inverse_), "dofs", None) is not None:
+            raise ValueError("the inverse has dofs, but there are no shapes; expected fit(T, F, shapes=shapes)")
         random_state = seeded(self.random_state)
         for part in (self.inverse_, self.mapper_, self.aligner_, self.imputer_):
             if part is not None:
@@ -721,6 +754,37 @@ def with_reference(aligner: BaseEstimator | None, model: FEModel) -> BaseEstimat
         if isinstance(part, BiasAligner) and part.reference is None:
             part.set_params(reference=model)
     return aligner
+
+
+def inverses_within(inverse: BaseEstimator) -> list[Any]:
+    """The inverses of an FE model in an estimator and its parts."""
+    return [one for one in (inverse, *inverse.get_params().values()) if isinstance(one, FrequencyInverse)]
+
+
+def invert(inverse: BaseEstimator, aligned: Table, names: list[str]) -> Bunch:
+    """``theta`` of aligned records and ``findings`` and, of a `PosteriorInverse`, all that its ``invert`` gives."""
+    last = last_step(inverse)
+    if not isinstance(last, PosteriorInverse):
+        with collected() as findings:
+            theta = as_floats(inverse.transform(aligned))
+        if theta.shape[1] != len(names):
+            raise ValueError(f"the inverse gave {theta.shape[1]} columns; expected {names}")
+        return Bunch(theta=theta, findings=findings)
+    found = last.invert(inputs_of_last_step(inverse, aligned))
+    known = found.weight[found.weight > 0]
+    if len(known) and known.mean() < 0.25:  # with four of six modes missing in each, say
+        found.findings.append(few_rows("because of gaps, they tell less than a quarter of what complete ones would"))
+    return Bunch(**{**found, "theta": as_floats(found.theta)})
+
+
+def with_shapes(inverse: BaseEstimator, F: Table, shapes: ArrayLike | None) -> Table:
+    """Frequencies with the columns of shapes that the inverse expects; NaN there without shapes."""
+    part: Any = last_step(inverse)
+    if getattr(part, "dofs", None) is not None:
+        return ShapeInputs.read(part.model, part.dofs, part.shape_noise).joined(F, shapes)
+    if shapes is not None:
+        raise ValueError("shapes are given, but the inverse has no dofs; expected PosteriorInverse(dofs=...)")
+    return F
 
 
 def imputed(imputer: BaseEstimator, T: Table, F: Table) -> Table:

@@ -1,0 +1,465 @@
+"""Records that a chain was fitted to, their residuals out of fold, and draws of records that monitoring would take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+from sklearn.base import BaseEstimator, clone
+from sklearn.pipeline import Pipeline
+
+from skthermo._core.arrays import (
+    Array,
+    as_columns,
+    as_floats,
+    as_random_state,
+    check_noise,
+    is_real,
+    median,
+    patterns,
+    refuse_no_table,
+    robust_deviation,
+    spread_evenly,
+)
+from skthermo._core.estimators import _safe_indexing, last_step
+from skthermo._core.frames import Table, check_same_rows, column_names, frame_like, row_times
+from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.warnings import collected
+from skthermo.exceptions import ModelWarning
+from skthermo.fem import FEModel, match_modes
+from skthermo.preprocessing import BlockedKFold
+from skthermo.preprocessing.folds import out_of_fold
+from skthermo.residuals.baseline import BaselineResiduals
+from skthermo.residuals.weather import unseen_weather
+from skthermo.surrogate._regression import fit_checked
+from skthermo.surrogate._thermal import Discrepancy, ThermalModel, Weather, ratio_regressor
+
+N_FOLDS = 5  # of records out of fold
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingRecords(SavesFrames):
+    """Records that `DataInformedFEM.fit` was given, in their order, and what M2 learned from them.
+
+    M2 has ``inputs``, lags included, and ``targets``, the parameters of the records, whose columns are
+    ``parameter_names``; for the inputs it gives the ``learned`` parameters. ``usable`` frequencies are without
+    outliers, ``modelled`` frequencies are the FE model's at ``learned``, in the measured domain. ``weights`` of the
+    rows may be None.
+    """
+
+    temperatures: Table
+    frequencies: Table
+    inputs: Array
+    targets: Array
+    learned: Array
+    usable: Array
+    modelled: Array
+    weights: Array | None
+    parameter_names: Sequence[str]
+
+    @property
+    def trained(self) -> NDArray[np.bool_]:
+        """Which rows trained M2."""
+        return ~(np.isnan(self.inputs).any(axis=1) | np.isnan(self.targets).any(axis=1)) & self.counted
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which rows have a weight, or had no mode that could give them one."""
+        if self.weights is None:
+            return np.ones(len(self.inputs), dtype=bool)
+        return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
+
+    def resampled(
+        self, residuals: BaselineResiduals, discrepancy: Discrepancy, random_state: np.random.RandomState
+    ) -> TrainingRecords:
+        """Records that this structure could have given as well in the same weather, before a mapper learns them.
+
+        Each takes what a record of similar weather left unexplained, of its parameters and of its frequencies, in runs.
+        """
+        known = ~np.isnan(self.inputs).any(axis=1)
+        order = np.argsort(row_times(self.temperatures), kind="stable")
+        order = order[known[order]]
+        taken, values = residuals.draw_records(self.inputs[order], random_state)
+        targets, measured = np.full_like(self.targets, np.nan), np.full(np.shape(self.frequencies), np.nan)
+        targets[order] = self.learned[order] * residuals.ratios[taken]
+        expected = self.modelled[order] * np.exp(discrepancy.at(self.inputs[order]))
+        measured[order] = expected * (1 + values)
+        weights = None
+        if self.weights is not None:
+            weights = np.zeros(len(targets))
+            weights[order] = self.weights[residuals.rows[taken]]
+        return replace(
+            self, frequencies=frame_like(self.frequencies, measured), usable=measured, targets=targets, weights=weights
+        )
+
+    def residuals(self, model: ThermalModel) -> BaselineResiduals:
+        """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
+
+        A fold holds every fifth block of a week, or longer where residuals are correlated for longer.
+        """
+        measured = as_floats(self.frequencies)
+        known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
+        order = np.argsort(row_times(self.temperatures), kind="stable")
+        order = order[known[order]]
+        inputs, theta, measured = self.inputs[order], self.targets[order], measured[order]
+        weights = None if self.weights is None else self.weights[order]
+        has_theta = ~np.isnan(theta).any(axis=1)
+        if has_theta.sum() < 2 * N_FOLDS:
+            least = 2 * N_FOLDS
+            raise ValueError(f"{has_theta.sum()} records have parameters; expected at least {least} for residuals")
+        own = measured / (self.modelled[order] * np.exp(model.discrepancy.at(inputs))) - 1
+        records = _safe_indexing(self.temperatures, order)
+        seen = ~np.isnan(own).all(axis=1)
+        in_sample = BaselineResiduals(inputs[seen], own[seen], own[seen], np.zeros(seen.sum(), dtype=np.intp))
+        fold_of = BlockedKFold(N_FOLDS).remembering(records, 5.0 * in_sample.correlation_time).fold_of(records)
+        learner, names = last_step(model.mapper), list(self.parameter_names)
+
+        def learn_parameters(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
+            rows = train[has_theta[train]]
+            targets, own_weights = pd.DataFrame(theta[rows], columns=names), None if weights is None else weights[rows]
+            fitted = fit_checked(clone(learner), inputs[rows], targets, own_weights)
+            return lambda test: as_columns(fitted.predict(inputs[test]))
+
+        def learn_discrepancy(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
+            # ratios to predictions that are out of fold themselves, so that the model is not solved for each fold
+            rows = train[has_theta[train]]
+            own_weights = None if weights is None else weights[rows]
+            others = Discrepancy.fitted(model.discrepancy.regressor, inputs[rows], ratios[rows], own_weights)
+            return lambda test: others.at(inputs[test])
+
+        predicted = out_of_fold(learn_parameters, fold_of)
+        modelled = model.frequencies(predicted)
+        ratios = self.usable[order] / modelled
+        values = measured / (modelled * np.exp(out_of_fold(learn_discrepancy, fold_of))) - 1
+        known = ~np.isnan(values).all(axis=1)
+        consequence = "Standard deviations, intervals and noise are unreliable there"
+        doubts = tuple(unseen_weather(records, fold_of, consequence))
+        ratios = (theta / predicted)[known]
+        return BaselineResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], ratios, doubts)
+
+
+def frequency_table(y: Any) -> tuple[Table, bool]:
+    """Frequencies as a table, and whether they were a vector of one mode."""
+    if y is None:
+        raise ValueError("This DataInformedFEM estimator requires y to be passed, but the target y is None")
+    refuse_no_table(y, "y", or_vector=True)
+    if np.ndim(y) != 1:
+        return y, False
+    if isinstance(y, pd.Series):
+        return y.to_frame("f1" if y.name is None else y.name), True
+    return np.reshape(y, (-1, 1)), True
+
+
+def doubts_of_order(
+    model: FEModel, F: Table, *, large: float = 15.0, small: float = 5.0, better: float = 0.25
+) -> list[ModelWarning]:
+    """The finding that modes look like others of the model.
+
+    Modes count as swapped if another order reduces the squared offsets to a share of ``better``, all below ``large``
+    percent; a mode within ``small`` percent is not taken for another one.
+    """
+    nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
+    offsets, names = 100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), column_names(F, "f")
+    if len(nominal) < 2:
+        return []
+    table, near = match_modes(model, as_floats(F)), np.abs(offsets) < small
+    order = np.where(near, np.arange(len(nominal)), table["mode"])
+    best = np.where(near, offsets, table["offset"])
+    moved = np.flatnonzero(order != np.arange(len(nominal)))
+    is_better = (best**2).sum() < better * (offsets**2).sum() and np.abs(best).max() < large
+    if not len(moved) or not is_better or len(np.unique(order)) < len(order):
+        return []
+    return [
+        ModelWarning(
+            f"the frequencies {[names[place] for place in moved]} look like other modes of the model. They would be "
+            "learned as those of their columns. Order them as the model does, or use "
+            f"model.with_modes({order.tolist()})",
+            "mode-order",
+        )
+    ]
+
+
+def measurement_noise(mapper: BaseEstimator, T: Table, F: Table, *, most: int = 3000) -> Array:
+    """Relative standard deviations of frequencies about a regression on what an unfitted mapper sees of the weather.
+
+    Out of fold, and by medians, so that outliers and rare weather hardly move them; (n_modes,). At most 0.1 counts as
+    noise; ``most`` so many records, spread evenly, are looked at.
+    """
+    rows = spread_evenly(np.argsort(row_times(T), kind="stable"), most)
+    logs, inputs = np.log(as_floats(F)), T
+    if isinstance(mapper, Pipeline):
+        with collected():
+            inputs = clone(mapper[:-1]).fit_transform(T, np.where(np.isnan(logs), median(logs), logs))
+    inputs, changes = as_floats(inputs)[rows], logs[rows] - median(logs)
+    ratios, fold_of = np.exp(changes), np.zeros(len(rows), dtype=np.intp)
+    if len(rows) >= N_FOLDS:
+        fold_of = BlockedKFold(N_FOLDS).fold_of(_safe_indexing(T, rows))
+
+    def learn(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
+        learned = Discrepancy.fitted(ratio_regressor(), inputs[train], ratios[train])
+        return lambda test: learned.at(inputs[test])
+
+    return np.minimum(robust_deviation(changes - out_of_fold(learn, fold_of)), 0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class ServiceRecords:
+    """Gaps and outliers of training records in order of time, as `RecordSimulator.service_of` gives them.
+
+    ``missing`` temperatures and frequencies, (n_records, n_sensors + n_modes); relative residuals of ``outliers``,
+    (n_records, n_modes), NaN where a value is none; ``places``, (n_records, n_coordinates), near for similar weather.
+    """
+
+    missing: NDArray[np.bool_]
+    outliers: Array
+    places: Array
+
+    @classmethod
+    def learned(
+        cls, records: TrainingRecords, residuals: BaselineResiduals, raw: ArrayLike | None, predicted: Array
+    ) -> ServiceRecords:
+        """Learn from training records; a value is an outlier if its residual is far from its neighbours' residuals.
+
+        With raw frequencies of these records, outliers are what cleaning has changed or removed.
+        """
+        frequencies = as_floats(records.frequencies)
+        measured, outliers = frequencies, np.full(frequencies.shape, np.nan)
+        if raw is None:
+            outliers[residuals.rows] = residuals.outliers
+        else:
+            measured = as_floats(raw)
+            if measured.shape != frequencies.shape:
+                raise ValueError(
+                    f"outliers has shape {measured.shape}; expected the frequencies that the chain was fitted on "
+                    f"before they were cleaned, {frequencies.shape}, or 'fitted', or the share of outliers"
+                )
+            check_same_rows(records.frequencies, raw, ("the frequencies of fit", "outliers"))
+            is_outlier = ~np.isnan(measured) & (measured != frequencies)
+            outliers[is_outlier] = (measured / predicted - 1)[is_outlier]
+        order = np.argsort(row_times(records.temperatures), kind="stable")
+        order = order[records.counted[order]]
+        missing = np.isnan(np.hstack([as_floats(records.temperatures), measured]))
+        places = pd.DataFrame(places_of(residuals, records.inputs[order])).ffill().bfill()
+        return cls(missing[order], outliers[order], places.to_numpy())
+
+    @property
+    def has_faults(self) -> bool:
+        """Whether there is a gap or an outlier."""
+        return bool(self.missing.any() or not np.isnan(self.outliers).all())
+
+    def draw(
+        self, places: Array, random_state: np.random.RandomState, *, mean_length: float = 25, n_similar: int = 25
+    ) -> NDArray[np.intp]:
+        """Positions, (n_rows,), of the records from which rows of weather in order of time take their faults.
+
+        A row takes the record after the one that the row before it took, so that faults last as long as in training.
+        Now and then, after a run of ``mean_length`` records in the mean, one of the ``n_similar`` records with the most
+        similar weather and the same faults takes over: where a run of faults begins, or in records with the most usual
+        faults, which are mostly none. All records are taken equally often.
+        """
+        n_records, n_rows = len(self.places), len(places)
+        if not self.has_faults:
+            return np.zeros(n_rows, dtype=np.intp)  # all records are alike
+        passes = random_state.uniform(size=n_rows) < 1 / mean_length
+        which = random_state.uniform(size=n_rows)
+        taken = np.empty(n_rows, dtype=np.intp)
+        joint_of, joints = self._joints
+        trees: dict[int, cKDTree] = {}
+
+        def similar(joint: int, place: Array, share: float) -> int:
+            rows = joints[joint]
+            if len(rows) > n_similar and not np.isnan(place).any():
+                if joint not in trees:
+                    trees[joint] = cKDTree(self.places[rows])
+                rows = rows[trees[joint].query(place, n_similar)[1]]
+            return int(rows[int(share * len(rows))])
+
+        record = similar(0, places[0], which[0]) if n_rows else 0
+        for row in range(n_rows):
+            if row:
+                if passes[row] and joint_of[record]:
+                    record = similar(joint_of[record], places[row - 1], which[row])
+                record = (record + 1) % n_records
+            taken[row] = record
+        return taken
+
+    def resampled(self, random_state: np.random.RandomState) -> ServiceRecords:
+        """Gaps and outliers that the training records could have had as well, in their own weather."""
+        taken = self.draw(self.places, random_state)
+        return replace(self, missing=self.missing[taken], outliers=self.outliers[taken])
+
+    def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
+        """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
+        run by run, with the bandwidth of Silverman's rule on logarithms."""
+        drawn, logs = self.outliers[taken], np.log(np.abs(self.outliers))
+        n_runs = _begins(self.outliers).sum()
+        if n_runs < 2:
+            return drawn
+        mean, deviation, bandwidth = np.nanmean(logs), np.nanstd(logs), (4 / (3 * n_runs)) ** 0.2
+        run = np.cumsum(_begins(drawn), axis=0)
+        normal = np.take_along_axis(random_state.standard_normal((run.max() + 1, run.shape[1])), run, axis=0)
+        smoothed = (np.log(np.abs(drawn)) - mean + bandwidth * deviation * normal) / np.hypot(1, bandwidth)
+        return np.sign(drawn) * np.exp(mean + smoothed)
+
+    @cached_property
+    def _joints(self) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
+        """From 1 on, the number of the faults of records at which others may take over, 0 for the rest; and the records
+        of each number, all of them for 0."""
+        of_row = patterns(np.hstack([self.missing, ~np.isnan(self.outliers)]))[1]
+        begins = np.diff(of_row, prepend=of_row[-1:]) != 0
+        joint_of = np.where(begins | (of_row == np.bincount(of_row).argmax()), of_row + 1, 0)
+        rows = np.split(np.argsort(joint_of, kind="stable"), np.cumsum(np.bincount(joint_of))[:-1])
+        return joint_of, [np.arange(len(self.places)), *rows[1:]]
+
+
+def _begins(outliers: Array) -> NDArray[np.bool_]:
+    """Where a run of outliers of a mode begins."""
+    is_outlier = ~np.isnan(outliers)
+    return is_outlier & ~np.vstack([np.zeros((1, outliers.shape[1]), dtype=bool), is_outlier[:-1]])
+
+
+def places_of(residuals: BaselineResiduals, weather: Array) -> Array:
+    """Coordinates of weather; NaN where it is unknown."""
+    known = ~np.isnan(weather).any(axis=1)
+    places = np.full((len(weather), residuals.places.shape[1]), np.nan)
+    if known.any():
+        places[known] = residuals.coordinates.transform(weather[known])
+    return places
+
+
+@dataclass(frozen=True, eq=False)
+class RecordSimulator(SavesFrames):
+    """Draws what monitoring adds to the frequencies of a thermal model, as its training records show it.
+
+    Records that were drawn themselves have the ``gaps_and_outliers`` of other records. `DataInformedFEM.simulate`
+    describes the arguments ``noise``, ``gaps``, ``outliers`` and ``random_state``; weather comes from
+    `DataInformedFEM.weather`.
+    """
+
+    model: ThermalModel
+    records: TrainingRecords
+    gaps_and_outliers: ServiceRecords | None = None
+
+    @cached_property
+    def residuals(self) -> BaselineResiduals:
+        """Out-of-fold residuals of the training records by weather, for which the mapper is fitted in each fold."""
+        return self.records.residuals(self.model)
+
+    @cached_property
+    def service(self) -> ServiceRecords:
+        """Gaps and outliers of the training records."""
+        return self.gaps_and_outliers or self.service_of(None)
+
+    def service_of(self, F: ArrayLike | None) -> ServiceRecords:
+        """Gaps and outliers of the training records.
+
+        With their frequencies before cleaning, outliers are what cleaning has changed or removed.
+        """
+        expected = self.records.modelled * np.exp(self.model.discrepancy.at(self.records.inputs))
+        return ServiceRecords.learned(self.records, self.residuals, F, expected)
+
+    def noise(
+        self,
+        weather: Weather,
+        noise: ArrayLike | Literal["fitted"] = "fitted",
+        gaps: float | Literal["fitted"] | None = None,
+        outliers: ArrayLike | Literal["fitted"] | ServiceRecords | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> Array:
+        """Relative noise, (n_rows, n_modes), which is added to 1; NaN where a mode is missing."""
+        check_faults(gaps, outliers)
+        random, names = as_random_state(random_state), self.model.mode_names
+        streams, shape = fault_streams(random), (len(weather), len(names))
+        is_fitted = isinstance(noise, str)
+        if is_fitted and noise != "fitted":
+            raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
+        if not is_fitted:
+            values = check_noise(noise, len(names), names) * random.standard_normal(shape)
+        else:
+            order = np.argsort(row_times(weather.given), kind="stable")
+            inputs, residuals = weather.inputs[order], self.residuals
+            if gaps is None and outliers is None:
+                values = residuals.draw(inputs, random)[np.argsort(order)]
+            else:
+                values = residuals.draw_complete(inputs, random, outliers is not None)[np.argsort(order)]
+            if gaps is None and outliers is not None:
+                gaps = "fitted"  # of the records that the noise, which was completed for the outliers, is of
+        if are_drawn(gaps) or are_drawn(outliers):
+            service, taken = self._taken(weather, outliers, streams[0])
+        if are_drawn(outliers):
+            drawn = service.drawn_outliers(taken, streams[2])
+            values = np.where(np.isnan(drawn), values, drawn)
+        elif outliers is not None:
+            values = values * np.where(streams[2].uniform(size=shape) < outliers, 10.0, 1.0)
+        if are_drawn(gaps):
+            return np.where(service.missing[taken, -len(names) :], np.nan, values)
+        return values if gaps is None else np.where(streams[1].uniform(size=shape) < gaps, np.nan, values)
+
+    def gaps(
+        self,
+        weather: Weather,
+        gaps: float | Literal["fitted"] | None = "fitted",
+        outliers: ArrayLike | Literal["fitted"] | ServiceRecords | None = None,
+        random_state: int | np.random.RandomState | None = None,
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which temperatures, (n_rows, n_sensors), and frequencies, (n_rows, n_modes), are missing.
+
+        `noise` leaves out the same modes if gaps, outliers and the seed, an integer, are the same. Sensors have gaps
+        with "fitted" only.
+        """
+        if gaps is None:
+            raise ValueError("gaps is None; expected 'fitted', or the share of the values that are missing")
+        check_faults(gaps, outliers)
+        streams = fault_streams(as_random_state(random_state))
+        n_sensors, n_modes = np.shape(weather.filled)[1], len(self.model.mode_names)
+        if are_drawn(gaps):
+            service, taken = self._taken(weather, outliers, streams[0])
+            return service.missing[taken, :n_sensors], service.missing[taken, n_sensors:]
+        if np.ndim(outliers):
+            self.service_of(outliers)  # which refuses what is not of the training records
+        single = streams[1].uniform(size=(len(weather), n_modes)) < gaps
+        return np.zeros((len(weather), n_sensors), dtype=bool), single
+
+    def _taken(
+        self, weather: Weather, outliers: Any, stream: np.random.RandomState
+    ) -> tuple[ServiceRecords, NDArray[np.intp]]:
+        """Gaps and outliers of the training records, and the position of the record that each row takes them from."""
+        if isinstance(outliers, ServiceRecords):
+            service = outliers
+        else:
+            service = self.service_of(outliers) if np.ndim(outliers) else self.service
+        order = np.argsort(row_times(weather.given), kind="stable")
+        taken = service.draw(places_of(self.residuals, weather.inputs[order]), stream)
+        return service, taken[np.argsort(order)]
+
+
+def fault_streams(random_state: np.random.RandomState) -> list[np.random.RandomState]:
+    """Random states of the records drawn from, of gaps and of outliers, the same whatever noise is drawn."""
+    return [np.random.RandomState(seed) for seed in deepcopy(random_state).randint(np.iinfo(np.int32).max, size=3)]
+
+
+def are_drawn(faults: Any) -> bool:
+    """Whether gaps or outliers come from records: they are "fitted", known ones, or a table of raw frequencies."""
+    return isinstance(faults, str | ServiceRecords) or np.ndim(faults) > 0
+
+
+def check_faults(gaps: Any, outliers: Any) -> None:
+    """Raise an error for gaps or outliers that are neither None nor "fitted" nor a share, nor outliers of records."""
+    expected = {
+        "gaps": "'fitted', the share of the values that are missing, such as 0.1, or None",
+        "outliers": "'fitted', the share of the values that are outliers, such as 0.01, the frequencies that the chain "
+        "was fitted on before they were cleaned, or None",
+    }
+    for what, value in (("gaps", gaps), ("outliers", outliers)):
+        is_of_records = what == "outliers" and not isinstance(value, str) and are_drawn(value)
+        is_share = is_real(value) and 0 <= value < 1
+        is_fitted = isinstance(value, str) and value == "fitted"
+        if not (value is None or is_of_records or is_share or is_fitted):
+            raise ValueError(f"{what} is {value!r:.100}; expected {expected[what]}")
