@@ -92,10 +92,6 @@ class CondensationSolver:
     def scaled(self, factors: Array) -> EigenSolver:
         return self._lapack.scaled(factors)
 
-    def certified(self, theta: Array, n_modes: int) -> NDArray[np.bool_]:
-        """Rows whose modes are found by iteration and certified. The others are solved by LAPACK."""
-        return self._iterate(theta, n_modes, self._tol_of_shapes)[2]
-
     def _iterate(self, theta: Array, n_modes: int, tol: float) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Eigenvalues (n_samples, n_modes), shapes (n_samples, n_modes, n), and which rows are certified."""
         eigenvalues = np.full((len(theta), n_modes), np.nan)
