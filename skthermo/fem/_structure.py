@@ -157,7 +157,12 @@ class Structure:
         for what, argument, expected in arguments:
             if not isinstance(argument, Mapping):
                 raise ValueError(f"{what} is {argument!r:.200}; expected {expected}")
-        self._coordinates = _read_nodes(nodes)
+        self._coordinates = read_coordinates(nodes)
+        first: dict[tuple[float, ...], Hashable] = {}
+        for node, xyz in self._coordinates.items():
+            twin = first.setdefault(tuple(xyz.tolist()), node)
+            if twin != node:
+                raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
         self._members = dict(members)
         places = np.array(list(self._coordinates.values()))
         extent = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
@@ -446,16 +451,6 @@ def _read_directions(along: object, node: Hashable) -> list[str]:
         return list(along or ())
     words = along.split()
     return [d for word in words for d in (word if set(word) <= set(TRANSLATIONS) else [word])]
-
-
-def _read_nodes(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:
-    coordinates = read_coordinates(nodes)
-    places: dict[tuple[float, ...], Hashable] = {}
-    for node, xyz in coordinates.items():
-        twin = places.setdefault(tuple(xyz.tolist()), node)
-        if twin != node:
-            raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
-    return coordinates
 
 
 def read_coordinates(nodes: Mapping[Hashable, Sequence[float]]) -> dict[Hashable, Array]:

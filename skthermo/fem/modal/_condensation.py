@@ -130,7 +130,10 @@ class CondensationSolver:
             if not rows.size:
                 return
             x = ritz.shapes.copy()
-            x[:, :, m:] -= self._corrections(K_ss, ritz, n_modes, n_steps)
+            # Solutions of (K_ss - lambda M_ss) x = r_s, in single precision: the next residuals tell their errors.
+            lowest = np.minimum(ritz.eigenvalues, ritz.eigenvalues[:, n_modes - 1 : n_modes]).astype(np.float32)
+            shift = lowest[:, :, np.newaxis] * mu[m:].astype(np.float32)
+            x[:, :, m:] -= conjugate_gradients(K_ss, shift, ritz.residuals[:, :, m:].astype(np.float32), n_steps)
             ritz = rayleigh_ritz(x, x @ K, mu)
             done = certificate(ritz, mu, bounds, m, n_modes, tol)
             finished = rows[done]
@@ -138,13 +141,6 @@ class CondensationSolver:
             shapes[finished] = ritz.shapes[done, :n_modes]
             certified[finished] = True
             rows, K, K_ss, bounds, ritz = _take(~done, rows, K, K_ss, bounds, ritz)
-
-    def _corrections(self, K: Array, ritz: Ritz, n_modes: int, n_steps: int) -> Array:
-        """Solutions of (K_ss - lambda M_ss) x = r_s, in single precision: the next residuals tell their errors."""
-        m = ritz.shapes.shape[1]
-        lowest = np.minimum(ritz.eigenvalues, ritz.eigenvalues[:, n_modes - 1 : n_modes])
-        shift = lowest.astype(K.dtype)[:, :, np.newaxis] * self._mu[m:].astype(K.dtype)
-        return conjugate_gradients(K, shift, ritz.residuals[:, :, m:].astype(K.dtype), n_steps)
 
 
 def batch_solver(
