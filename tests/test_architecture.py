@@ -48,9 +48,6 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.chain": {"surrogate.inverse"},
     "monitoring": {"preprocessing.checks"},
     "monitoring.fleet": set(),
-    "reporting": {"reporting.fleet", "reporting.service"},
-    "reporting.fleet": {"reporting.service"},
-    "reporting.service": set(),
     "studies.detectability": set(),
     "studies.identification": set(),
 }

@@ -16,7 +16,6 @@ MOST_SIDE_BY_SIDE = 15  # modules of a package, beside its __init__.py
 SHORT = 40
 SHORT_FILES = {  # private files of fewer lines, and why they stand alone
     "fem/_samples.py": "it imports scikit-learn, which importing fem must not",
-    "reporting/_settings.py": "three pages share it",
 }
 
 

@@ -290,17 +290,17 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("monitoring/_status.py", "reporting/test_service.py"): [
         ("silence called healthy", "self.max_age is not None and self.age > self.max_age", "False"),
     ],
-    ("reporting/service/_standing.py", "reporting/test_service.py"): [
+    ("reporting/_monitor.py", "reporting/test_service.py"): [
         ("much lost stiffness called healthy", 'return "attention" if said == "healthy" and self.worn else', "return"),
     ],
-    ("reporting/fleet/_bridge.py", "reporting/test_fleet.py"): [
+    ("reporting/_fleet.py", "reporting/test_fleet.py"): [
         ("significant alarms among the others", '("significant" if is_significant else "open")', '"open"'),
         ("silent bridges below healthy ones", 'place, size = "silent",', 'place, size = "well",'),
     ],
-    ("reporting/_choice.py", "reporting/test_choice.py"): [
+    ("reporting/_study.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
     ],
-    ("plotting/_structures.py", "plotting/test_structures.py"): [
+    ("plotting/_structure_display.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
     ("monitoring/_files.py", "monitoring/test_files.py"): [

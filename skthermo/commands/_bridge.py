@@ -18,7 +18,7 @@ import pandas as pd
 import skthermo
 from skthermo._core.files import alone_with
 from skthermo._core.text import counted, plain
-from skthermo._core.warnings import warn_user, without_kinds
+from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._new_records import (
     NewFile,
     Taken,
@@ -149,13 +149,12 @@ class Bridge:
         before = None if self.settings is None else Taken.read(self.taken_file).settings
         changed = [] if self.settings is None or before is None else self.settings.changed_since(before)
         if changed:
-            warn_user(
+            text = (
                 f"{self.file}: {counted(len(changed), 'setting')} changed since the monitor was fitted: "
                 f"{', '.join(changed)}; the monitor goes on with those of its fit: expected skthermo fit {self.file} "
-                "--replace, or the settings as they were",
-                SkthermoWarning,
-                "changed-settings",
+                "--replace, or the settings as they were"
             )
+            warn_each([SkthermoWarning(text, "changed-settings")])
 
     def append_transitions(self, monitor: Monitor, done: Done) -> None:
         """Append what has changed to the file of transitions, for whoever holds the lock of the monitor."""
@@ -249,8 +248,9 @@ def update(bridge: Bridge, done: Done, files: Sequence[Path] = ()) -> None:
         monitor, taken = bridge.load(), Taken.read(bridge.taken_file)
         before = monitor.counts_
         new = _given(bridge, files, monitor, done) if files else _found(bridge, taken, monitor, done)
-        with without_kinds({"not-evaluated"}):  # said below, with all reasons
+        with collected() as findings:
             evaluated, handed = _taken_in(monitor, new, bridge, done)
+        warn_each(one for one in findings if one.kind != "not-evaluated")  # said below, with all reasons
         if len(evaluated):
             monitor.save(bridge.monitor_file)
         if not files:

@@ -14,8 +14,8 @@ import pandas as pd
 
 from skthermo._core.files import write_when_complete
 from skthermo._core.text import counted
-from skthermo._core.warnings import warn_user
-from skthermo.commands._settings import Records
+from skthermo._core.warnings import warn_each
+from skthermo.commands._settings import RecordSettings
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, read_file
 from skthermo.preprocessing.loggers.together import in_celsius, joined, once
@@ -104,7 +104,9 @@ def files_in(folder: Path) -> list[Path]:
     return sorted(one for one in folder.glob("*") if one.suffix.lower() in endings and one.name[0] not in "._~")
 
 
-def read_columns(file: Path, form: CsvFormat, records: Records, *, leave_unfinished: bool = False) -> pd.DataFrame:
+def read_columns(
+    file: Path, form: CsvFormat, records: RecordSettings, *, leave_unfinished: bool = False
+) -> pd.DataFrame:
     """Records of a file in the columns that the settings name, temperatures in degrees Celsius."""
     table = read_file(file, form, ignore=records.ignore, leave_unfinished=leave_unfinished)
     unknown = [name for name in table if name not in records.columns]
@@ -116,7 +118,7 @@ def read_columns(file: Path, form: CsvFormat, records: Records, *, leave_unfinis
     return in_celsius(table, records.convert)
 
 
-def check_layout(table: pd.DataFrame, file: Path, records: Records, layouts: Sequence[Sequence[str]]) -> None:
+def check_layout(table: pd.DataFrame, file: Path, records: RecordSettings, layouts: Sequence[Sequence[str]]) -> None:
     """Raise an error if a file has not the columns of a file of the baseline, or all columns."""
     known = [records.columns, *layouts]
     if not any(set(table) == set(layout) for layout in known):
@@ -125,7 +127,9 @@ def check_layout(table: pd.DataFrame, file: Path, records: Records, layouts: Seq
         raise ValueError(f"{file} lacks the columns {lacking}; expected {nearest}, in any order, as in the baseline")
 
 
-def read_baseline(files: Sequence[Path], form: CsvFormat, records: Records) -> tuple[pd.DataFrame, list[list[str]]]:
+def read_baseline(
+    files: Sequence[Path], form: CsvFormat, records: RecordSettings
+) -> tuple[pd.DataFrame, list[list[str]]]:
     """Records of the baseline's files, in order of time, and the columns of each file."""
     tables = [read_columns(file, form, records) for file in files]
     lacking = [name for name in records.columns if not any(name in table for table in tables)]
@@ -136,10 +140,9 @@ def read_baseline(files: Sequence[Path], form: CsvFormat, records: Records) -> t
         stamps = ", ".join(f"{file.name} from {table.index.min()}" for file, table in zip(files, tables, strict=True))
         raise ValueError(f"no stamp is in all files of the baseline ({stamps}); expected records of the same times")
     if len(waiting):
-        warn_user(
+        text = (
             f"{counted(len(waiting), 'stamp')} of the baseline are not in all files, the first {waiting.min()}. They "
-            f"are left out; {len(whole)} records have all columns. If they are many, compare the clocks of the loggers",
-            RecordsWarning,
-            "unmatched-stamps",
+            f"are left out; {len(whole)} records have all columns. If they are many, compare the clocks of the loggers"
         )
+        warn_each([RecordsWarning(text, "unmatched-stamps")])
     return once(whole).sort_index(), [list(table) for table in tables]

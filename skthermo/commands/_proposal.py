@@ -20,12 +20,12 @@ import skthermo
 from skthermo._core.files import write_when_complete
 from skthermo._core.frames import usual_step
 from skthermo._core.text import duration_text
-from skthermo._core.warnings import warn_each, without_warnings
+from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._settings import (
     CLASSES,
     SECTIONS,
     Files,
-    Records,
+    RecordSettings,
     Settings,
     class_named,
     read_settings,
@@ -42,10 +42,6 @@ FEATURES = {
     "ExponentialMeans": "Means of earlier temperatures that explain the responses.",
     "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
 }
-DENSE = pd.Timedelta(hours=6)  # time between records up to which those of a day can be evaluated together
-DAY = {"window": "1D"}
-ANY_CHANGE, FALLS = "MahalanobisDetector", "DirectionalDetector"  # of other responses, and of natural frequencies
-WIDTH = 110  # of comments
 OTHERS = """
 # An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
 # a function of a Python file that gives one, or a folder of matrices that another program exported. Other settings
@@ -63,7 +59,7 @@ OTHERS = """
 
 
 @dataclass(frozen=True)
-class Candidate:
+class TriedDetector:
     """A detector by its class and settings, what it evaluates, what it finds, and how small changes are that it finds.
 
     The ``size`` is the geometric mean of the smallest changes of each response alone, infinite where none is found.
@@ -85,7 +81,7 @@ class Proposal:
 
     looks: Sequence[FileLook]
     form: CsvFormat
-    records: Records
+    records: RecordSettings
     baseline: pd.DataFrame
     n_waiting: int
     units: Mapping[str, str]
@@ -93,7 +89,7 @@ class Proposal:
     means: ExponentialMeans | None
 
     @classmethod
-    def of(cls, options: argparse.Namespace) -> Proposal:
+    def found(cls, options: argparse.Namespace) -> Proposal:
         """Look at files, and at their records up to the end of the baseline."""
         read = LoggerRecords.read(
             options.files, options.temperatures, options.responses, options.reference, options.zone, options.stamps
@@ -105,7 +101,7 @@ class Proposal:
         baseline = table if until is None else table.loc[:until]
         if not len(baseline):
             raise ValueError(f"no record is from before {until}; the first is of {table.index[0]}")
-        records = Records(
+        records = RecordSettings(
             [f"{BASELINE}/{look.file.name}" for look in looks],
             **roles,
             ignore=list(read.ignored),
@@ -149,27 +145,32 @@ class Proposal:
             )
 
     @cached_property
-    def detectors(self) -> list[Candidate]:
+    def detectors(self) -> list[TriedDetector]:
         """Detectors that are possible, the best first; the single record where nothing speaks for another.
 
         Of natural frequencies, those that know in which direction damage moves them.
         """
         parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen in self.features]}
         parts["regression"] = class_named(REGRESSION, CLASSES["regression"])()
-        kind = FALLS if set(self.units.values()) == {HZ} else ANY_CHANGE
-        falls = ", falls of frequencies with more weight than rises" if kind == FALLS else ""
-        ways = [({}, f"each record for itself{falls}"), (DAY, f"the records of a day together{falls}")]
+        are_frequencies = set(self.units.values()) == {HZ}
+        kind = "DirectionalDetector" if are_frequencies else "MahalanobisDetector"
+        falls = ", falls of frequencies with more weight than rises" if are_frequencies else ""
+        ways = [({}, f"each record for itself{falls}")]
+        if self.step <= pd.Timedelta(hours=6):  # a day has enough records
+            ways.append(({"window": "1D"}, f"the records of a day together{falls}"))
         parts["detector"], tried = class_named(kind, CLASSES["detector"])(), []
-        for chosen, text in ways if self.step <= DENSE else ways[:1]:
+        for chosen, text in ways:
             options = {"compensator": chosen, "monitor": self.monitor_options}
             try:
                 made = Settings(Path(), {}, Files(), self.records, self.form, parts, options)
-                with without_warnings():  # the fit that follows gives them
+                with collected():  # the fit that follows gives them
                     smallest = made.monitor().fit(self.baseline).smallest_changes_
                 size = float(np.exp(np.log(list(smallest.single.values())).mean()))
-                tried.append(Candidate(kind, chosen, text, str(smallest), size if np.isfinite(size) else np.inf))
+                tried.append(TriedDetector(kind, chosen, text, str(smallest), size if np.isfinite(size) else np.inf))
             except ValueError as error:
-                tried.append(Candidate(kind, chosen, text, f"it cannot be fitted to this baseline: {error}", np.inf))
+                tried.append(
+                    TriedDetector(kind, chosen, text, f"it cannot be fitted to this baseline: {error}", np.inf)
+                )
         return sorted(tried, key=lambda one: one.size)
 
     @property
@@ -275,7 +276,7 @@ def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) 
 
 
 def _comment(text: str, sign: str = "# ") -> str:
-    lines = textwrap.wrap(text, WIDTH, initial_indent=sign, subsequent_indent=sign, break_long_words=False)
+    lines = textwrap.wrap(text, 110, initial_indent=sign, subsequent_indent=sign, break_long_words=False)
     return "\n".join(lines)
 
 

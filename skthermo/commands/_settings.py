@@ -62,7 +62,7 @@ class Files:
 
 
 @dataclass(frozen=True)
-class Records:
+class RecordSettings:
     """Which files hold records, and which of their columns are what.
 
     Parameters
@@ -115,7 +115,7 @@ class Setting(NamedTuple):
 
 SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = {
     "files": (lambda: Files, ()),
-    "records": (lambda: Records, ()),
+    "records": (lambda: RecordSettings, ()),
     "csv": (lambda: CsvFormat, ()),
     "compensator": (lambda: CompensatedDetector, ("detector", "regressor", "targets")),
     "monitor": (lambda: Monitor, ("detector", "targets", "reference", "fem")),
@@ -170,7 +170,7 @@ class Settings:
     file: Path
     content: Mapping[str, Any]
     files: Files
-    records: Records
+    records: RecordSettings
     csv: CsvFormat
     parts: Mapping[str, Any]
     options: Mapping[str, Mapping[str, Any]]
@@ -260,7 +260,7 @@ def _made_by(path: Path, setting: str, what: str) -> Any:
 
 def read_settings(file: Path) -> Settings:
     """Read and check a file of settings; errors name the line."""
-    return _Reader.of(file).settings()
+    return _Reader.opened(file).settings()
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ class _Reader:
     lines: Mapping[tuple[str, int, str], int]
 
     @classmethod
-    def of(cls, file: Path) -> _Reader:
+    def opened(cls, file: Path) -> _Reader:
         try:
             text = file.read_text(encoding="utf-8")
             return cls(file, tomllib.loads(text), dict(_places(text)))

@@ -29,7 +29,6 @@ import logging
 import os
 import sys
 import traceback
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
@@ -42,15 +41,13 @@ import pandas as pd
 import skthermo
 from skthermo._core.files import ReadWhenAsked, write_when_complete
 from skthermo._core.text import capital, plain
+from skthermo._core.warnings import collected
 from skthermo.commands import _bridge
-from skthermo.commands._bridge import ALARM, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt, sentence
+from skthermo.commands._bridge import ALARM, CODES, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt, sentence
 from skthermo.commands._settings import HOW_TO_BEGIN
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
-OF_ONE = ("acknowledge", "rebaseline", "refit", "discard")  # commands on a single monitor
-WORST = (ALARM, FAILED, NOT_EVALUATED, HEALTHY)
 EXPLAINED = (ValueError, OSError, ImportError)  # errors that need no traceback
-STATES = ("healthy", "watch", "alarm", "not evaluated")
 GAUGES = {
     "up": "1 if the last command could do its work on this bridge, else 0",
     "state": "1 for the state that the bridge is in, 0 for the others",
@@ -67,8 +64,6 @@ GAUGES = {
 }
 """Names of metrics, all of them gauges that begin with ``skthermo_``, and their help."""
 
-KINDS = ("damage", "watch", "measurement or structure")
-ESCAPES = str.maketrans({"\\": r"\\", '"': r"\"", "\n": r"\n"})  # of labels, as the text format wants them
 
 logger = logging.getLogger("skthermo.commands")
 
@@ -95,19 +90,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     facts |= {"time": pd.Timestamp.now("UTC"), "bridges": [], "fleet": None, "findings": None, "settings": None}
     facts |= {"warnings": [], "errors": []}
     try:
-        with _logged(options, facts["warnings"]):
-            try:
-                facts["exit_code"] = options.command(options, facts)
-            except Exception as error:  # Python's own exit code of an error would be that of an alarm
-                _complain(error)
-                facts["errors"].append(sentence(error))
-            logger.info("%s ends with exit code %s", options.name, facts["exit_code"])
+        with _logged(options):
+            _run(options, facts)
     except OSError as error:
         print(f"error: {sentence(error)}", file=sys.stderr)
         facts["errors"].append(sentence(error))
     if options.json:
         _print(json.dumps(plain(facts), indent=1, ensure_ascii=False, allow_nan=False))
     return facts["exit_code"]
+
+
+def _run(options: argparse.Namespace, facts: dict[str, Any]) -> None:
+    """Do what was asked for, and then say each warning once."""
+    with collected() as findings:
+        try:
+            facts["exit_code"] = options.command(options, facts)
+        except Exception as error:  # Python's own exit code of an error would be that of an alarm
+            _complain(error)
+            facts["errors"].append(sentence(error))
+    facts["warnings"] = list(dict.fromkeys(map(str, findings)))
+    for text in facts["warnings"]:
+        logger.warning("%s", text)
+    logger.info("%s ends with exit code %s", options.name, facts["exit_code"])
 
 
 def _print(text: str) -> None:
@@ -119,8 +123,8 @@ def _print(text: str) -> None:
 
 
 @contextmanager
-def _logged(options: argparse.Namespace, texts: list[str]) -> Iterator[None]:
-    """Warnings and errors go to stderr, and to a file that the options name; warnings are kept for the JSON, too."""
+def _logged(options: argparse.Namespace) -> Iterator[None]:
+    """Warnings and errors go to stderr, and to a file that the options name."""
     root, handlers = logging.getLogger("skthermo"), [logging.StreamHandler()]
     level = root.level
     handlers[0].setFormatter(Spoken())
@@ -129,19 +133,11 @@ def _logged(options: argparse.Namespace, texts: list[str]) -> Iterator[None]:
         file = logging.FileHandler(options.log, encoding="utf-8")
         file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
         handlers.append(file)
-
-    def keep(message: Warning | str, *_: Any) -> None:
-        texts.append(str(message))
-        logger.warning("%s", message)
-
     for handler in handlers:
         root.addHandler(handler)
     root.setLevel(logging.INFO)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("default", UserWarning)  # once for each line of code, whatever the environment says
-            warnings.showwarning = keep
-            yield
+        yield
     finally:
         root.setLevel(level)
         for handler in handlers:
@@ -169,8 +165,8 @@ def _parser() -> Parser:
         one.add_argument("--verbose", action="store_true", help="say more on stderr")
         return one
 
-    _on_records(add("check", "look at files of records, and say what was found", _check))
-    init = add("init", "look at files of records, and write settings that fit them", _init)
+    _on_records(add("check", "look at files of records, and say what was found", _look))
+    init = add("init", "look at files of records, and write settings that fit them", _look)
     _on_records(init)
     init.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
     init.add_argument("--name", dest="bridge", help="of the bridge (default: that of the folder)")
@@ -201,7 +197,7 @@ def _on_records(one: argparse.ArgumentParser) -> None:
 
 
 def _on_monitors(one: argparse.ArgumentParser, name: str) -> None:
-    many = {} if name in OF_ONE else {"nargs": "+"}
+    many = {} if name in ("acknowledge", "rebaseline", "refit", "discard") else {"nargs": "+"}
     what = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
     one.add_argument("files", type=Path, help=f"{what}, then new records" if name == "update" else what, **many)
     one.add_argument("--metrics", type=Path, metavar="FILE", help="write them in Prometheus' text format")
@@ -264,7 +260,7 @@ def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: d
         if one.errors:
             errors[one.name] = error or ValueError("; ".join(one.errors))
     facts["bridges"] = [one.facts() for one in done]
-    code = next(code for code in WORST if any(one.code == code for one in done))
+    code = next(code for code in (ALARM, FAILED, NOT_EVALUATED, HEALTHY) if any(one.code == code for one in done))
     if len(bridges) > 1 and options.name in ("update", "status", "report"):
         code = _as_fleet(bridges, done, errors, options, facts, code)
     metrics: dict[Path, list[dict[str, Any]]] = {}
@@ -338,38 +334,32 @@ def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> in
     return code if code == ALARM else FAILED
 
 
-def _check(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+def _look(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+    """Say what files of records hold and, of init, write settings that fit them."""
     from skthermo.commands._proposal import Proposal  # for jobs that look at files
 
-    found = Proposal.of(options)
+    found = Proposal.found(options)
     facts["findings"] = found.findings.table.to_dict("records")
+    lines = [*found.account(), found.findings.summary()]
+    if options.name == "init":
+        file = found.write(options.into, options.bridge)
+        facts["settings"] = str(file)
+        lines += [f"chosen: {found.detectors[0]}", f"written: {file}", f"read it, then: skthermo fit {file}"]
     if not options.json:
-        _print("\n".join([*found.account(), found.findings.summary()]))
-    return HEALTHY if found.findings.table.empty else ALARM
-
-
-def _init(options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    from skthermo.commands._proposal import Proposal
-
-    found = Proposal.of(options)
-    file = found.write(options.into, options.bridge)
-    facts["findings"], facts["settings"] = found.findings.table.to_dict("records"), str(file)
-    if not options.json:
-        chosen = [f"chosen: {found.detectors[0]}", f"written: {file}"]
-        _print("\n".join([*found.account(), found.findings.summary(), *chosen]))
-        _print(f"read it, then: skthermo fit {file}")
-    return HEALTHY
+        _print("\n".join(lines))
+    return HEALTHY if options.name == "init" or found.findings.table.empty else ALARM
 
 
 def write_metrics(file: Path, bridges: Sequence[Mapping[str, Any]], now: pd.Timestamp) -> None:
     """Replace a file of metrics of some bridges, as the JSON has them."""
     samples = [(name, *sample) for bridge in bridges for name, sample in _samples(bridge, now)]
+    escapes = str.maketrans({"\\": r"\\", '"': r"\"", "\n": r"\n"})  # of labels, as the text format wants them
     lines = []
     for name, text in GAUGES.items():
         lines += [f"# HELP skthermo_{name} {text}", f"# TYPE skthermo_{name} gauge"]
         for one, labels, value in samples:
             if one == name:
-                escaped = {label: text.translate(ESCAPES) for label, text in labels.items()}
+                escaped = {label: text.translate(escapes) for label, text in labels.items()}
                 shown = ",".join(f'{label}="{text}"' for label, text in escaped.items())
                 lines.append(f"skthermo_{name}{{{shown}}} {value:.10g}")
     write_when_complete(file, "\n".join(lines) + "\n")
@@ -382,9 +372,9 @@ def _samples(bridge: Mapping[str, Any], now: pd.Timestamp) -> Iterator[tuple[str
     yield "written_timestamp_seconds", (own, now.timestamp())
     if status is None:
         return
-    for state in STATES:
+    for state in CODES:
         yield "state", (own | {"state": state}, float(status["state"] == state))
-    for kind in KINDS:
+    for kind in ("damage", "watch", "measurement or structure"):
         yield "open_events", (own | {"kind": kind}, sum(one["kind"] == kind for one in status["events"]))
     yield "failed_sensors", (own, len(status["faults"]))
     counts = status["counts"] or {}

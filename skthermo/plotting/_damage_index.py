@@ -31,6 +31,7 @@ from skthermo.plotting._display import (
     mark_not_evaluated,
     marker_style,
     on_axis,
+    panels,
     plain,
     shortened,
 )
@@ -220,7 +221,7 @@ class DamageIndexDisplay(Display):
         titles = list(self.scenarios)
         width = 9.0 if n_columns == 1 else 4.6
         height = 3.4 if len(titles) == 1 else 2.6
-        self._take_axes(ax, titles, (width, height), n_columns=n_columns, share_x=True)
+        self.axes_ = panels(ax, titles, (width, height), n_columns=n_columns, share_x=True)
         self.points_: dict[str, list[Line2D]] = {}
         self.threshold_lines_: list[Line2D] = []
         self.event_spans_: list[Polygon] = []

@@ -21,6 +21,7 @@ from skthermo.plotting._display import (
     check_study,
     figure_legend,
     label_of,
+    panels,
     plain,
     shortened,
 )
@@ -32,14 +33,8 @@ if TYPE_CHECKING:
 
     from skthermo.studies import DetectabilityStudy
 
-OF_RESULTS = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
-BOUNDED = ("false_alarms", "pod", "pod_deficit")
-OF_RANKING = [f"{name}{end}" for name in BOUNDED for end in ("", "_ci_low", "_ci_high")]
-OF_RANKING += ["within_limit", "pod_at_equal_pfa", "significantly_worse"]
-OF_CAUSES = ["probability", "severity", "ci_low", "ci_high"]
-OF_SHIFTS = ["measured", "explained", "standard_error"]
 BEST, ONE_REPEAT = "not significantly worse", "order uncertain: one repeat"
-WORSE, FAILED = "significantly lower POD", "failed"
+WORSE, BROKEN = "significantly lower POD", "failed"
 
 RATES = ["low", "high", "value", "mark"]
 
@@ -222,15 +217,26 @@ class DetectorsDisplay(Display):
         if isinstance(table, pd.Series) and len(table):
             return cls(**of_changes(table)).plot(**options)
         columns = list(table.columns) if isinstance(table, pd.DataFrame) else []
-        for needed, made in ((OF_CAUSES, of_causes), (OF_SHIFTS, of_shifts), (["probability"], of_explanations)):
-            if columns and len(table) and set(needed) <= set(columns) and "rate" not in columns:
+        identified = {
+            of_causes: {"probability", "severity", "ci_low", "ci_high"},
+            of_shifts: {"measured", "explained", "standard_error"},
+            of_explanations: {"probability"},
+        }
+        for made, needed in identified.items():
+            if columns and len(table) and needed <= set(columns) and "rate" not in columns:
                 return cls(**made(table)).plot(**options)
-        needed = OF_RANKING if "within_limit" in columns else OF_RESULTS
+        results = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
+        bounded = [
+            f"{name}{end}" for name in ("false_alarms", "pod", "pod_deficit") for end in ("", "_ci_low", "_ci_high")
+        ]
+        ranking = [*bounded, "within_limit", "pod_at_equal_pfa", "significantly_worse"]
+        is_ranking = "within_limit" in columns
+        needed = ranking if is_ranking else results
         missing = [name for name in needed if name not in columns]
         if missing or not len(table):
             got = f"lacks the columns {missing}" if columns and missing else f"is {table!r:.200}"
-            raise ValueError(f"table {got}; expected a ranking, or results with {OF_RESULTS}, and one row or more")
-        if needed is OF_RANKING:
+            raise ValueError(f"table {got}; expected a ranking, or results with {results}, and one row or more")
+        if is_ranking:
             return cls(**of_ranking(table, max_false_alarms, by)).plot(**options)
         return cls(**of_results(table, scenarios, groups or {})).plot(**options)
 
@@ -251,7 +257,7 @@ class DetectorsDisplay(Display):
         n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
         width = 3.6 if n_columns > 1 else 5.0
         size = width + LETTER * n_letters / n_columns, max(0.26 * len(self.places) + 1.5, 2.4)  # inches
-        self._take_axes(ax, list(self.panels), size, n_columns=n_columns)
+        self.axes_ = panels(ax, list(self.panels), size, n_columns=n_columns)
         self.bars_: dict[str, BarContainer] = {}
         self.values_: dict[str, PathCollection] = {}
         self.marks_: dict[str, list[PathCollection]] = {}
@@ -311,8 +317,8 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
     loud = f"more than {percent(limit)} false alarms"
     is_tested = np.isfinite(ranking["false_alarms"].astype(float))
     kinds = ranking["significantly_worse"].astype(bool).map({True: WORSE, False: level})
-    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, FAILED)
-    kinds = kinds.sort_values(key=lambda names: names.map([level, WORSE, loud, FAILED].index), kind="stable")
+    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, BROKEN)
+    kinds = kinds.sort_values(key=lambda names: names.map([level, WORSE, loud, BROKEN].index), kind="stable")
     tested = ranking[is_tested]
 
     def rates(name: str, mark: pd.Series | None = None) -> pd.DataFrame:

@@ -316,20 +316,6 @@ class Display:
         own = {field.name: options.pop(field.name) for field in fields(cls) if field.name in options}
         return cls(*data, **own).plot(**options)
 
-    def _take_axes(
-        self, ax: Axes | np.ndarray | None, names: Sequence[object], size: tuple[float, float], **options: Any
-    ) -> np.ndarray:
-        """One axes for each name: those that are given, or those of a new figure with panels of this size."""
-        self.axes_ = panels(ax, names, size, **options)
-        return self.axes_
-
-    @staticmethod
-    def _check_has(given: object, names: Sequence[str], what: str, expected: str) -> None:
-        """Raise an error for what lacks attributes that are drawn."""
-        missing = [name for name in names if not hasattr(given, name)]
-        if missing:
-            raise ValueError(f"{what} is a {type(given).__name__} without {missing}; expected {expected}")
-
     @property
     def ax_(self) -> Axes:
         """The only axes, or the first of several."""

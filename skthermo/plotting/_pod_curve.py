@@ -15,6 +15,7 @@ from skthermo.plotting._display import (
     MARKERS,
     Display,
     check_study,
+    panels,
     shortened,
 )
 
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import PolyCollection
 
     from skthermo.studies import DetectabilityStudy, PODCurve
-
-NEEDED = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
-QUANTILE = 1.959964
 
 
 @dataclass(eq=False, repr=False)
@@ -150,7 +148,9 @@ class PODCurveDisplay(Display):
         ValueError
             If the curve lacks an attribute or method.
         """
-        cls._check_has(curve, NEEDED, "curve", "a PODCurve")
+        needed = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
+        if missing := [name for name in needed if not hasattr(curve, name)]:
+            raise ValueError(f"curve is a {type(curve).__name__} without {missing}; expected a PODCurve")
         return cls._drawn(curve, **options)
 
     def plot(self, ax: Axes | None = None, *, marks: bool = True) -> PODCurveDisplay:
@@ -169,7 +169,7 @@ class PODCurveDisplay(Display):
         PODCurveDisplay
             Itself.
         """
-        self._take_axes(ax, ["one display"], (6.5, 4.2))
+        self.axes_ = panels(ax, ["one display"], (6.5, 4.2))
         number = sum(line.get_gid() == "POD" for line in self.ax_.lines)
         colour = COLOURS[number % len(COLOURS)]
         marker, dashes = MARKERS[number % len(MARKERS)], LINES[number % len(LINES)]
@@ -241,7 +241,8 @@ class PODCurveDisplay(Display):
 
 def wilson(n_detected: Array, n_records: Array) -> tuple[Array, Array]:
     """Wilson's interval of 95 % of a share of independent records."""
-    square = QUANTILE**2
+    quantile = 1.959964
+    square = quantile**2
     middle = (n_detected + square / 2) / (n_records + square)
-    half = QUANTILE / (n_records + square) * np.sqrt(n_detected * (n_records - n_detected) / n_records + square / 4)
+    half = quantile / (n_records + square) * np.sqrt(n_detected * (n_records - n_detected) / n_records + square / 4)
     return middle - half, middle + half

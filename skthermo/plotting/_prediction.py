@@ -31,6 +31,7 @@ from skthermo.plotting._display import (
     line_style,
     marker_style,
     on_axis,
+    panels,
     plain,
     shortened,
     with_breaks,
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import PolyCollection
     from matplotlib.lines import Line2D
-
-KINDS = ("time", "points", "lines", "scatter")
 
 
 @dataclass(eq=False, repr=False)
@@ -282,8 +281,8 @@ class PredictionDisplay(Display):
         ValueError
             If ``kind`` is something else, or a mark is not on the axis.
         """
-        if kind not in KINDS:
-            raise ValueError(f"kind is {kind!r}; expected one of {KINDS}")
+        if kind not in (kinds := ("time", "points", "lines", "scatter")):
+            raise ValueError(f"kind is {kind!r}; expected one of {kinds}")
         columns = list(self.measured.columns)
         if titles is not None and len(titles) != len(columns):
             raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {columns}")
@@ -293,7 +292,7 @@ class PredictionDisplay(Display):
         n_rows = -(-len(names) // n_columns)  # panels over time are wide, and taller if there are few
         wide = (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
         size = (3.3, 3.2) if is_square else wide
-        self._take_axes(ax, names, size, n_columns=n_columns, share_x=not is_square)
+        self.axes_ = panels(ax, names, size, n_columns=n_columns, share_x=not is_square)
         self.lines_: dict[str, list[Line2D]] = {}
         self.bands_: list[PolyCollection] = []
         if kind == "scatter":

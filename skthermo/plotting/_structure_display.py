@@ -1,29 +1,31 @@
-"""Structures with a value for each member, or in their modes."""
+"""Structures with a value for each member, or in their modes, seen in a plane or in space."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skthermo._core.arrays import Array, real_array
+from skthermo._core.arrays import Array, Label, real_array
 from skthermo._core.estimators import last_step
 from skthermo.fem import FEModel, Structure
-from skthermo.plotting._display import COLOURS, GREY, LIGHT, ORANGE, Display, legend_columns, plain, pyplot, shortened
-from skthermo.plotting._structures import (
-    Projection,
-    add_members,
-    check_structure,
-    dofs_of,
-    draw_supports,
-    height_of,
-    set_view,
-    sort_members,
-    structure_axes,
+from skthermo.plotting._display import (
+    BLACK,
+    COLOURS,
+    GREY,
+    LIGHT,
+    ORANGE,
+    Display,
+    drawing,
+    legend_columns,
+    panels,
+    plain,
+    pyplot,
+    shortened,
 )
 
 if TYPE_CHECKING:
@@ -31,8 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import Collection
     from matplotlib.colorbar import Colorbar
-
-WIDTH, THIN = 2.5, 0.8
+    from matplotlib.lines import Line2D
 
 
 @dataclass(eq=False, repr=False)
@@ -231,13 +232,13 @@ class StructureDisplay(Display):
         if self.shapes is not None:
             return self._draw_modes(ax, amplitude, 1.5 if linewidth is None else linewidth, n_columns)
         is_own_figure = ax is None
-        linewidth = WIDTH if linewidth is None else linewidth
-        view = Projection.of(self.structure, ax)
+        linewidth = 2.5 if linewidth is None else linewidth
+        view = Projection.facing(self.structure, ax)
         nodes = np.array(list(view.nodes.values()))
         self.axes_ = structure_axes(ax, view, ["one display"], nodes, width=9.0, n_columns=1)
         self.members_: dict[str, Collection] = {}
         if self.values is not None:
-            width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
+            width = 2.5 if isinstance(linewidth, Mapping) else float(linewidth)
             self._draw_values(view, self.values, cmap, limits, width)
         else:
             self._draw_groups(view, linewidth)
@@ -254,7 +255,7 @@ class StructureDisplay(Display):
 
     def _draw_modes(self, ax: Axes | np.ndarray | None, amplitude: float, width: object, n_columns: int) -> Self:
         """A panel for each mode: moved members over those at rest."""
-        view = Projection.of(self.structure, ax)
+        view = Projection.facing(self.structure, ax)
         rest, moved = view.nodes, [moved_nodes(view, shape, amplitude) for shape in self.shapes.T]
         points = np.array([place for places in (rest, *moved) for place in places.values()])
         self.axes_ = structure_axes(ax, view, self.titles, points, width=5.0, n_columns=n_columns)
@@ -267,7 +268,7 @@ class StructureDisplay(Display):
             for nodes, colour in ((rest, LIGHT), (places, ORANGE)) if surfaces else ():
                 add_members(one, self.structure, nodes, "surfaces", surfaces, facecolors=colour, alpha=0.3)
             if lines:
-                add_members(one, self.structure, rest, "lines", lines, colors=LIGHT, linewidths=THIN, zorder=1)
+                add_members(one, self.structure, rest, "lines", lines, colors=LIGHT, linewidths=0.8, zorder=1)
                 style = {"colors": ORANGE, "linewidths": width, "zorder": 2}
                 self.members_[mode] = add_members(one, self.structure, places, "lines", lines, **style)
             draw_supports(one, view, size=7)
@@ -296,7 +297,7 @@ class StructureDisplay(Display):
         for kind, names in (("surfaces", surfaces), ("lines", lines)):
             if names:
                 shown = np.ma.masked_invalid([of_member[name] for name in names])
-                widths = np.where(np.ma.getmaskarray(shown), THIN, width)
+                widths = np.where(np.ma.getmaskarray(shown), 0.8, width)
                 style = {"alpha": 0.7} if kind == "surfaces" else {"linewidths": widths}
                 drawn = add_members(self.ax_, self.structure, nodes, kind, names, cmap=colours, **style)
                 drawn.set_array(shown)
@@ -321,7 +322,7 @@ class StructureDisplay(Display):
     def _draw_groups(self, view: Projection, linewidth: float | Mapping[str, float]) -> None:
         groups, nodes = self.structure.groups, view.nodes
         widths = linewidth if isinstance(linewidth, Mapping) else {}
-        width = WIDTH if isinstance(linewidth, Mapping) else float(linewidth)
+        width = 2.5 if isinstance(linewidth, Mapping) else float(linewidth)
         coloured = dict(zip(self.groups or (), itertools.cycle(COLOURS), strict=False))
         rest = set(self.structure.members).difference(*(groups[group] for group in coloured))
         parts: dict[str, tuple[Iterable[Hashable], str]] = {"other members": (rest, GREY if not coloured else LIGHT)}
@@ -407,3 +408,196 @@ def values_by_member(structure: Structure, values: Mapping[Hashable, float] | Ar
             raise ValueError(f"values names {key!r}; expected members, or groups among {sorted(groups)}")
         found[key] = float(values[key])
     return np.array([found.get(member, np.nan) for member in members])
+
+
+ELEVATION, AZIMUTH = 22, -60
+
+
+@dataclass(frozen=True)
+class Projection:
+    """A structure seen along the normal of its plane, or in space."""
+
+    structure: Structure
+    directions: str
+    """Those of the horizontal and the vertical axis, such as "xz", or "xyz"."""
+
+    @classmethod
+    def facing(cls, structure: Structure, ax: Axes | np.ndarray | None = None) -> Projection:
+        """In the plane that nodes and motions lie in, if there is one; in space if such axes are given."""
+        if structure.dimension == 2:
+            return cls(structure, "xy")
+        if not any(hasattr(one, "get_zlim") for one in np.ravel(np.asarray(ax, dtype=object))):
+            moving = {direction for _, direction in dofs_of(structure)}
+            extent = np.ptp(list(structure.nodes.values()), axis=0)
+            for normal in "yzx":  # a structure along one line is drawn with z upwards, if it moves there
+                plane = "xyz".replace(normal, "")
+                if extent["xyz".index(normal)] == 0 and moving <= {*plane, f"r{normal}"}:
+                    return cls(structure, plane)
+        return cls(structure, "xyz")
+
+    @property
+    def is_space(self) -> bool:
+        return len(self.directions) == 3
+
+    @property
+    def nodes(self) -> dict[Hashable, Array]:
+        """Coordinates of every node along the directions."""
+        columns = ["xyz".index(direction) for direction in self.directions]
+        return {node: place[columns] for node, place in self.structure.nodes.items()}
+
+    @property
+    def supports(self) -> dict[Hashable, bool]:
+        """Nodes that are held in a direction in which others move, and whether in every such direction."""
+        moving = ({direction for _, direction in dofs_of(self.structure)} or set("xyz")).intersection(self.directions)
+        held = {node: moving.intersection(along) for node, along in self.structure.supports.items()}
+        return {node: fixed == moving for node, fixed in held.items() if fixed}
+
+
+def dofs_of(structure: Structure) -> list[Label]:
+    """Nodes and directions of the degrees of freedom, with directions called "x" to "rz" where they are known."""
+    names = ("x", "y", "z", "rx", "ry", "rz")
+    others: dict[object, str] = dict(enumerate(names, start=1))  # by which other programs call them
+    for name in names:
+        rotated, axis = len(name) == 2, name[-1].upper()
+        others |= {f"{'ROT' if rotated else 'U'}{axis}": name, f"{'DR' if rotated else 'D'}{axis}": name}
+    return [(node, others.get(direction, direction)) for node, direction in structure.dofs]
+
+
+def check_structure(structure: object, groups: Iterable[str] | None) -> None:
+    """Raise an error for what is not a structure, or for groups that it does not have."""
+    if not isinstance(structure, Structure):
+        raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
+    for group in groups or ():
+        if group not in structure.groups:
+            raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
+
+
+def structure_axes(
+    ax: Axes | np.ndarray | None, view: Projection, names: Sequence[object], points: Array, width: float, n_columns: int
+) -> np.ndarray:
+    """Axes of a plane or of space for each name: those that are given, or those of a new figure."""
+    ratio = height_of(points)
+    width /= max(ratio, 1.0)  # tall structures are as high as others are wide
+    height = width * ratio + 0.6
+    if ax is not None or not view.is_space:
+        axes = panels(ax, names, (width, height), n_columns)
+        if view.is_space and not all(hasattr(one, "get_zlim") for one in axes):
+            raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
+        return axes
+    n_columns = min(n_columns, len(names))
+    n_rows = -(-len(names) // n_columns)
+    figure = pyplot().figure(figsize=(width * n_columns, height * n_rows))
+    title = 0.4 / height
+    room = {"left": 0.02, "right": 0.98, "bottom": 0.02, "top": 1 - title / n_rows, "wspace": 0.04, "hspace": title}
+    flat = {"projection": "3d", "proj_type": "ortho", "computed_zorder": False}  # without perspective
+    axes = figure.subplots(n_rows, n_columns, squeeze=False, subplot_kw=flat, gridspec_kw=room).ravel()
+    for unused in axes[len(names) :]:
+        unused.remove()
+    return axes[: len(names)]
+
+
+def height_of(points: Array) -> float:
+    """Height of what is seen of points as a share of its width, kept within reason for a figure."""
+    if points.shape[1] == 3:
+        azimuth, elevation = np.radians([AZIMUTH, ELEVATION])
+        across = points[:, 1] * np.cos(azimuth) - points[:, 0] * np.sin(azimuth)
+        away = points[:, 0] * np.cos(azimuth) + points[:, 1] * np.sin(azimuth)
+        points = np.column_stack([across, points[:, 2] * np.cos(elevation) - away * np.sin(elevation)])
+    width, height = np.ptp(points, axis=0)
+    return float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
+
+
+def set_view(ax: Axes, points: Array, is_own: bool) -> None:
+    """Equal scales around the points; in space, new axes are enlarged until the points fill their place."""
+    ax.set_axis_off()
+    if points.shape[1] == 2:
+        ax.set_aspect("equal")
+        low, high = points.min(axis=0), points.max(axis=0)
+        margin = 0.03 * (high - low).max()
+        ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+        return
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = np.maximum(high - low, 0.01 * (high - low).max())
+    middle = (low + high) / 2
+    limits = np.column_stack([middle - extent / 2, middle + extent / 2])
+    ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
+    ax.set_box_aspect(extent)
+    ax.patch.set_visible(False)
+    if is_own:
+        ax.view_init(elev=ELEVATION, azim=AZIMUTH)
+        fill_place(ax, points)
+
+
+def fill_place(ax: Axes, points: Array) -> None:
+    """Enlarge axes so that the projected points fill the place in the figure that these axes had."""
+    left, bottom, width, height = ax.get_position(original=True).bounds
+    size = ax.figure.get_size_inches()
+    ax.set_position((0, 0, *(1 / size)))  # one inch, from the lower left corner
+    ax.apply_aspect()
+    project = drawing("mpl_toolkits.mplot3d.proj3d").proj_transform
+    x, y, _ = project(*points.T, ax.get_proj())
+    inches = ax.transData.transform(np.column_stack([x, y])) / ax.figure.dpi
+    low, high = inches.min(axis=0), inches.max(axis=0)
+    place, room = np.array([left, bottom]) * size, np.array([width, height]) * size
+    scale = (room / np.maximum(high - low, 1e-9)).min()
+    origin = place + room / 2 - scale * (low + high) / 2
+    ax.set_position((*(origin / size), *(scale / size)))
+
+
+def sort_members(structure: Structure, names: Iterable[Hashable]) -> tuple[list[Hashable], ...]:
+    """Names of members that are points, lines and surfaces."""
+    elements = structure.members
+    points: list[Hashable] = []
+    lines: list[Hashable] = []
+    surfaces: list[Hashable] = []
+    for name in names:
+        n_nodes = len(elements[name].nodes)
+        (points if n_nodes == 1 else lines if n_nodes == 2 else surfaces).append(name)
+    return points, lines, surfaces
+
+
+def add_members(
+    ax: Axes,
+    structure: Structure,
+    nodes: Mapping[Hashable, Array],
+    kind: Literal["points", "lines", "surfaces"],
+    names: Iterable[Hashable],
+    **style: object,
+) -> Collection:
+    """Add diamonds, lines or polygons for members with nodes at some places, in two or three dimensions."""
+    places = [np.array([nodes[node] for node in structure.members[name].nodes]) for name in names]
+    if kind == "points":
+        fixed = {"s": 36, "marker": "D", "edgecolors": BLACK, "linewidths": 0.5, "clip_on": False}
+        return ax.scatter(*np.vstack(places).T, **fixed, **style)
+    name, fixed = (
+        ("LineCollection", {"capstyle": "round"}) if kind == "lines" else ("PolyCollection", {"edgecolors": "none"})
+    )
+    is_space = hasattr(ax, "get_zlim")
+    if is_space:
+        factory = getattr(drawing("mpl_toolkits.mplot3d.art3d"), name.replace("Coll", "3DColl"))
+    else:
+        factory = getattr(drawing("matplotlib.collections"), name)
+    collection = factory(places, **fixed, **style)
+    (ax.add_collection3d if is_space else ax.add_collection)(collection)
+    return collection
+
+
+def draw_supports(ax: Axes, view: Projection, size: float = 11.0) -> dict[str, Line2D]:
+    """Triangles below nodes that are held: filled where they are so in every direction, open where some stay free."""
+    nodes, supports, drawn = view.nodes, view.supports, {}
+    kinds = {True: ("fixed in every direction", BLACK), False: ("free in some direction", "white")}
+    for is_fixed, (label, face) in kinds.items():
+        places = [nodes[node] for node, fixed in supports.items() if fixed == is_fixed]
+        if places:
+            drawn[label] = ax.plot(
+                *np.array(places).T,
+                linestyle="",
+                marker=[(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)],  # a triangle with its tip at the node
+                markersize=size,
+                color=BLACK,
+                markerfacecolor=face,
+                label=label,
+                clip_on=False,
+                zorder=3,
+            )[0]
+    return drawn

@@ -12,27 +12,12 @@ from sklearn.exceptions import NotFittedError
 from skthermo._core.arrays import check_path, check_size
 from skthermo._core.files import write_when_complete
 from skthermo.fem import Structure
-from skthermo.reporting._templates import check_templates, rendered
-from skthermo.reporting.service import Standing, monitor_facts
+from skthermo.reporting._monitor import Standing, monitor_facts
+from skthermo.reporting._page import check_templates, rendered
 
 if TYPE_CHECKING:  # jobs write the page on a monitor every night: studies and fleets are imported for their own pages
     from skthermo.monitoring import Fleet, Monitor
     from skthermo.studies import DetectabilityStudy, IdentifiedDamage
-
-KINDS = {
-    "Fleet": ("chains", "monitors", "discoveries"),
-    "Monitor": ("update", "acknowledge"),
-    "DetectabilityStudy": ("scenarios",),
-}
-"""Attributes by which a subject is recognised."""
-
-ONLY_FOR = {
-    "identified": ("DetectabilityStudy", "Monitor"),
-    "structure": ("DetectabilityStudy", "Monitor"),
-    "detector": ("DetectabilityStudy",),
-    "now": ("Monitor", "Fleet"),
-}
-"""Arguments that are not for every subject."""
 
 
 def owner_report(
@@ -98,7 +83,7 @@ def owner_report(
         subject, the detector has no results, several cannot be ranked, as no scenario is healthy or none is damaged, or
         a template is wrong: the error names its file and line.
     ImportError
-        If jinja2 or matplotlib is not installed; the pages on a fleet do without matplotlib.
+        If jinja2 is not installed. Without matplotlib, a sentence and a table to save stand in place of each drawing.
 
     Notes
     -----
@@ -131,14 +116,14 @@ def owner_report(
         limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
     folder = check_templates(templates)
     if kind == "Fleet":
-        from skthermo.reporting.fleet import write_fleet
+        from skthermo.reporting._fleet import write_fleet
 
         check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
         write_fleet(subject, file, title, now, limit, fdr, folder)
     elif kind == "Monitor":
-        facts = monitor_facts(Standing.of(subject, now, limit), structure)
+        facts = monitor_facts(Standing.at(subject, now, limit), structure)
         if identified is not None:
-            from skthermo.reporting._figures import identified_facts
+            from skthermo.reporting._drawings import identified_facts
 
             facts["identified"] = identified_facts(identified)
         write_when_complete(file, rendered("monitor", facts | {"title": title}, folder))
@@ -152,7 +137,8 @@ def owner_report(
 
 def _kind_of(subject: object) -> str:
     """Whether it is a study, a monitor or a fleet; an error for what is none, or has nothing to report yet."""
-    kind = next((kind for kind, names in KINDS.items() if all(hasattr(subject, name) for name in names)), None)
+    attributes = {"Fleet": "discoveries", "Monitor": "acknowledge", "DetectabilityStudy": "scenarios"}
+    kind = next((kind for kind, name in attributes.items() if hasattr(subject, name)), None)
     if kind is None:
         raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy, a Monitor or a Fleet")
     if kind == "Monitor" and not hasattr(subject, "events_"):
@@ -172,7 +158,13 @@ def _check_arguments(kind: str, given: dict[str, Any]) -> None:
     for name, expected in types.items():
         if given[name] is not None and not isinstance(given[name], expected):
             raise ValueError(f"{name} is {given[name]!r:.200}; expected a {expected.__name__}")
-    for name, kinds in ONLY_FOR.items():
+    only_for = {
+        "identified": ("DetectabilityStudy", "Monitor"),
+        "structure": ("DetectabilityStudy", "Monitor"),
+        "detector": ("DetectabilityStudy",),
+        "now": ("Monitor", "Fleet"),
+    }
+    for name, kinds in only_for.items():
         if given[name] is not None and kind not in kinds:
             raise ValueError(f"{name} given for a {kind}; expected only for a {' or a '.join(kinds)}")
 

@@ -14,7 +14,7 @@ pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.filterwarnings("ignore:.*few-baseline-records")
 
 BREAKABLE = """
-return [...document.querySelectorAll("tr, img, .chart, .state")]
+return [...document.querySelectorAll("tr, img, .state")]
   .filter((one) => getComputedStyle(one).breakInside !== "avoid").map((one) => one.tagName)
 """
 INSERTED = """

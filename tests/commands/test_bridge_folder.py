@@ -8,7 +8,6 @@ import sys
 from importlib.resources import files
 from itertools import pairwise
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -357,7 +356,7 @@ def test_an_fe_model_of_a_python_file_follows_drift_and_is_drawn(bridge, records
 def test_the_page_is_written_from_the_templates_that_the_settings_name(bridge, monkeypatch):
     pytest.importorskip("jinja2")
     monkeypatch.undo()  # of the short page
-    monkeypatch.setattr("skthermo.reporting._figures._svg", lambda figure: b"<svg/>")
+    monkeypatch.setattr("skthermo.reporting._drawings._svg", lambda figure: b"<svg/>")
     text = settings(bridge).read_text().replace("# [page]", "[page]").replace("# templates = ", "templates = ")
     settings(bridge).write_text(text)
     failed = run("report", settings(bridge))
@@ -384,7 +383,3 @@ def test_a_missing_file_is_named_in_words(command, tmp_path):
     missing = [tmp_path / "nowhere.toml"] if command != "check" else [tmp_path / "T.csv", tmp_path / "F.csv"]
     done = run(command, *missing)
     assert (done.code, str(missing[0]) in done.err, "Errno" in done.err) == (FAILED, True, False)
-
-
-def test_numbers_are_read_to_the_last_bit(bridge, records):
-    assert np.array_equal(load_monitor(bridge / "monitor.joblib").baseline_, records[:FIRST])

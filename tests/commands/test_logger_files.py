@@ -2,7 +2,6 @@
 
 import io
 import re
-import shutil
 import sys
 import warnings
 from dataclasses import dataclass
@@ -14,14 +13,11 @@ import pytest
 
 from skthermo.commands._new_records import check_layout, read_baseline, read_columns
 from skthermo.commands._settings import read_settings
-from skthermo.monitoring import load_monitor
 from skthermo.preprocessing import read_records
-from skthermo.preprocessing.loggers.logger_files import look_at
-from tests.commands.folders import edit, run, write_day
-from tests.monitoring.nightly import FIRST as TWO_YEARS
+from tests.commands.folders import run
 
 FAILED = 3
-N, FIRST = 80, 60  # records of a file, and of the baseline where later ones are new
+N = 80  # records of a file
 RANDOM = np.random.default_rng(0)
 RECORDS = pd.DataFrame(
     {"T1": RANDOM.normal(10, 8, N).round(2), "f1": RANDOM.normal(4, 0.1, N).round(4)},
@@ -303,11 +299,6 @@ UNDERSTOOD = {
     "values that are missing at first": lambda: log(rows(BEGUN), truth=BEGUN),
 }  # fmt: skip
 """Logs of one kind each, and all of their records."""
-OTHER_LENGTHS = {
-    "the month first, as later days show", "one day, its format given", "offsets", "offsets of hours",
-    "clocks that change",
-    "the day first, none after the twelfth", "the month first, none after the twelfth", "a workbook, with midnights",
-}  # fmt: skip
 
 HIDDEN = [[row[0][:10], row[0][11:].replace(":", "h"), *row[1:]] for row in rows(HOURS)]
 TWICE = pd.concat([RECORDS, changed(30, 55.5)[30:31]])
@@ -507,50 +498,3 @@ def test_without_openpyxl_a_workbook_is_named_with_what_to_install(tmp_path, mon
     done, _ = begin(Log({"log.xlsx": b""}, RECORDS), tmp_path)
     assert done.code == FAILED
     assert_one_error(done.err, tmp_path, "openpyxl", "[excel]")
-
-
-def test_without_openpyxl_a_workbook_keeps_no_other_file_out(fitted, records, tmp_path, monkeypatch):
-    bridge = shutil.copytree(fitted, tmp_path / "bridge")
-    now = write_day(records, bridge, TWO_YEARS, TWO_YEARS + 3)
-    (bridge / "new" / "log.xlsx").write_bytes(b"")
-    monkeypatch.setitem(sys.modules, "openpyxl", None)
-    assert run("update", bridge, "--now", now).code != FAILED  # an empty file is not read yet
-    (bridge / "new" / "log.xlsx").write_bytes(b"PK")
-    now = write_day(records, bridge, TWO_YEARS + 3, TWO_YEARS + 5)
-    done = run("update", bridge, "--now", now)
-    assert done.code == FAILED
-    assert_one_error(done.err, tmp_path, "openpyxl")
-    assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
-
-
-def test_a_format_of_stamps_that_is_given_is_the_one_that_is_read(tmp_path):
-    (file,) = write(log(rows(LONE, US)), tmp_path)
-    for stamps, month in ((US, 3), ("%d/%m/%Y %H:%M", 4)):
-        assert set(look_at(file, stamps=stamps).records.index.month) == {month}
-    with pytest.raises(ValueError, match=re.escape(str(file))):
-        look_at(file, stamps=GERMAN)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("kind", [kind for kind in UNDERSTOOD if kind not in OTHER_LENGTHS])
-def test_a_monitor_in_service_reads_them_too(kind, tmp_path):
-    one = UNDERSTOOD[kind]()
-    done, file = begin(one, tmp_path)
-    assert done.code == 0, done.err
-    truth = one.truth.sort_index()
-    end = str(truth.index[FIRST - 1])
-    edit(file, "# until = ...", f'until = "{end}"')
-    edit(file, "false_alarms_per_year = 1.0", "false_alarms_per_year = 100.0")  # as the baseline is short
-    edit(file, "watch_per_year = 12.0", "watch_per_year = 1000.0")
-    done = run("fit", file)
-    assert done.code == 0, done.err
-    done = run("update", file, "--now", str(truth.index[-1]))
-    assert done.code != FAILED, done.err
-    monitor = load_monitor(tmp_path / "bridge" / "monitor.joblib")
-    assert_read(monitor.baseline_, truth[:FIRST])
-    assert_read(monitor.records_, truth[FIRST:])
-    for name, content in one.files.items():
-        (tmp_path / "bridge" / "new" / name).write_bytes(content)
-    done = run("update", file, "--now", str(truth.index[-1]))
-    assert done.code != FAILED, done.err
-    assert len(load_monitor(tmp_path / "bridge" / "monitor.joblib").records_) == N - FIRST

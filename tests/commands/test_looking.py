@@ -134,26 +134,6 @@ def test_columns_that_cannot_be_used_are_named_where_others_are_lacking(tmp_path
         read_records(tmp_path / "a.csv")
 
 
-def test_days_and_months_that_may_be_exchanged_are_named(tmp_path):
-    table = RECORDS.set_axis(pd.date_range("2026-01-01", periods=80, freq="3h"))  # no day after the twelfth
-    table.to_csv(tmp_path / "a.csv", date_format="%d/%m/%Y %H:%M")
-    found = look_at(tmp_path / "a.csv")
-    assert found.form.stamps == "%d/%m/%Y %H:%M"
-    assert "%m/%d/%Y" in found.notes[0]
-
-
-def test_seconds_since_1970_and_offsets_are_times_in_utc(tmp_path):
-    utc = RECORDS.tz_localize("UTC")
-    utc.set_axis(utc.index.asi8 // 10**9 if utc.index.unit == "ns" else utc.index.as_unit("s").asi8).to_csv(
-        tmp_path / "s.csv"
-    )
-    utc.tz_convert("Europe/Brussels").to_csv(tmp_path / "offset.csv")
-    for name in ("s.csv", "offset.csv"):
-        found = look_at(tmp_path / name).records
-        assert str(found.index.tz) == "UTC"
-        assert (found.index == utc.index).all()
-
-
 ZONES = ["Europe/Brussels", "America/New_York", "Australia/Lord_Howe", "UTC", "Asia/Kolkata", "America/St_Johns"]
 
 
@@ -175,30 +155,6 @@ def test_local_clocks_are_followed_over_their_changes(tmp_path_factory, zone, st
     assert (read_file(file, CsvFormat(time_zone=zone)).index == local).all()
     pd.DataFrame({"T": range(len(local))}, local).to_csv(file)
     assert (read_file(file, CsvFormat(time_zone=zone)).index == local).all()
-
-
-def test_an_hour_that_does_not_exist_is_named(tmp_path):
-    hours = pd.date_range("2026-03-28", periods=48, freq="h")  # a clock that stays on winter time
-    pd.DataFrame({"T": 1.0}, hours).to_csv(tmp_path / "a.csv")
-    with pytest.raises(ValueError, match="line 28: 2026-03-29 02:00:00 is no time in Europe/Brussels"):
-        read_file(tmp_path / "a.csv", CsvFormat(time_zone="Europe/Brussels"))
-    assert len(read_file(tmp_path / "a.csv", CsvFormat(time_zone="Etc/GMT-1"))) == 48
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("", "no columns"),
-        ("time,T1\n", "no columns"),
-        ("a,b\nc,d\n", "no columns"),
-        ("2026-01-01,1.5\n2026-01-02,1.5\n", "line of names"),
-        ("name,T1\nx,1.5\ny,1.5\n", "no column holds stamps"),
-    ],
-)
-def test_what_is_no_table_of_records_is_an_error(tmp_path, text, expected):
-    (tmp_path / "a.csv").write_text(text)
-    done = run("check", tmp_path / "a.csv")
-    assert (done.code, expected in done.err) == (3, True), done.err
 
 
 @pytest.mark.usefixtures("one_detector")

@@ -15,7 +15,7 @@ import pytest
 import skthermo.reporting
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, truss_records
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 
@@ -133,45 +133,6 @@ def test_status_and_acknowledge(bridge):
     assert "event is 7; expected the number of one of the 1 events" in wrong.err
 
 
-ROW = "T1,T2\n2027-01-11,1.5,2.5\n"
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "is empty; expected a line of names"),
-        ("time;T1\n2027-01-11;1\n", "line 1: names ['time;T1']; expected stamps and columns"),
-        ("time,T1,T1\n", "expected stamps and columns, each once"),
-        ("time,T1,T2\n2027-01-11,1.5\n", "line 2: values: 2; expected 3 as named above"),
-        ("time,T1,T2\n\n2027-01-11,1.5,warm\n", "line 3, column 'T2': 'warm'; expected a number with the decimal"),
-        ("time,T1\n2027-01-11,1_5\n", "line 2, column 'T1': '1_5'; expected a number"),
-        ("time,T1\n11.01.2027,1\n12.01.2027,1\n", "line 2: '11.01.2027' is no time; expected one like 2026-01-31"),
-        ("time,T1\n2027-13-01,1\n", "'2027-13-01' is no time"),
-        ("time,T1\n46023.5,1\n", "'46023.5' is no time"),
-        ("time,T1\n2027-01-11T13:00Z,1\n", "stamps have an offset from UTC; expected none, as in the records"),
-        ("time,T1\n2027-01-11 13:00Z,1\n2027-01-11 14:00,1\n", "1 of 2 stamps have an offset from UTC"),
-    ],
-)  # fmt: skip
-def test_what_is_no_record_is_named_with_its_line(bridge, text, message):
-    done = bridge("update", new=text)
-    assert done.code == FAILED
-    assert message in done.err
-    assert_same_history(load_monitor(done.file), load_monitor(bridge("status").file))
-
-
-def test_other_columns_and_values_are_refused_and_nothing_is_changed(bridge, records):
-    wrong = {
-        "T9": records[FIRST + 10 : FIRST + 12].rename(columns={"T1": "T9"}),
-        "other values": records[FIRST + 9 : FIRST + 12] + 0.1,
-    }
-    for message, new in wrong.items():
-        done = bridge("update", new=new)
-        before = done.file.read_bytes()
-        assert (done.code, message in done.err) == (FAILED, True)
-        assert done.file.read_bytes() == before
-
-
 def test_other_forms_of_files(bridge, records, tmp_path):
     new = records[FIRST + 10 : FIRST + 12]
     form = {"sep": ";", "decimal": ",", "date_format": "%d.%m.%Y %H:%M"}
@@ -190,37 +151,6 @@ def test_a_file_that_may_be_cut_off_is_reported(bridge, records, tmp_path):
     assert done.code == HEALTHY
     assert done.err.startswith("warning: ")
     assert "unfinished-file" in done.err
-
-
-@pytest.mark.nightly
-def test_stamps_with_offsets_come_in_the_time_zone_of_the_baseline(records, tmp_path):
-    zoned = records.tz_localize("Europe/Brussels")
-    monitor, file = fitted_monitor(zoned), tmp_path / "bridge.joblib"
-    monitor.save(file)
-    new = zoned[FIRST + 84 : FIRST + 90]  # the clocks change in between
-    with pytest.warns(UserWarning, match="of 6 .*not-evaluated"):
-        monitor.update(new)
-    new.to_csv(tmp_path / "new.csv")
-    assert len({line[:25][-6:] for line in (tmp_path / "new.csv").read_text().splitlines()[1:]}) == 2  # offsets
-    with contextlib.redirect_stdout(io.StringIO()):
-        main(["update", str(file), str(tmp_path / "new.csv")])
-    assert_same_history(load_monitor(file), monitor)
-    new.tz_localize(None).to_csv(tmp_path / "new.csv")
-    with contextlib.redirect_stderr(io.StringIO()) as errors:
-        assert main(["update", str(file), str(tmp_path / "new.csv")]) == ALARM  # which an error does not hide
-    assert "stamps have no offset from UTC; expected one for each" in errors.getvalue()
-
-
-def test_a_report_that_fails_hides_no_alarm(bridge, records, monkeypatch):
-    def fails(*given, **named):
-        raise OSError("the disk is full")
-
-    monkeypatch.setattr(skthermo.reporting, "owner_report", fails)
-    done = bridge("update", "--report", "status.html", new=records[FIRST + 10 : FIRST + 12])
-    assert (done.code, done.err) == (FAILED, "error: status.html was not written: the disk is full\n")
-    assert load_monitor(done.file).last_ == records.index[FIRST + 11]  # what was evaluated is kept
-    alarm = bridge("update", "--report", "a.html", new=records[DAMAGED + 10 : DAMAGED + 12], state="alarm")
-    assert (alarm.code, alarm.err) == (ALARM, "error: a.html was not written: the disk is full\n")
 
 
 def test_records_that_are_set_aside_are_not_healthy(bridge, records):
@@ -261,13 +191,6 @@ def test_wrong_arguments_are_not_taken_for_a_monitor_that_is_not_evaluated(argum
         main(arguments)
     assert ended.value.code == FAILED
     assert capsys.readouterr().err.startswith("usage: skthermo")
-
-
-def test_the_version_is_that_of_the_package(capsys):
-    with pytest.raises(SystemExit) as end:
-        main(["--version"])
-    assert end.value.code == 0
-    assert capsys.readouterr().out.split() == ["skthermo", skthermo.__version__]
 
 
 @pytest.mark.parametrize("files", [["bridge.joblib"], ["new.csv"], ["a.toml", "b.toml", "new.csv"]])

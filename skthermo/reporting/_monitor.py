@@ -1,27 +1,24 @@
-"""How a structure stands by its monitor, at the time at which a page is written."""
+"""The page on a monitor: how a structure stands at the time at which it is written, and its drawings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
 
-from skthermo._core.frames import as_moment
+from skthermo._core.frames import DAY, YEAR, as_moment, midnight, midnights_between
+from skthermo.fem import Structure
 from skthermo.monitoring import Monitor, MonitorStatus
-from skthermo.reporting._templates import Row, rows_of
+from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
+from skthermo.reporting._drawings import Values, draw, draw_detectable, fold_legend, losses_on
+from skthermo.reporting._page import Html, Row, rows_of, settings_of, versions
 
-ONE_DAY, MONTH, YEAR = pd.Timedelta(days=1), pd.Timedelta(days=31), pd.Timedelta(days=365.25)
 Time: TypeAlias = str | datetime | None
-
-N_ERRORS = 2  # standard errors on either side of an estimate
-FARTHEST = 100.0  # years ahead, beyond which nothing is predicted
-
-SET_ASIDE = "measurement or structure"  # the kind of events of responses that moved too far
 
 
 class Doubt(NamedTuple):
@@ -64,7 +61,7 @@ class Standing:
     errors: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, monitor: Monitor, now: Time = None, limit: float = 0.1, errors: Iterable[str] = ()) -> Standing:
+    def at(cls, monitor: Monitor, now: Time, limit: float, errors: Iterable[str] = ()) -> Standing:
         """Now is by the clock where no time is given."""
         return cls(monitor, as_moment(now, monitor.last_.tz), limit, tuple(dict.fromkeys(errors)))
 
@@ -108,13 +105,15 @@ class Standing:
     @property
     def alarm_since(self) -> pd.Timestamp:
         """When the first of the open events began that make an alarm."""
-        starts = [opened["start"].min() for kind in ("damage", SET_ASIDE) if len(opened := self.opened(kind))]
+        starts = [
+            opened["start"].min() for kind in ("damage", "measurement or structure") if len(opened := self.opened(kind))
+        ]
         return min(starts, default=self.last)
 
     @property
     def is_set_aside(self) -> bool:
         """Whether a response that moved too far is all that makes an alarm."""
-        return not len(self.opened("damage")) and bool(len(self.opened(SET_ASIDE)))
+        return not len(self.opened("damage")) and bool(len(self.opened("measurement or structure")))
 
     @property
     def doubt(self) -> Doubt:
@@ -155,24 +154,17 @@ class Standing:
     def years(self) -> float:
         return (self.last - self.monitor.days_.index[0]) / YEAR if self.has_records else 0.0
 
-    def days_until(self, end: pd.Timestamp) -> pd.DataFrame:
-        """Days in service within the year up to a time, those without a record included, without a time zone."""
-        days = self.monitor.days_.tz_localize(None)
-        last = end.tz_localize(None).normalize()
-        first = max(last - YEAR, days.index[0]).normalize() if len(days) else last
-        return days.reindex(pd.date_range(first, max(first, last), freq="D"))
-
     @property
     def recent(self) -> tuple[int, int]:
         """How many records came in the month up to the newest one, and how many of them were evaluated."""
         days = self.monitor.days_
-        days = days[days.index > self.last - MONTH]
+        days = days[days.index > self.last - pd.Timedelta(days=31)]
         return int(days["n_records"].sum()), int(days["n_evaluated"].sum())
 
     @property
     def n_doubtful(self) -> int:
         """How many of the records of that month that were evaluated have a remark."""
-        recent = self.evaluations[self.evaluations.index > self.last - MONTH]
+        recent = self.evaluations[self.evaluations.index > self.last - pd.Timedelta(days=31)]
         return int(((recent["state"] != "not evaluated") & (recent["reason"] != "")).sum())
 
     @property
@@ -200,7 +192,7 @@ class Standing:
     def _failing(self, event: Row) -> list[str]:
         """Sensors that failed in the time of an event, before the monitor had noticed."""
         faults, end = self.monitor.faults_, event["end"] or self.last
-        during = [one for one in rows_of(faults) if one["since"] <= end and event["start"] < one["detected"] + ONE_DAY]
+        during = [one for one in rows_of(faults) if one["since"] <= end and event["start"] < one["detected"] + DAY]
         return sorted({str(fault["column"]) for fault in during})
 
     @property
@@ -218,18 +210,18 @@ class Standing:
         return [{**row, "reached": self._reached(row)} for row in rows_of(found)]
 
     def _reached(self, row: Row) -> Reached | None:
-        """When a loss of so much is reached at this rate; None if it is not."""
+        """When a loss of so much is reached at this rate, with two standard errors; None if it is not."""
         left = self.limit + row["change"]
         if not np.isfinite(row["per_year"]) or (left > 0 and row["per_year"] >= 0):
             return None
         if left <= 0:
             return Reached(is_past=True)
         rate, error = -row["per_year"], row["per_year_error"]
-        if left / rate > FARTHEST:
-            return Reached(is_far=True)
-        speeds = [rate, *([] if not np.isfinite(error) else [rate + N_ERRORS * error, rate - N_ERRORS * error])]
+        speeds = [rate, rate + 2 * error, rate - 2 * error] if np.isfinite(error) else [rate]
         spans = [left / speed if speed > 0 else np.inf for speed in speeds]
-        return Reached(False, False, *(self.last + span * YEAR if span <= FARTHEST else None for span in spans))
+        if spans[0] > 100:  # years, beyond which nothing is predicted
+            return Reached(is_far=True)
+        return Reached(False, False, *(self.last + span * YEAR if span <= 100 else None for span in spans))
 
     @property
     def unknown(self) -> dict[str, Any]:
@@ -251,3 +243,95 @@ class Standing:
             "reasons": list(self.evaluations.loc[is_unknown, "reason"].value_counts().items()),
             "remarks": list(remarks[remarks != ""].value_counts().items()),
         }
+
+
+class Span(NamedTuple):
+    """What a drawing of the damage index shows: the records of the last "month", the days of the last "year", or those
+    of all of the "service"."""
+
+    name: str
+    start: pd.Timestamp
+    table: pd.DataFrame
+    number: int
+    n_alarms: int
+    n_unknown: int
+    highest: float
+
+
+def spans_of(standing: Standing) -> list[Span]:
+    """The last month, if records of it are kept, the last year and, where service is longer, all of it."""
+    found = []
+    if len(standing.evaluations):
+        start = standing.last - pd.Timedelta(days=31)
+        shown = standing.evaluations[standing.evaluations.index >= start]
+        n_alarms, n_unknown = (int((shown["state"] == state).sum()) for state in ("alarm", "not evaluated"))
+        highest = shown["index"].max()
+        found.append(Span("month", start, shown[["index", "threshold"]], len(shown), n_alarms, n_unknown, highest))
+    whole = standing.monitor.days_.index[0]
+    starts = {"year": midnight(max(standing.last - YEAR, whole))}
+    if standing.last - whole > pd.Timedelta(days=400):
+        starts["service"] = whole
+    for name, start in starts.items():
+        days = standing.monitor.days_[standing.monitor.days_.index >= start]
+        number = len(midnights_between(days.index[0], standing.last))
+        n_unknown = number - int((days["n_evaluated"] > 0).sum())
+        values = {"highest of the day": days["index_max"], "median": days["index_median"]}
+        table = pd.DataFrame(values).assign(threshold=standing.monitor.threshold_)
+        n_alarms = int((days["n_alarms"] > 0).sum())
+        found.append(Span(name, start, table, number, n_alarms, n_unknown, days["index_max"].max()))
+    return found
+
+
+def draw_span(standing: Standing, span: Span, title: str, alt: str) -> Html:
+    """Damage index of each record, or the highest and the median of each day."""
+    what = "all of the service" if span.name == "service" else f"the last {span.name}"
+    values = Values(f"damage index of {what}", span.table.rename_axis("date"))
+    by = "record" if span.name == "month" else "day"
+
+    def make() -> DamageIndexDisplay:
+        display = DamageIndexDisplay.from_estimator(standing.monitor, start=span.start, by=by)
+        fold_legend(display.figure_, "outside lower center")
+        return display
+
+    return draw(make, alt, title, height=3.4, values=values)
+
+
+def draw_drift(standing: Standing, alt: str) -> list[Html]:
+    """Change of each group's stiffness by day; nothing where none is known yet."""
+    changes = 100 * standing.monitor.days_.filter(regex="^drift ").astype(float)
+    shown = changes.rename(columns=lambda name: name.removeprefix("drift "))
+    if not shown.notna().any(axis=None):
+        return []
+    table = shown.rename(columns="change of {} (%)".format).rename_axis("date")
+    make = partial(PredictionDisplay.from_predictions, shown, unit="%", kind="lines", quantity="change")
+    return [draw(make, alt, height=1.0 + 1.4 * shown.shape[1], values=Values("change of stiffness", table))]
+
+
+def monitor_facts(standing: Standing, structure: Structure | None = None) -> dict[str, Any]:
+    """What the template of the page on a monitor is given."""
+    monitor = standing.monitor
+    detector = monitor.detector_
+    parts = dict(detector.named_steps) if hasattr(detector, "named_steps") else {"detector": detector}
+    parts = {"monitor": monitor, **parts, "model": monitor.fem}
+    return {
+        "written": standing.now,
+        "standing": standing,
+        "monitor": monitor,
+        "structure": structure,
+        "draw": {one.__name__: one for one in (draw_detectable, draw_drift, draw_span, losses_on, spans_of)},
+        "settings": settings_of(parts, but=("monitor: detector", "monitor: fem")),
+        "columns": _columns(monitor),
+        "versions": versions(),
+        "identified": None,
+        "fleet": None,
+    }
+
+
+def _columns(monitor: Monitor) -> dict[str, list[str]]:
+    """Names of the columns with their units: responses, and temperatures."""
+    found: dict[str, list[str]] = {"responses": [], "temperatures": []}
+    for name, unit in monitor.units_.items():
+        kind = "responses" if name in set(monitor.targets_) else "temperatures"
+        says_it = f"[{unit}]" in str(name) or f"({unit})" in str(name)
+        found[kind].append(f"{name}" if says_it or not unit else f"{name} ({unit})")
+    return found

@@ -1,15 +1,19 @@
-"""Pages from templates: the package's own, or changed ones in a folder."""
+"""Pages from templates, the package's own or changed ones in a folder; their HTML, settings and versions."""
 
 from __future__ import annotations
 
 import os
+import platform
 import re
 import traceback
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
+from html import escape
+from importlib import import_module
 from importlib.resources import files
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -19,7 +23,6 @@ from skthermo._core import text
 from skthermo._core.arrays import check_path
 from skthermo._core.estimators import import_optional
 from skthermo._core.frames import midnight
-from skthermo.reporting._html import Html
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -27,7 +30,29 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 Row: TypeAlias = dict[str, Any]
-ENDING = ".html.j2"
+
+
+class Html(str):
+    """Text that is HTML already; any other text is escaped when it becomes part of an element."""
+
+    __slots__ = ()
+
+    def __html__(self) -> Html:
+        """By which templates know it."""
+        return self
+
+
+def element(tag: str, *content: object, **attributes: object) -> Html:
+    """An element with its content; an underscore at the end of an attribute's name is left out, others are hyphens."""
+    named = "".join(f' {name.rstrip("_").replace("_", "-")}="{_escaped(one)}"' for name, one in attributes.items())
+    inner = "".join(_escaped(part) for part in content)
+    return Html(f"<{tag}{named}>" if tag in ("img", "input") else f"<{tag}{named}>{inner}</{tag}>")
+
+
+def _escaped(value: object) -> str:
+    return str(value) if hasattr(value, "__html__") else escape(text.printable(value))
+
+
 STYLE, SCRIPT = (
     Html("\n" + files("skthermo.reporting").joinpath(name).read_text(encoding="utf-8"))
     for name in ("page.css", "page.js")
@@ -51,7 +76,7 @@ def rendered(name: str, facts: Mapping[str, Any], folder: str = "") -> str:
     """
     jinja2 = import_optional("jinja2", extra="pages")
     try:
-        return environment_of(folder).get_template(name + ENDING).render(facts)
+        return environment_of(folder).get_template(f"{name}.html.j2").render(facts)
     except ImportError:  # of what draws
         raise
     except Exception as error:
@@ -91,7 +116,12 @@ def environment_of(folder: str = "") -> Environment:
     )
     environment.globals |= {"policy": POLICY, "style": STYLE, "script": SCRIPT}
     environment.tests["finite"] = np.isfinite
-    environment.filters |= {one.__name__: one for one in FILTERS}
+    filters = [
+        *(text.bounds_text, text.capital, text.chance_text, text.counted, text.counted_number, text.duration_text),
+        *(text.listed, text.percent, text.period_text, text.probability_text, text.share_text, text.significant),
+        *(moment, day, rows_of, sections_of),
+    ]
+    environment.filters |= {one.__name__: one for one in filters} | {"grouped": "{:,}".format}
     return environment
 
 
@@ -125,19 +155,6 @@ def day(time: str | datetime | None) -> str:
     return moment(time, is_short=True)
 
 
-def grouped(number: int) -> str:
-    """A whole number with its thousands apart."""
-    return f"{number:,}"
-
-
-FILTERS = [
-    *(text.bounds_text, text.capital, text.chance_text, text.counted, text.counted_number, text.duration_text),
-    *(text.listed, text.percent, text.period_text, text.probability_text, text.share_text, text.significant),
-    *(moment, day, grouped, rows_of, sections_of),
-]
-"""What templates write numbers and times with."""
-
-
 def _printable(value: Any) -> Any:
     """What a template writes: nothing for None, and text without control characters."""
     if value is None:
@@ -148,5 +165,25 @@ def _printable(value: Any) -> Any:
 def _place(error: Exception, folder: str = "") -> str:
     """File and line of the innermost template, perhaps of those in a folder, through which an error came."""
     frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
-    found = [(file, line) for file, line in frames if file.startswith(folder) and file.endswith(ENDING)]
+    found = [(file, line) for file, line in frames if file.startswith(folder) and file.endswith(".html.j2")]
     return f"{found[-1][0]}, line {found[-1][1]}" if found else ""
+
+
+def versions() -> list[tuple[str, str]]:
+    """Versions of the programs by name."""
+    packages = {name: name for name in ("skthermo", "numpy", "scipy", "pandas")}
+    packages |= {"sklearn": "scikit-learn", "matplotlib": "matplotlib"}
+    installed = {name: shown for name, shown in packages.items() if find_spec(name) is not None}
+    found = [(shown, str(import_module(name).__version__)) for name, shown in installed.items()]
+    return [("Python", platform.python_version()), *found]
+
+
+def settings_of(estimators: Mapping[str, object], but: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """Parameters of estimators as short text, by the name of their part; of what has none, nothing."""
+    rows = []
+    for part, estimator in estimators.items():
+        found = estimator.get_params(deep=False) if hasattr(estimator, "get_params") else {}
+        for name, value in found.items():
+            shown, label = " ".join(repr(value).split()), f"{part}: {name}"
+            rows += [] if label in but else [(label, shown if len(shown) <= 400 else f"{shown[:400]} ...")]
+    return rows

@@ -1,12 +1,12 @@
-"""What the page for the owner of many bridges is made of, and the pages of the single ones beside it."""
+"""The page for the owner of many bridges: how each stands among the others, and its own page beside it."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -17,15 +17,140 @@ import numpy as np
 import pandas as pd
 
 from skthermo._core.files import write_when_complete
-from skthermo._core.frames import as_moment
+from skthermo._core.frames import as_moment, midnights_between
 from skthermo.monitoring import Fleet
-from skthermo.reporting._settings import settings_of, versions
-from skthermo.reporting._templates import Row, rendered, rows_of
-from skthermo.reporting.fleet._bridge import FAILED, UNKNOWN_STATES, UNWATCHED, Bridge
-from skthermo.reporting.service import Standing, Time, monitor_facts
+from skthermo.reporting._monitor import Doubt, Standing, Time, monitor_facts
+from skthermo.reporting._page import Row, rendered, rows_of, settings_of, versions
 
-LONGEST = 60  # letters of a file's name
-RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)$")  # no names of files on Windows
+PLACES = (
+    "significant",
+    "open",
+    "unexplained",
+    "raised",
+    "worn",
+    "silent",
+    "broken",
+    "without monitor",
+    "drifting",
+    "well",
+)
+"""Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
+that would be significant, has ended and was not explained; a raised index; much stiffness lost; not evaluated; not
+fitted; without a monitor; a drift beyond its error; healthy."""
+
+
+@dataclass(frozen=True)
+class BridgeRow:
+    """State of a bridge in the table of a fleet.
+
+    ``size`` orders those in the same place: the larger, the worse. ``alarm_for`` is how long it is in alarm, ``modes``
+    and ``groups`` drive and explain the alarm, ``index`` and ``highest`` are over the threshold, ``drift`` is the group
+    that has changed most beyond its error, with its change. ``errors`` are stages that failed; ``unread`` is the
+    "monitor" or "model" whose file cannot be read.
+    """
+
+    name: Hashable
+    state: str
+    place: str
+    size: float = 0.0
+    is_watched: bool = False
+    since: pd.Timestamp = pd.NaT
+    alarm_for: pd.Timedelta | None = None
+    modes: list[str] = field(default_factory=list)
+    groups: list[str] = field(default_factory=list)
+    silent_since: pd.Timestamp | None = None
+    doubt: Doubt | None = None
+    worn: list[str] = field(default_factory=list)
+    unexplained: list[int] = field(default_factory=list)
+    failed: list[str] = field(default_factory=list)
+    errors: tuple[str, ...] = ()
+    unread: str = ""
+    index: float | None = None
+    highest: float | None = None
+    is_followed: bool = False
+    drift: tuple[str, float] | None = None
+    n_evaluated: int = 0
+    n_days: int = 0
+    n_warnings: int = 0
+
+    @property
+    def order(self) -> tuple[int, float]:
+        """By which bridges are sorted, the worst first."""
+        return PLACES.index(self.place), -self.size
+
+    @classmethod
+    def watched(
+        cls,
+        name: Hashable,
+        standing: Standing,
+        *,
+        is_significant: bool = False,
+        unexplained: Sequence[int] = (),
+        n_warnings: int = 0,
+    ) -> BridgeRow:
+        """A bridge as its monitor evaluates it; ``unexplained`` are the numbers of its events that have ended so."""
+        opened, state = standing.opened("damage"), standing.state
+        threshold = float(standing.monitor.threshold_)
+        highest = float(opened["peak"].max()) / threshold if len(opened) else None
+        certain = [group for group in standing.drift or () if group["significant"]]
+        largest = max(certain, key=lambda group: abs(group["change"]), default=None)
+        lost = max([-group["change"] for group in certain], default=0.0)
+        place, size = "drifting" if lost > 0 else "well", max(lost, 0.0)
+        if state == "alarm":
+            place, size = ("significant" if is_significant else "open"), np.nan if highest is None else highest
+        elif unexplained:
+            place, size = "unexplained", float(standing.events.loc[list(unexplained), "peak"].max()) / threshold
+        elif state == "watch":
+            place, size = "raised", float(standing.opened("watch")["peak"].max()) / threshold
+        elif state == "attention":
+            place = "worn"
+        elif state == "not evaluated":
+            place, size = "silent", (standing.now - standing.doubt.since) / pd.Timedelta("1D")
+        days, known = standing.monitor.days_, standing.evaluations["index"].dropna()
+        month = midnights_between(standing.now - pd.Timedelta(days=30), standing.now)
+        month = month[month >= days.index[0]] if standing.has_records else month[:0]
+        is_alarm = state == "alarm"
+        return cls(
+            name,
+            state,
+            place,
+            size,
+            is_watched=True,
+            since=_since(standing, opened),
+            alarm_for=max(standing.now - opened["start"].min(), standing.status.records.step) if is_alarm else None,
+            modes=_names(opened["modes"]),
+            groups=_names(opened["groups"]),
+            silent_since=standing.last if standing.status.records.is_late else None,
+            doubt=standing.doubt if state == "not evaluated" else None,
+            worn=standing.worn,
+            unexplained=list(unexplained),
+            failed=[str(column) for column in standing.failed["column"]],
+            errors=standing.errors,
+            index=float(known.iloc[-1]) / threshold if len(known) else None,
+            highest=highest,
+            is_followed=standing.drift is not None,
+            drift=None if largest is None else (largest["name"], largest["change"]),
+            n_evaluated=int((days["n_evaluated"].reindex(month) > 0).sum()),
+            n_days=len(month),
+            n_warnings=n_warnings,
+        )
+
+
+def _names(texts: pd.Series) -> list[str]:
+    """Names in texts that list them."""
+    return sorted({name for text in texts if text for name in str(text).split(", ")})
+
+
+def _since(standing: Standing, opened: pd.DataFrame) -> pd.Timestamp:
+    """Since when a bridge is in its state; healthy since its last damage event, or since its service began."""
+    if len(opened):
+        return opened["start"].min()
+    if standing.state == "watch":
+        return standing.opened("watch")["start"].min()
+    if standing.state == "not evaluated":
+        return standing.doubt.since
+    ends = standing.events.loc[standing.events["kind"] == "damage", "end"]
+    return ends.max() if len(ends) else standing.monitor.days_.index[0]
 
 
 def write_fleet(
@@ -45,10 +170,10 @@ def write_fleet(
     write_when_complete(file, rendered("fleet", fleet_facts(fleet, bridges, links, found) | facts, templates))
 
 
-def fleet_facts(fleet: Fleet, bridges: list[Bridge], links: Mapping[Hashable, str], found: Any) -> dict[str, Any]:
+def fleet_facts(fleet: Fleet, bridges: list[BridgeRow], links: Mapping[Hashable, str], found: Any) -> dict[str, Any]:
     """What the template of the page is given: bridges by state, the worst first, warnings and errors."""
     counts = Counter(bridge.state for bridge in bridges)
-    n_unknown = sum(counts[state] for state in UNKNOWN_STATES)
+    n_unknown = sum(counts[state] for state in ("not evaluated", "not fitted", "no monitor"))
     unexplained = [bridge for bridge in bridges if bridge.place == "unexplained"]
     state = "alarm" if counts["alarm"] else "attention" if unexplained or counts["attention"] else "healthy"
     state = "watch" if counts["watch"] and state == "healthy" else state
@@ -99,7 +224,7 @@ class PageWriter:
         warned = self.fleet.warnings
         return {name: texts.unique().tolist() for name, texts in warned.groupby("bridge")["message"]}
 
-    def write(self, name: Hashable) -> Bridge:
+    def write(self, name: Hashable) -> BridgeRow:
         """Write a bridge's page, and tell how it stands."""
         messages, errors = self.messages.get(name, []), self.errors[name]
         monitor, unread = _opened(self.fleet.monitors, name)
@@ -109,8 +234,8 @@ class PageWriter:
         of_fleet = {**self.back, "warnings": messages, "errors": errors}
         facts = {"title": str(name), "written": self.written, "fleet": of_fleet}
         if monitor is not None:
-            standing, ended = Standing.of(monitor, self.now, self.limit, stages), self.found.unexplained
-            bridge = Bridge.watched(
+            standing, ended = Standing.at(monitor, self.now, self.limit, stages), self.found.unexplained
+            bridge = BridgeRow.watched(
                 name,
                 standing,
                 is_significant=name in self.found.bridges,
@@ -133,16 +258,16 @@ class PageWriter:
 
     def _without_monitor(
         self, name: Hashable, is_unread: bool, stages: list[str], n_warnings: int
-    ) -> tuple[Bridge, Any]:
+    ) -> tuple[BridgeRow, Any]:
         """A bridge that nobody watches, and its chain, if it has one."""
         chain, without_chain = _opened(self.fleet.chains, name)
-        state, place = (UNWATCHED, "without monitor") if chain is not None else (FAILED, "broken")
+        state, place = ("no monitor", "without monitor") if chain is not None else ("not fitted", "broken")
         unread = "model" if without_chain and chain is None else ""
         size = 0.0
         if is_unread:
             state, place, size, unread = "not evaluated", "silent", np.inf, "monitor"
         errors = tuple(dict.fromkeys(stages))
-        return Bridge(name, state, place, size, errors=errors, unread=unread, n_warnings=n_warnings), chain
+        return BridgeRow(name, state, place, size, errors=errors, unread=unread, n_warnings=n_warnings), chain
 
 
 def page_names(bridges: Iterable[Hashable]) -> dict[Hashable, str]:
@@ -168,8 +293,9 @@ def link(*parts: str) -> str:
 
 def _plain(name: str) -> str:
     letters = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-    text = re.sub(r"[^A-Za-z0-9]+", "_", letters).strip("_")[:LONGEST].rstrip("_")
-    return f"bridge_{text}".rstrip("_") if not text or RESERVED.match(text) else text
+    text = re.sub(r"[^A-Za-z0-9]+", "_", letters).strip("_")[:60].rstrip("_")
+    is_reserved = re.fullmatch(r"(?i)con|prn|aux|nul|com\d|lpt\d", text)  # on Windows
+    return f"bridge_{text}".rstrip("_") if not text or is_reserved else text
 
 
 def _as_written(now: Time) -> pd.Timestamp:
