@@ -383,26 +383,19 @@ def linearise_modes(
         }
         results, findings = solve_rows(model, rows, "linearised_modes", expected, n_jobs, dofs=places)
     else:
-        results, findings = _differenced_modes(model, rows, dofs, step, n_jobs)
+        (frequencies, jacobian), findings = solve_slopes(model, rows, step, n_jobs)
+        shapes = solve_modes(model, rows, dofs, n_jobs)[0][1]
+
+        def with_the_same_signs(moved: Array) -> Array:
+            (_, there), found = solve_modes(model, moved, dofs, n_jobs)
+            findings.extend(found)
+            reference = np.tile(np.repeat(shapes, rows.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
+            return there * np.sign(np.einsum("sdm,sdm->sm", there, reference))[:, np.newaxis]
+
+        slopes = central_differences(with_the_same_signs, rows, shapes, _step_size(step))
+        results = [frequencies, jacobian, shapes, slopes]
     warn_each(findings)
     return tuple(results)  # type: ignore[return-value]
-
-
-def _differenced_modes(
-    model: FEModel, theta: Array, dofs: ArrayLike, step: float | None, n_jobs: int | None
-) -> tuple[list[Array], list[SkthermoWarning]]:
-    """The results of `linearise_modes` by central differences of the shapes, and the findings about them."""
-    (frequencies, jacobian), findings = solve_slopes(model, theta, step, n_jobs)
-    shapes = solve_modes(model, theta, dofs, n_jobs)[0][1]
-
-    def with_the_same_signs(moved: Array) -> Array:
-        (_, there), found = solve_modes(model, moved, dofs, n_jobs)
-        findings.extend(found)
-        reference = np.tile(np.repeat(shapes, theta.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
-        return there * np.sign(np.einsum("sdm,sdm->sm", there, reference))[:, np.newaxis]
-
-    slopes = central_differences(with_the_same_signs, theta, shapes, _step_size(step))
-    return [frequencies, jacobian, shapes, slopes], findings
 
 
 def add_noise(

@@ -152,11 +152,6 @@ class AffineTerms(ABC):
         """Derivative of ``coefficients``, (n_samples, n_terms, n_parameters)."""
         return self.coefficients(theta)[:, :, np.newaxis] * self.exponents / theta[:, np.newaxis]
 
-    def derivatives(self, theta: Array, vectors: Array) -> Array:
-        """(dA / d theta_p) times each vector at one row of theta, (n, n_vectors, n_parameters)."""
-        gradients = self.coefficient_gradients(theta)[0]
-        return np.stack([self.weighted_sum(weights) @ vectors for weights in gradients.T], axis=2)
-
     @classmethod
     @abstractmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
@@ -167,8 +162,8 @@ class AffineTerms(ABC):
         """The summed matrix of every row of theta."""
 
     @abstractmethod
-    def weighted_sum(self, weights: Array) -> Matrix:
-        """The weighted sum of the matrices."""
+    def derivatives(self, theta: Array, vectors: Array) -> Array:
+        """(dA / d theta_p) times the vectors of every row of theta, (n_samples, n, n_vectors, n_parameters)."""
 
     def each(self, theta: Array) -> Iterator[Matrix]:
         """The summed matrices, one by one; a constant matrix is summed once."""
@@ -225,11 +220,7 @@ class DenseTerms(AffineTerms):
         flat = self.matrices.reshape(len(self.matrices), -1)
         return (self.coefficients(theta) @ flat).reshape(-1, self.n_dof, self.n_dof)
 
-    def weighted_sum(self, weights: Array) -> Array:
-        return np.tensordot(weights, self.matrices, axes=1)
-
-    def batch_derivatives(self, theta: Array, vectors: Array) -> Array:
-        """(dA / d theta_p) times the vectors of every row of theta, (n_samples, n, n_vectors, n_parameters)."""
+    def derivatives(self, theta: Array, vectors: Array) -> Array:
         products = np.stack([matrix @ vectors for matrix in self.matrices], axis=3)
         return products @ self.coefficient_gradients(theta)[:, np.newaxis]
 
@@ -307,9 +298,14 @@ class SparseTerms(AffineTerms):
         sums = self.entries @ self.coefficients(theta).T
         return [self.pattern.matrix(data) for data in sums.T.copy()]
 
-    def weighted_sum(self, weights: Array) -> scipy.sparse.csc_array:
-        used = self.entries[:, np.flatnonzero(weights)]
-        return self.pattern.matrix(used @ weights[weights != 0])
+    def derivatives(self, theta: Array, vectors: Array) -> Array:
+        slopes = np.empty((*vectors.shape, theta.shape[1]))
+        for row, gradient in enumerate(self.coefficient_gradients(theta)):
+            for parameter, weights in enumerate(gradient.T):
+                used = np.flatnonzero(weights)
+                matrix = self.pattern.matrix(self.entries[:, used] @ weights[used])
+                slopes[row, :, :, parameter] = matrix @ vectors[row]
+        return slopes
 
     def quadratic_forms(self, shapes: Array) -> Array:
         columns = self.pattern.columns

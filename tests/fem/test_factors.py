@@ -4,7 +4,6 @@ import importlib.util
 import pickle
 import sys
 
-import joblib
 import numpy as np
 import pytest
 import scipy.linalg
@@ -12,7 +11,7 @@ import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skthermo.fem import AffineModel, sample
+from skthermo.fem import AffineModel
 from skthermo.fem.modal import ShiftInvertSolver
 from tests.fem.frames import FRAME, portal
 from tests.fem.test_sparse import THETA, chain, dense_frequencies
@@ -60,13 +59,6 @@ def test_frequencies_do_not_depend_on_the_solver(solver):
     np.testing.assert_allclose(model.jacobian(THETA), FRAME.jacobian(THETA), rtol=1e-6, atol=1e-6)
     reduced = model.reduced(0.2, random_state=0)
     np.testing.assert_allclose(reduced.frequencies(THETA[:1] ** 0.1), model.frequencies(THETA[:1] ** 0.1), rtol=1e-5)
-
-
-def test_workers_give_the_bits_of_one_process(solver):
-    model = portal()
-    with joblib.parallel_config("loky"):
-        there = sample(model, 0.2, 20, n_jobs=2, random_state=0)
-    np.testing.assert_array_equal(there.frequencies, sample(model, 0.2, 20, random_state=0).frequencies)
 
 
 def test_a_solver_that_is_missing_is_named(monkeypatch):

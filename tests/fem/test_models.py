@@ -34,11 +34,6 @@ def row_model(row):
     return np.sqrt(row @ [1.0, 2.0]) * np.array([1.0, 2.0])
 
 
-def test_models_are_the_documented_duck_type():
-    assert isinstance(make_truss(), FEModel)
-    assert isinstance(CallableModel(row_model, ["a", "b"], 2), FEModel)
-
-
 def test_clone_shares_and_pickle_copies():
     truss = make_truss()
     assert clone(truss) is truss
@@ -98,12 +93,8 @@ def test_third_party_programs_run_row_by_row_or_all_at_once():
         lambda theta: np.sqrt(theta @ [1.0, 2.0])[:, None] * [1.0, 2.0], ["a", "b"], 2, vectorized=True
     )
     np.testing.assert_allclose(by_row.frequencies(rows), at_once.frequencies(rows), rtol=1e-15)
-    for model in (by_row, at_once):
-        np.testing.assert_array_equal(
-            sample(model, 0.2, 700, n_jobs=2, random_state=1).frequencies,
-            sample(model, 0.2, 700, random_state=1).frequencies,
-        )
     assert clone(by_row) is by_row
+    assert isinstance(by_row, FEModel)
 
 
 def test_a_program_is_damaged_by_its_parameters(tmp_path):

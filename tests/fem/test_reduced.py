@@ -123,10 +123,7 @@ def test_a_reduced_model_is_a_model_like_any():
     assert clone(REDUCED) is REDUCED
     copied = pickle.loads(pickle.dumps(REDUCED))
     np.testing.assert_array_equal(copied.frequencies(THETA), REDUCED.frequencies(THETA))
-    drawn = [sample(REDUCED, 0.3, 600, n_jobs=n_jobs, random_state=1).frequencies for n_jobs in (1, 2)]
-    np.testing.assert_array_equal(*drawn)
     assert "basis vectors, error" in repr(REDUCED)
-    assert REDUCED.reduced(0.1, random_state=0).n_dof == FRAME.n_dof
     assert (REDUCED.matrices(THETA[0])[0] != FRAME.matrices(THETA[0])[0]).nnz == 0
 
 

@@ -1,6 +1,5 @@
-"""Finite elements, each in its own file."""
+"""Finite elements."""
 
-from skthermo.fem.elements._bar import Bar
 from skthermo.fem.elements._beam import Beam
 from skthermo.fem.elements._element import (
     ROTATIONS,
@@ -13,8 +12,7 @@ from skthermo.fem.elements._element import (
     check_matrices,
 )
 from skthermo.fem.elements._membrane import Membrane
-from skthermo.fem.elements._point_mass import PointMass
-from skthermo.fem.elements._spring import Spring
+from skthermo.fem.elements._simple import Bar, PointMass, Spring
 
 __all__ = [
     "ROTATIONS",

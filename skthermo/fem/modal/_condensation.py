@@ -92,10 +92,6 @@ class CondensationSolver:
     def scaled(self, factors: Array) -> EigenSolver:
         return self._lapack.scaled(factors)
 
-    def certified(self, theta: Array, n_modes: int) -> NDArray[np.bool_]:
-        """Rows whose modes are found by iteration and certified. The others are solved by LAPACK."""
-        return self._iterate(theta, n_modes, self._tol_of_shapes)[2]
-
     def _iterate(self, theta: Array, n_modes: int, tol: float) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Eigenvalues (n_samples, n_modes), shapes (n_samples, n_modes, n), and which rows are certified."""
         eigenvalues = np.full((len(theta), n_modes), np.nan)
@@ -134,7 +130,10 @@ class CondensationSolver:
             if not rows.size:
                 return
             x = ritz.shapes.copy()
-            x[:, :, m:] -= self._corrections(K_ss, ritz, n_modes, n_steps)
+            # Solutions of (K_ss - lambda M_ss) x = r_s, in single precision: the next residuals tell their errors.
+            lowest = np.minimum(ritz.eigenvalues, ritz.eigenvalues[:, n_modes - 1 : n_modes]).astype(np.float32)
+            shift = lowest[:, :, np.newaxis] * mu[m:].astype(np.float32)
+            x[:, :, m:] -= conjugate_gradients(K_ss, shift, ritz.residuals[:, :, m:].astype(np.float32), n_steps)
             ritz = rayleigh_ritz(x, x @ K, mu)
             done = certificate(ritz, mu, bounds, m, n_modes, tol)
             finished = rows[done]
@@ -142,13 +141,6 @@ class CondensationSolver:
             shapes[finished] = ritz.shapes[done, :n_modes]
             certified[finished] = True
             rows, K, K_ss, bounds, ritz = _take(~done, rows, K, K_ss, bounds, ritz)
-
-    def _corrections(self, K: Array, ritz: Ritz, n_modes: int, n_steps: int) -> Array:
-        """Solutions of (K_ss - lambda M_ss) x = r_s, in single precision: the next residuals tell their errors."""
-        m = ritz.shapes.shape[1]
-        lowest = np.minimum(ritz.eigenvalues, ritz.eigenvalues[:, n_modes - 1 : n_modes])
-        shift = lowest.astype(K.dtype)[:, :, np.newaxis] * self._mu[m:].astype(K.dtype)
-        return conjugate_gradients(K, shift, ritz.residuals[:, :, m:].astype(K.dtype), n_steps)
 
 
 def batch_solver(

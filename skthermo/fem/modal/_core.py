@@ -1,5 +1,6 @@
 """Modal analysis of affine matrices: eigenproblems by LAPACK, columns that follow modes, and derivatives."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -12,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 
 from skthermo._core.arrays import Array, Matrix
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
-from skthermo.fem.modal._condensation import CondensationSolver, EigenSolver, batch_solver
+from skthermo.fem.modal._condensation import EigenSolver, batch_solver
 from skthermo.fem.modal._modes import REPEATED, LocalModes, linearised_by_row
 from skthermo.fem.modal._sparse import ShiftInvertSolver, count_modes
 
@@ -170,12 +171,6 @@ class AffineCore:
         known = len(ratios) and np.isfinite(ratios).all()
         return replace(projected, guards=int(ratios.argmax()) if known else GUARD_MODES)
 
-    def certified(self, theta: Array) -> NDArray[np.bool_]:
-        """Rows that are solved by iteration; the others are solved by LAPACK."""
-        if isinstance(self.solver, CondensationSolver):
-            return self.solver.certified(theta, self.n_solved)
-        return np.zeros(len(theta), dtype=bool)
-
     def frequencies(self, theta: Array) -> tuple[Array]:
         """Frequencies in Hz, (n_samples, n_modes)."""
         if self.track:
@@ -318,7 +313,28 @@ def eigen_solver(stiffness: AffineTerms, mass: AffineTerms) -> EigenSolver:
     raise TypeError("stiffness and mass must both be dense or both sparse")
 
 
-class StandardSolver:
+class DenseSolver(ABC):
+    """A solver by LAPACK; at one theta the stiffness is factored when it is first needed."""
+
+    _stiffness: DenseTerms
+
+    @abstractmethod
+    def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
+        """Lowest eigenvalues and their shapes, (n_samples, n_dof, n_modes)."""
+
+    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
+        eigenvalues, shapes = self.modes(theta, n_modes)
+        factors: list = []
+
+        def solve(columns: Array) -> Array:
+            if not factors:
+                factors.append(scipy.linalg.cho_factor(self._stiffness.assemble(theta)[0]))
+            return scipy.linalg.cho_solve(factors[0], columns)
+
+        return eigenvalues[0], shapes[0], solve
+
+
+class StandardSolver(DenseSolver):
     """A y = lambda y with A = L^-1 K L^-T and phi = L^-T y, for a constant mass M = L L'.
 
     The mass is factored once and every stiffness term transformed once.
@@ -338,10 +354,6 @@ class StandardSolver:
         positive = np.where(eigenvalues[:, :1] > 0, eigenvalues, np.nan)
         return positive[:, :n_modes], self._basis @ shapes[:, :, :n_modes]
 
-    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        eigenvalues, shapes = self.modes(theta, n_modes)
-        return eigenvalues[0], shapes[0], cholesky_solver(self._stiffness, theta)
-
     def scaled(self, factors: Array) -> "StandardSolver":
         factors = self._stiffness.factors * factors
         return StandardSolver(
@@ -349,7 +361,7 @@ class StandardSolver:
         )
 
 
-class FlexibilitySolver:
+class FlexibilitySolver(DenseSolver):
     """B y = y / lambda with B = L^-1 M L^-T and phi = L^-T y sqrt(lambda), for K = L L'.
 
     The mass may vary with theta or be zero at some degrees of freedom. The lowest modes stay accurate where the
@@ -369,10 +381,6 @@ class FlexibilitySolver:
         inverse_eigenvalues, shapes = np.linalg.eigh(flexibility)
         eigenvalues = ones / inverse_eigenvalues[:, ::-1][:, :n_modes]
         return eigenvalues, back @ shapes[:, :, ::-1][:, :, :n_modes] * np.sqrt(eigenvalues)[:, np.newaxis]
-
-    def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        eigenvalues, shapes = self.modes(theta, n_modes)
-        return eigenvalues[0], shapes[0], cholesky_solver(self._stiffness, theta)
 
     def scaled(self, factors: Array) -> "FlexibilitySolver":
         return FlexibilitySolver(self._stiffness.with_factors(self._stiffness.factors * factors), self._mass)
@@ -403,18 +411,6 @@ def dense_solver(stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest
     return FlexibilitySolver(stiffness, mass)
 
 
-def cholesky_solver(stiffness: DenseTerms, theta: Array) -> Callable[[Array], Array]:
-    """A function that solves K x = b at one theta; the matrix is factored when it is first called."""
-    factors: list = []
-
-    def solve(columns: Array) -> Array:
-        if not factors:
-            factors.append(scipy.linalg.cho_factor(stiffness.assemble(theta)[0]))
-        return scipy.linalg.cho_solve(factors[0], columns)
-
-    return solve
-
-
 def _cholesky(matrices: Array) -> tuple[Array, Array]:
     """Lower factors and ones; the identity and NaN where a matrix is not positive definite."""
     try:
@@ -442,9 +438,9 @@ def shape_derivatives(
     derivatives = np.full((*shapes.shape, theta.shape[1]), np.nan)
     theta, eigenvalues, shapes = theta[solved], eigenvalues[solved], shapes[solved]
     K, M = stiffness.assemble(theta), mass.assemble(theta)
-    forces, d_masses = -stiffness.batch_derivatives(theta, shapes), np.zeros((len(theta), *derivatives.shape[2:]))
+    forces, d_masses = -stiffness.derivatives(theta, shapes), np.zeros((len(theta), *derivatives.shape[2:]))
     if not mass.is_constant:
-        inertia = mass.batch_derivatives(theta, shapes)
+        inertia = mass.derivatives(theta, shapes)
         forces += eigenvalues[:, np.newaxis, :, np.newaxis] * inertia
         d_masses = np.einsum("sim,simp->smp", shapes, inertia)
     for mode in range(shapes.shape[2]):

@@ -183,10 +183,10 @@ class LocalModes:
         dofs = check_dofs(dofs, self.n_dof) if dofs is None or np.size(dofs) else np.empty(0, dtype=np.intp)
         stiffness, mass = self._stiffness, self._mass
         phi, eigenvalues = self._shapes[:, columns], self._eigenvalues[columns]
-        forces = -stiffness.derivatives(self._theta, phi)
+        forces = -stiffness.derivatives(self._theta, phi[np.newaxis])[0]
         d_masses = np.zeros((len(columns), forces.shape[2]))
         if not mass.is_constant:
-            inertia = mass.derivatives(self._theta, phi)
+            inertia = mass.derivatives(self._theta, phi[np.newaxis])[0]
             d_masses = np.einsum("ij,ijp->jp", phi, inertia)
             forces += eigenvalues[:, np.newaxis] * inertia
         along = np.tensordot(self._shapes.T, forces, axes=1)
