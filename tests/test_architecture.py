@@ -47,7 +47,6 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate.inverse": {"fem.affine"},  # polynomials of ln f
     "surrogate.chain": {"surrogate.inverse"},
     "monitoring": {"preprocessing.checks"},
-    "monitoring.fleet": set(),
     "reporting": {"reporting.fleet", "reporting.service"},
     "reporting.fleet": {"reporting.service"},
     "reporting.service": set(),

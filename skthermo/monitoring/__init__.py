@@ -5,11 +5,11 @@ what happens to a batch.
 """
 
 from skthermo.monitoring._files import load_monitor
+from skthermo.monitoring._fleet import Fleet, fit_fleet
 from skthermo.monitoring._monitor import Monitor
 from skthermo.monitoring._parameter_history import ParameterHistory, track_parameters
 from skthermo.monitoring._retraining import Retraining
 from skthermo.monitoring._status import MonitorStatus
-from skthermo.monitoring.fleet import Fleet, fit_fleet
 
 __all__ = [
     "Fleet",

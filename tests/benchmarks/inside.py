@@ -6,7 +6,7 @@ PLACES = {
     "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
     "fem.external._files": ["form_of", "read_file"],
-    "monitoring.fleet._bridge": ["KnownBridge"],
+    "monitoring._fleet": ["KnownBridge"],
     "monitoring._events": ["find_events", "followed"],
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._sensors": ["SensorWatch"],

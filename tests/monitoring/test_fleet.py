@@ -107,9 +107,9 @@ def test_warnings_of_all_bridges_are_one_and_counted_by_kind(fleet):
 def test_nothing_known_is_never_healthy(fleet):
     assert set(fleet.table["state"]) == {"not evaluated", ""}
     text = fleet.summary()
-    assert "5 of 6 bridges are fitted." in text
-    assert "Not fitted: broken." in text
-    assert "5 of 5 monitors have had no record since they were fitted; the state of their bridges is not known." in text
+    assert "5 of 6 bridges are fitted, 0 healthy." in text
+    assert "Not fitted: 1 (broken)." in text
+    assert "Without a record since the fit, state not known: 5 (a, b, c, d, odd)." in text
     assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not evaluated)"
 
 

@@ -1,45 +1,223 @@
-"""Many bridges: fitted side by side, with their monitors, in memory or in a folder."""
+"""Many bridges: fitted side by side, with their monitors, in memory or in a folder, and compared."""
 
 from __future__ import annotations
 
 import os
 import pickle
+import re
+import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import joblib
 import numpy as np
 import pandas as pd
-from joblib import delayed
-from sklearn.base import BaseEstimator
+import sklearn
+from joblib import delayed, wrap_non_picklable_objects
+from scipy.stats import false_discovery_control
+from sklearn.base import BaseEstimator, clone
 
-from skthermo._core.arrays import as_random_state, check_jobs, check_path
+import skthermo
+from skthermo._core.arrays import as_random_state, check_jobs, check_path, check_size
+from skthermo._core.estimators import seed_parts
 from skthermo._core.files import ReadWhenAsked, alone_with, write_when_complete
-from skthermo._core.parallel import as_they_come, with_progress
-from skthermo._core.text import counted
-from skthermo._core.warnings import warn_each
+from skthermo._core.memory import as_new
+from skthermo._core.parallel import as_they_come, single_blas_thread, with_progress
+from skthermo._core.text import counted, counted_number, listed, percent, significant
+from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import SkthermoWarning
+from skthermo.metrics import mape
 from skthermo.monitoring._monitor import Monitor
 from skthermo.monitoring._status import MonitorStatus
-from skthermo.monitoring.fleet._bridge import (
-    Fitted,
-    KnownBridge,
-    by_value,
-    file_of,
-    fit_bridge,
-    given,
-    monitor_in,
-    part_of,
-    read_fitted,
-    read_known,
-    update_bridge,
-)
-from skthermo.monitoring.fleet._discoveries import Discoveries, discover, without_zone
+from skthermo.monitoring._threshold import times_exceeded
+
+Fitted = tuple[Any, Monitor | None]  # an estimator and the monitor of its bridge
+
+
+@dataclass(frozen=True)
+class KnownBridge:
+    """All that is known of a bridge beside its fitted objects.
+
+    ``content`` identifies the records, the estimator and the versions by which it was fitted. ``warnings`` have stage,
+    kind, message and number, ``errors`` have stage, type and text, and place.
+    """
+
+    name: Hashable
+    content: str = ""
+    is_fitted: bool = False
+    facts: dict[str, Any] = field(default_factory=dict)
+    events: pd.DataFrame | None = None
+    status: MonitorStatus | None = None  # at the time of the newest record; None without a monitor
+    warnings: tuple[tuple[str, str, str, int], ...] = ()
+    errors: tuple[tuple[str, str, str], ...] = ()
+
+    @property
+    def error(self) -> str:
+        return "; ".join(text for _, text, _ in self.errors)
+
+    @property
+    def state(self) -> str:
+        """State at the newest record, "" without a monitor."""
+        return "" if self.status is None else self.status_at(self.status.now).state
+
+    def status_at(self, now: Any, max_age: Any = None) -> MonitorStatus:
+        """Status at a time; nothing is healthy whose newest records failed."""
+        if self.status is None:
+            return MonitorStatus("not evaluated", self.error or "there is no monitor").at(now)
+        status = self.status.at(now, max_age=max_age)
+        if not self.errors:
+            return status
+        return replace(status, state="alarm" if status.state == "alarm" else "not evaluated", reason=self.error)
+
+    def after(self, monitor: Monitor) -> KnownBridge:
+        """The bridge as its monitor knows it now."""
+        days, events, drift = monitor.days_, monitor.events_, monitor.drift_
+        damage = events[events["kind"] == "damage"]
+        n_evaluated, n_records = int(days["n_evaluated"].sum()), monitor.counts_["n_records"]
+        facts = {
+            "last": monitor.last_ if len(monitor.records_) else pd.NaT,
+            "n_evaluated": n_evaluated,
+            "not_evaluated": 1 - n_evaluated / n_records if n_records else np.nan,
+            "alarm_rate": days["n_alarms"].sum() / n_evaluated if n_evaluated else np.nan,
+            "n_events": len(damage),
+            "n_open": int(damage["end"].isna().sum()),
+        }
+        if drift is not None and drift["significant"].any():
+            group = drift.loc[drift["significant"], "change"].abs().idxmax()
+            facts |= {"drift": float(drift.loc[group, "change"]), "drift_group": str(group)}
+        return replace(self, facts=self.facts | facts, events=events, status=monitor.status(monitor.last_))
+
+    def failed(self, stage: str, error: BaseException) -> KnownBridge:
+        """The bridge as it was, with an error and the line of code that raised it."""
+        last = traceback.extract_tb(error.__traceback__)[-1:]
+        places = [f"{Path(one.filename).name}:{one.lineno} in {one.name}" for one in last]
+        return replace(self, errors=((stage, f"{type(error).__name__}: {error}", "".join(places)),))
+
+    def warned(self, stage: str, found: Iterable[SkthermoWarning]) -> KnownBridge:
+        """The bridge with the warnings of a stage in place of earlier ones."""
+        counts = Counter((stage, one.kind, str(one.args[0])) for one in found)
+        others = tuple(one for one in self.warnings if one[0] != stage)
+        return replace(self, warnings=(*others, *((*one, times) for one, times in counts.items())))
+
+
+def fit_bridge(
+    known: KnownBridge, maker: Any, records: Any, monitor: Callable[[Any], Monitor] | None, seed: int, keeps: bool
+) -> tuple[KnownBridge, Fitted | None]:
+    """Fit a bridge and its monitor, unless the same was fitted before; no fitted objects where all is as it was."""
+    start, stage, bridge, fitted = time.perf_counter(), "records", KnownBridge(known.name), None
+    with single_blas_thread(), collected() as found:
+        try:
+            T, F = pair_of(called(records))
+            stage = "maker"
+            estimator = clone(called(maker))
+            seed_parts(estimator, np.random.RandomState(seed))
+            versions = skthermo.__version__, sklearn.__version__
+            content = [versions, estimator, as_new(T), as_new(F), by_value(monitor)]
+            content = str(joblib.hash(content, coerce_mmap=True)) if keeps else ""
+            if keeps and content == known.content:
+                return replace(known, errors=()), None
+            missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
+            facts = {"n_records": len(F), "gaps": missing.mean()}
+            bridge, stage = replace(bridge, content=content, facts=facts), "fit"
+            chain = estimator.fit(T, F)
+            errors = chain.report_.modes["MAPE"] if hasattr(chain, "report_") else mape(np.asarray(F), chain.predict(T))
+            bridge = replace(bridge, is_fitted=True, facts=facts | {"mape": float(np.mean(errors))})
+            fitted = chain, None
+            if monitor is not None:
+                stage = "monitor"
+                watch = monitor(chain)
+                seed_parts(watch, np.random.RandomState(seed))
+                watch.fit(joined(T, F))
+                bridge, fitted = bridge.after(watch), (chain, watch)
+        except Exception as error:
+            if stage in ("records", "maker") and known.is_fitted:
+                return known.failed(stage, error), None
+            bridge = replace(bridge, content="").failed(stage, error)
+    bridge = replace(bridge, facts=bridge.facts | {"seconds": time.perf_counter() - start})
+    return bridge.warned("fit", found), fitted
+
+
+def update_bridge(known: KnownBridge, kept: Any, records: Any) -> tuple[KnownBridge, Fitted | None, pd.DataFrame]:
+    """Evaluate new records of a bridge by its monitor."""
+    stage, fitted = "new records", None
+    with single_blas_thread(), collected() as found:
+        try:
+            new = called(records)
+            new, stage = joined(*new) if isinstance(new, tuple) else new, "update"
+            chain, monitor = opened(kept, known.name)
+            if monitor is None:
+                raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
+            answers = monitor.update(new).rename_axis("time").reset_index()
+            bridge, fitted = replace(known, errors=()).after(monitor), (chain, monitor)
+        except Exception as error:
+            bridge = known.failed(stage, error)
+            row = {"time": pd.NaT, "state": "not evaluated", "index": np.nan, "reason": bridge.error, "event": 0}
+            answers = pd.DataFrame([row | {"revised": False}])
+    answers.insert(0, "bridge", pd.Series([known.name] * len(answers), dtype=object))
+    return bridge.warned("update", found), fitted, answers
+
+
+def called(given: Any) -> Any:
+    """What a function or a class gives; anything else as it is. Estimators are no functions."""
+    is_function = callable(given) and (isinstance(given, type) or not hasattr(given, "get_params"))
+    return given() if is_function else given
+
+
+def pair_of(records: Any) -> tuple[Any, Any]:
+    """Temperatures and frequencies."""
+    if not isinstance(records, tuple | list) or len(records) != 2:
+        raise ValueError(f"records are {type(records).__name__!r}; expected a pair (T, F)")
+    shapes = [np.shape(table) for table in records]
+    if not all(shape and shape[0] for shape in shapes):
+        raise ValueError(f"records have the shapes {shapes[0]} and {shapes[1]}; expected a row for each record")
+    return records[0], records[1]
+
+
+def joined(T: Any, F: Any) -> pd.DataFrame:
+    """Temperatures and frequencies side by side, as monitors want them."""
+    if not (isinstance(T, pd.DataFrame) and isinstance(F, pd.DataFrame) and T.index.equals(F.index)):
+        raise ValueError(
+            f"records for a monitor are {type(T).__name__} and {type(F).__name__}; expected two frames with the same "
+            "stamps"
+        )
+    return T.join(F)
+
+
+def by_value(thing: Any) -> bytes:
+    """Bytes of an object, with the code of functions that no module holds."""
+    return pickle.dumps(wrap_non_picklable_objects(thing, keep_wrapper=False))
+
+
+def opened(kept: Any, name: Hashable) -> Fitted:
+    """The fitted objects of a bridge: as they are, from its file after the facts, or its monitor from a mapping."""
+    if isinstance(kept, Path):
+        with open(kept, "rb") as content:
+            pickle.load(content)
+            return pickle.load(content)
+    return (None, kept[name]) if isinstance(kept, Mapping) else kept
+
+
+def read_known(file: Path) -> KnownBridge:
+    """What a file holds first; one that cannot be read is a bridge that is not fitted."""
+    try:
+        with open(file, "rb") as content:
+            return pickle.load(content)
+    except Exception as error:  # damaged files raise errors of every type
+        return KnownBridge(file.stem).failed("reading its file", error)
+
+
+def file_of(folder: Path, name: Hashable) -> Path:
+    """The file of a bridge, whose name may hold any letters."""
+    shown = re.sub(r"[^\w-]+", "_", str(name))[:40]
+    return folder / f"{shown}-{sha256(repr(name).encode()).hexdigest()[:10]}.bridge"
 
 
 def fit_fleet(
@@ -125,9 +303,9 @@ def fit_fleet(
     {'north': 365, 'south': 365}
     """
     check_jobs(n_jobs)
-    for what, given_ in (("estimators", estimators), ("records", records)):
-        if not isinstance(given_, Mapping) or not given_:
-            raise ValueError(f"{what} are {given_!r:.100}; expected a mapping of at least one name of a bridge")
+    for what, one in (("estimators", estimators), ("records", records)):
+        if not isinstance(one, Mapping) or not one:
+            raise ValueError(f"{what} are {one!r:.100}; expected a mapping of at least one name of a bridge")
     if set(estimators) != set(records):
         missing, unknown = [n for n in estimators if n not in records], [n for n in records if n not in estimators]
         raise ValueError(
@@ -144,21 +322,18 @@ def fit_fleet(
     with only_user(path):
         fleet = Fleet._in(path)
         before = {name: fleet._known.get(name, KnownBridge(name)) for name in estimators}
-        fleet._known = {name: one for name, one in fleet._known.items() if name in before}
+        fleet._known = {name: before[name] for name in estimators}
         jobs = (
             delayed(fit_bridge)(before[name], maker, records[name], monitor, seed_of(base, name), path is not None)
             for name, maker in estimators.items()
         )
-        work = as_they_come(jobs, n_jobs=n_jobs, pre_dispatch="n_jobs", max_nbytes=None)
-        for known, fitted in with_progress(work, len(before), progress, count=lambda _: 1, unit="bridges"):
-            old = before[known.name]
-            if old.facts.get("n_evaluated") and fitted is not None:
+        for known, fitted in in_turn(jobs, len(before), n_jobs, progress):
+            if before[known.name].facts.get("n_evaluated") and fitted is not None:
                 file = file_of(path, known.name)
                 file.replace(file.with_suffix(".replaced"))
                 restarted.append(known.name)
-            if known is not old:
+            if known != before[known.name]:
                 fleet._put(known, fitted)
-    fleet._known = {name: fleet._known[name] for name in estimators}
     findings = list(fleet._findings(list(estimators), "fit"))
     if restarted:
         text = (
@@ -174,6 +349,12 @@ def fit_fleet(
 def seed_of(base: int, name: Hashable) -> int:
     """The seed of a bridge, whatever the others are."""
     return int.from_bytes(sha256(f"{base} {name!r}".encode()).digest()[:4], "big")
+
+
+def in_turn(jobs: Iterable[Any], n_bridges: int, n_jobs: int | None, progress: bool | None) -> Iterable[Any]:
+    """Results of jobs as they come, beside a progress bar."""
+    work = as_they_come(jobs, n_jobs=n_jobs, pre_dispatch="n_jobs", max_nbytes=None)
+    return with_progress(work, n_bridges, progress, count=lambda _: 1, unit="bridges")
 
 
 class Fleet:
@@ -237,7 +418,7 @@ class Fleet:
             raise ValueError(f"there is no folder {str(path)!r}; expected that of a fit_fleet")
         self._folder: Path | None = path
         self._known: dict[Hashable, KnownBridge] = {}
-        self._fitted: dict[Hashable, Callable[[], Fitted]] = {}
+        self._kept: dict[Hashable, Any] = {}
         self._read()
         if not self._known:
             raise ValueError(f"the folder {str(path)!r} holds no bridge; expected that of a fit_fleet")
@@ -246,7 +427,7 @@ class Fleet:
     def _in(cls, folder: Path | None) -> Fleet:
         """A fleet in memory, or in a folder that may be empty."""
         fleet = cls.__new__(cls)
-        fleet._folder, fleet._known, fleet._fitted = folder, {}, {}
+        fleet._folder, fleet._known, fleet._kept = folder, {}, {}
         fleet._read()
         return fleet
 
@@ -254,21 +435,19 @@ class Fleet:
         """Read what the folder holds."""
         for file in sorted(self._folder.glob("*.bridge")) if self._folder else ():
             known = read_known(file)
-            self._known[known.name], self._fitted[known.name] = known, partial(read_fitted, file)
+            self._known[known.name], self._kept[known.name] = known, file
 
     def _put(self, known: KnownBridge, fitted: Fitted | None) -> None:
         """Keep what is known of a bridge; without fitted objects, they stay what they are."""
         name = known.name
         self._known[name] = known
-        if self._folder is None:
-            if fitted is not None:
-                self._fitted[name] = partial(given, fitted)
-            return
-        if fitted is None and known.is_fitted:
-            fitted = self._fitted[name]()
-        file = file_of(self._folder, name)
-        write_when_complete(file, pickle.dumps(known) + by_value(fitted))
-        self._fitted[name] = partial(read_fitted, file)
+        if self._folder is not None:
+            if fitted is None and known.is_fitted:
+                fitted = opened(self._kept[name], name)
+            self._kept[name] = file_of(self._folder, name)
+            write_when_complete(self._kept[name], pickle.dumps(known) + by_value(fitted))
+        elif fitted is not None:
+            self._kept[name] = fitted
 
     @classmethod
     def of_monitors(
@@ -299,8 +478,8 @@ class Fleet:
         fleet = cls._in(None)
         for name in monitors:
             facts = {"n_records": len(monitors[name].baseline_)}
-            known = KnownBridge(name, is_fitted=True, facts=facts).after(monitors[name])
-            fleet._known[name], fleet._fitted[name] = known, partial(monitor_in, monitors, name)
+            fleet._known[name] = KnownBridge(name, is_fitted=True, facts=facts).after(monitors[name])
+            fleet._kept[name] = monitors
         for name, error in (errors or {}).items():
             fleet._known[name] = fleet._known.get(name, KnownBridge(name)).failed("update", error)
         if not fleet._known:
@@ -311,12 +490,15 @@ class Fleet:
         return len(self._known)
 
     def __repr__(self) -> str:
-        states = Counter(one.state for one in self._known.values())
-        watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
+        counts = self._counts()
         words = {"alarm": "in alarm", "watch": "to be watched", "not evaluated": "not evaluated"}
-        watched += [f"{states[state]} {text}" for state, text in words.items() if states[state]]
+        watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
+        watched += [f"{counts[state]} {text}" for state, text in words.items() if counts[state]]
         parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
         return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
+
+    def _counts(self) -> Counter:
+        return Counter(one.state for one in self._known.values())
 
     @property
     def chains(self) -> Mapping[Hashable, BaseEstimator]:
@@ -326,15 +508,27 @@ class Fleet:
     @property
     def monitors(self) -> Mapping[Hashable, Monitor]:
         """Monitors by name, read when asked for."""
-        return self._objects(1, [name for name, one in self._known.items() if one.is_watched])
+        return self._objects(1, [name for name, one in self._known.items() if one.status is not None])
 
     def _objects(self, part: int, names: Iterable[Hashable]) -> Mapping[Hashable, Any]:
-        return ReadWhenAsked({name: partial(part_of, self._fitted[name], part) for name in names})
+        return ReadWhenAsked({name: partial(self._object, part, name) for name in names})
+
+    def _object(self, part: int, name: Hashable) -> Any:
+        return opened(self._kept[name], name)[part]
 
     @property
     def table(self) -> pd.DataFrame:
         """A row for each bridge."""
-        rows = [self._row(one) for one in self._known.values()]
+        usual = {"n_records": 0, "gaps": np.nan, "mape": np.nan, "n_warnings": 0, "state": "", "last": pd.NaT}
+        usual |= {"n_evaluated": 0, "not_evaluated": np.nan, "alarm_rate": np.nan, "n_events": 0, "n_open": 0}
+        usual |= {"drift": np.nan, "drift_group": "", "seconds": np.nan}
+        rows = []
+        for name, one in self._known.items():
+            about = {"n_warnings": sum(times for *_, times in one.warnings), "state": one.state}
+            file = None if self._folder is None else file_of(self._folder, name)
+            size = file.stat().st_size / 1e6 if file is not None and file.exists() else np.nan
+            first = {"is_fitted": one.is_fitted, "error": one.error}
+            rows.append(first | usual | about | one.facts | {"megabytes": size})
         names = pd.Index(list(self._known), name="bridge", tupleize_cols=False)
         table = pd.DataFrame(rows, index=names)
         last = pd.Series([without_zone(stamp) for stamp in table["last"]], index=names, dtype="datetime64[ns]")
@@ -344,15 +538,6 @@ class Fleet:
         for kind in sorted(counts.columns, reverse=True):
             table.insert(place, f"warnings {kind}", counts[kind].reindex(names, fill_value=0))
         return table
-
-    def _row(self, known: KnownBridge) -> dict[str, Any]:
-        file = None if self._folder is None else file_of(self._folder, known.name)
-        row = {"is_fitted": known.is_fitted, "error": known.error, "n_records": 0, "gaps": np.nan, "mape": np.nan}
-        row |= {"n_warnings": sum(times for *_, times in known.warnings), "state": known.state, "last": pd.NaT}
-        row |= {"n_evaluated": 0, "not_evaluated": np.nan, "alarm_rate": np.nan, "n_events": 0, "n_open": 0}
-        row |= {"drift": np.nan, "drift_group": "", "seconds": np.nan}
-        size = file.stat().st_size / 1e6 if file is not None and file.exists() else np.nan
-        return row | known.facts | {"megabytes": size}
 
     @property
     def events(self) -> pd.DataFrame:
@@ -429,11 +614,10 @@ class Fleet:
         with only_user(self._folder):
             self._read()  # another process may have updated the folder since
             jobs = (
-                delayed(update_bridge)(self._known[name], self._fitted.get(name, partial(given, (None, None))), new)
+                delayed(update_bridge)(self._known[name], self._kept.get(name, (None, None)), new)
                 for name, new in records.items()
             )
-            work = as_they_come(jobs, n_jobs=n_jobs, pre_dispatch="n_jobs", max_nbytes=None)
-            for known, fitted, one in with_progress(work, len(records), progress, count=lambda _: 1, unit="bridges"):
+            for known, fitted, one in in_turn(jobs, len(records), n_jobs, progress):
                 self._put(known, fitted)
                 answers[known.name] = one
         warn_each(self._findings(list(records), "update"))
@@ -468,7 +652,7 @@ class Fleet:
             )
         with only_user(self._folder):
             self._read()
-            chain, monitor = self._fitted[bridge]()
+            chain, monitor = opened(self._kept[bridge], bridge)
             monitor.acknowledge(event, harmless=harmless, note=note)
             self._put(self._known[bridge].after(monitor), (chain, monitor))
 
@@ -518,9 +702,7 @@ class Fleet:
         """
         if not len(self.monitors):
             raise ValueError("no bridge has a monitor; expected fit_fleet(..., monitor=function of a chain)")
-        blind = {name for name, one in self._known.items() if one.state == "not evaluated"}
-        newest = [without_zone(one.facts["last"]) for one in self._known.values() if not pd.isna(one.facts.get("last"))]
-        return discover(self.monitors, blind, max(newest, default=pd.NaT), fdr, days)
+        return discover(self.monitors, self.table, fdr, days)
 
     def summary(self) -> str:
         """How many bridges were fitted, failed, and are in which state, in a few lines.
@@ -530,39 +712,22 @@ class Fleet:
         str
             Plain sentences.
         """
-        return "\n".join(self._sentences())
-
-    def _sentences(self) -> Iterator[str]:
         table = self.table
-        fitted, broken = table[table["is_fitted"]], table.index[~table["is_fitted"]]
-        yield f"{len(fitted)} of {len(table)} bridges are fitted."
-        if len(broken):
-            yield f"Not fitted: {named(broken)}."
-        watched = fitted[fitted["state"] != ""]
-        if len(watched) < len(fitted):
-            yield f"{len(fitted) - len(watched)} fitted bridges have no monitor; their state is not known."
-        begun = watched[watched["last"].notna()]
-        if len(begun) < len(watched):
-            yield (
-                f"{len(watched) - len(begun)} of {len(watched)} monitors have had no record since they were fitted; "
-                "the state of their bridges is not known."
-            )
-        if len(watched):
-            states = {"alarm": "in alarm", "healthy": "healthy", "not evaluated": "not evaluated"}
-            counts = ", ".join(f"{(begun['state'] == state).sum()} {words}" for state, words in states.items())
-            yield f"Newest records of {len(begun)} monitors: {counts}."
-        said = {"alarm": "In alarm", "watch": "Raised damage index without an alarm (watch)"}
-        for state, words in (said | {"not evaluated": "Not evaluated, state not known"}).items():
-            if (begun["state"] == state).any():
-                yield f"{words}: {named(begun.index[begun['state'] == state])}."
-        silent = begun.index[(begun["state"] != "not evaluated") & (begun["days_silent"] > 7)]
-        if len(silent):
-            yield f"Without a record for more than 7 days before the newest of all: {named(silent)}."
-        failed = fitted.index[fitted["error"] != ""]
-        if len(failed):
-            yield f"Fitted, but with an error since: {named(failed)}."
-        if len(self.warnings):
-            yield f"Warnings: {kinds(self.warnings)}."
+        broken = table.index[~table["is_fitted"]]
+        is_begun, is_watched = table["last"].notna(), table["state"] != ""
+        rows = {
+            "Not fitted": broken,
+            "Fitted without a monitor, state not known": table.index[table["is_fitted"] & ~is_watched],
+            "Without a record since the fit, state not known": table.index[is_watched & ~is_begun],
+            "In alarm": table.index[table["state"] == "alarm"],
+            "Raised damage index without an alarm (watch)": table.index[table["state"] == "watch"],
+            "Not evaluated, state not known": table.index[is_begun & (table["state"] == "not evaluated")],
+            "Without a record for more than 7 days before the newest of all": table.index[table["days_silent"] > 7],
+            "With an error since the fit": table.index[table["is_fitted"] & (table["error"] != "")],
+        }
+        lines = [f"{len(table) - len(broken)} of {len(table)} bridges are fitted, {self._counts()['healthy']} healthy."]
+        lines += [f"{what}: {len(names)} ({named(names)})." for what, names in rows.items() if len(names)]
+        return "\n".join([*lines, *([f"Warnings: {kinds(self.warnings)}."] if len(self.warnings) else [])])
 
     def _findings(self, asked: list[Hashable], stage: str) -> Iterator[SkthermoWarning]:
         """One finding of all bridges that failed, and one of all of their warnings."""
@@ -603,3 +768,136 @@ def kinds(warned: pd.DataFrame) -> str:
     numbers = warned.groupby("kind")["bridge"].nunique().sort_values(ascending=False, kind="stable")
     shown = [f"{kind} ({counted(number, 'bridge')})" for kind, number in numbers.items()]
     return named(shown).replace("\N{NO-BREAK SPACE}", " ")
+
+
+@dataclass(frozen=True, repr=False)
+class Discoveries:
+    """Events of all bridges, and which of those that are open are significant after correction for many bridges.
+
+    Parameters
+    ----------
+    fdr : float
+        False discovery rate: share of healthy ones among the bridges with a significant event, on average.
+    table : DataFrame
+        Damage events that are open or recent, and were not acknowledged as harmless: ``bridge``, ``event`` (its number
+        in the monitor's ``events_``), ``start``, ``end``, ``peak``, ``modes``, ``p_value``, ``acknowledged``, and
+        ``is_discovery``: it is open, and its bridge is significant.
+    p_values : Series
+        By bridge that was evaluated: that of its highest open event, 1 without one.
+    level : float
+        P value up to which bridges are significant.
+    not_evaluated : list
+        Names of bridges with a monitor of which nothing is known: they count neither as healthy nor as significant.
+    false_discoveries_per_year : float
+        Expected number of bridges with a significant event in a year at this level, if all are healthy.
+    false_alarms_per_year : float
+        Number for which all monitors together are set.
+
+    Notes
+    -----
+    The p value of an event is the probability that a healthy bridge has so high a peak of its damage index in the time
+    in which it was watched: from the rank of the peak among the highest indices of three days each of its baseline.
+    The squares of higher ones are taken as exponential. Benjamini and Hochberg's procedure compares the bridges.
+
+    References
+    ----------
+    Benjamini and Hochberg, *J. R. Stat. Soc. B* 57 (1995) 289-300.
+    """
+
+    fdr: float
+    table: pd.DataFrame
+    p_values: pd.Series
+    level: float
+    not_evaluated: list[Hashable]
+    false_discoveries_per_year: float
+    false_alarms_per_year: float
+
+    @property
+    def bridges(self) -> list[Hashable]:
+        """Names of the bridges with a significant open event, the least probable first."""
+        return self.table.loc[self.table["is_discovery"]].sort_values("p_value")["bridge"].unique().tolist()
+
+    @property
+    def unexplained(self) -> pd.DataFrame:
+        """Events that have ended, would be significant, and were not acknowledged."""
+        ended = self.table["end"].notna() & ~self.table["acknowledged"].astype(bool)
+        return self.table[ended & (self.table["p_value"].astype(float) <= self.level)]
+
+    @property
+    def n_evaluated(self) -> int:
+        """Number of bridges that were evaluated."""
+        return len(self.p_values)
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def summary(self) -> str:
+        """Which bridges are in alarm significantly, and how many false alarms and discoveries to expect.
+
+        Returns
+        -------
+        str
+            One sentence a line.
+        """
+        names, n_open = self.bridges, self.table.loc[self.table["end"].isna(), "bridge"].nunique()
+        alarms = counted_number(float(significant(self.false_alarms_per_year, 2)), "false alarm")
+        false = significant(self.false_discoveries_per_year, 2)
+        found = f"{len(names)} of them significantly after correction for many bridges{': ' if names else ''}"
+        lines = [
+            f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
+            if n_open
+            else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
+            f"Expected if all bridges are healthy: {alarms} a year over all bridges, {false} of them significant.",
+            f"False discovery rate: {percent(self.fdr)} of the significant bridges are healthy on average.",
+        ]
+        lines += [f"Not evaluated, state not known: {listed(self.not_evaluated)}."] if self.not_evaluated else []
+        return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def discover(monitors: Mapping[Hashable, Monitor], known: pd.DataFrame, fdr: float, days: float) -> Discoveries:
+    """Compare the events of all monitors that were open within so many days before the newest record of all."""
+    fdr = check_size(fdr, "fdr", 0, 1, "a number between 0 and 1, such as 0.1")
+    most = 100_000
+    days = check_size(days, "days", 0, most, f"a number of days up to {most}, such as 365")
+    begin = max((without_zone(last) for last in known["last"].dropna()), default=pd.NaT) - pd.Timedelta(days=days)
+    tables, p_values, years, expected, not_evaluated = [], {}, {}, 0.0, []
+    for name in monitors:
+        try:
+            monitor = monitors[name]
+            expected += monitor.false_alarms_per_year
+            table, n_years = events_since(monitor, begin)
+        except Exception:  # damaged files raise errors of every type, which are in the table of errors
+            not_evaluated.append(name)
+            continue
+        if not len(table) and (known.loc[name, "state"] == "not evaluated" or not n_years):
+            not_evaluated.append(name)
+            continue
+        peaks = monitor.baseline_peaks_.to_numpy()
+        n_times = [times_exceeded(peaks, peak) for peak in table["peak"]]  # in three days a peak
+        table = table.assign(bridge=name, p_value=-np.expm1(-n_years * np.array(n_times) / (len(peaks) * 3 / 365.25)))
+        p_values[name], years[name] = table.loc[table["end"].isna(), "p_value"].min(), n_years
+        tables += [table.reset_index()] if len(table) else []
+    p = pd.Series(p_values, dtype=float).fillna(1.0)
+    is_found = false_discovery_control(p) <= fdr if len(p) else np.zeros(0, dtype=bool)
+    level = fdr * max(np.count_nonzero(is_found), 1) / max(len(p), 1)
+    columns = ["bridge", "event", "start", "end", "peak", "modes", "p_value", "acknowledged"]
+    table = pd.concat(tables, ignore_index=True)[columns] if tables else pd.DataFrame(columns=columns)
+    table["is_discovery"] = table["end"].isna() & table["bridge"].isin(p.index[is_found])
+    false = float(np.sum(-np.log1p(-level) / np.array(list(years.values()))))
+    return Discoveries(fdr, table, p, level, not_evaluated, false, expected)
+
+
+def events_since(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, float]:
+    """Events that are open or have ended since a time, and years in which records were evaluated since their begin."""
+    events = monitor.events_
+    events = events[(events["kind"] == "damage") & ~events["harmless"].astype(bool)]
+    if not len(monitor.days_) or pd.isna(begin):
+        return events.iloc[:0], 0.0
+    since = begin.tz_localize("UTC").tz_convert(monitor.last_.tz) if monitor.last_.tz else begin
+    events = events[events["end"].isna() | (events["end"] >= since)]
+    return events, monitor.years_watched(min([since, *events.loc[events["end"].isna(), "start"]]))
+
+
+def without_zone(stamp: pd.Timestamp) -> pd.Timestamp:
+    """A stamp of UTC without a time zone, by which those of all bridges can be compared."""
+    return stamp if stamp.tzinfo is None else stamp.tz_convert("UTC").tz_localize(None)
