@@ -470,12 +470,15 @@ class Monitor(SavesFrames, Estimator):
             return
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
             self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
-        seen = self.corrections_.corrected(begin, raw, self._explained())
-        self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen.records])
-        states = [*(one for one in earlier if one.day < begin.day), *seen.states]
+        said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT].drop_duplicates(
+            "time", keep="last"
+        )
+        seen, notes, states = self.corrections_.corrected(begin, raw, said["at"][said["harmless"]].tolist())
+        self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen])
+        states = [*(one for one in earlier if one.day < begin.day), *states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
-        new = self._decided(first, seen.notes[seen.notes.index >= first])
+        new = self._decided(first, notes[notes.index >= first])
         self.decisions_ = pd.concat([self.decisions_[self.decisions_.index < first], new])
         self._explain(first)
 
@@ -523,23 +526,14 @@ class Monitor(SavesFrames, Estimator):
         places = place + rows - rows[0]
         records = records.iloc[: places[-1] + 1]
         sizes = np.abs(departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places])
-        sizes = np.round(np.nan_to_num(sizes), 2)
-        effects = group_effects(self.detector_, records[self.features_]).iloc[places]
-        decisions = self.decisions_.copy()
-        modes = decisions["modes"].to_numpy(copy=True)
-        modes[rows] = [leading(dict(zip(map(str, self.targets_), size, strict=True))) for size in sizes]
-        decisions["modes"] = modes
-        for name in effects:
-            column = decisions[name].to_numpy(copy=True) if name in decisions else np.full(len(decisions), np.nan)
-            column[rows] = effects[name]
-            decisions[name] = column
+        sizes = pd.DataFrame(np.round(np.nan_to_num(sizes), 2), columns=list(map(str, self.targets_)))
+        found = group_effects(self.detector_, records[self.features_]).iloc[places]
+        found = found.assign(modes=[leading(row) for _, row in sizes.iterrows()]).astype({"modes": object})
+        decisions = self.decisions_.reindex(
+            columns=[*self.decisions_, *found.columns.difference(self.decisions_.columns)]
+        )
+        decisions.loc[found.index, found.columns] = found
         self.decisions_ = decisions
-
-    def _explained(self) -> list[int]:
-        """Times (nanoseconds) at which the owner called values that were set aside the fault of a sensor."""
-        said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT]
-        last = said.drop_duplicates("time", keep="last")
-        return last["at"][last["harmless"]].tolist()
 
     def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
         """Append the changes since a former state to the transitions, after the actions that made them."""
@@ -783,8 +777,8 @@ class Monitor(SavesFrames, Estimator):
             return table[(table.index < first) | (False if last is None else table.index > last)]
 
         after = self._twin()
-        for name in ("records_", "ahead_", "corrected_", "decisions_"):
-            setattr(after, name, others(getattr(self, name)))
+        after.records_, after.ahead_ = others(self.records_), others(self.ahead_)
+        after.corrected_, after.decisions_ = others(self.corrected_), others(self.decisions_)
         n_discarded = len(self.records_) - len(after.records_) + len(self.ahead_) - len(after.ahead_)
         if not n_discarded:
             until = "on" if last is None else f"to {last}"
