@@ -60,38 +60,32 @@ class DailyWeather:
         usual = replace(usual, covariance=usual.covariance + own)
         return cls(usual, axes[:, kept] / scale[:, np.newaxis] / np.sqrt(sizes[kept]), half_lives)
 
-    def coordinates(self, T: Array) -> Array:
-        return (self.usual.completed(T)[0] - self.usual.mean) @ self.axes
-
-    def later(self, earlier: Array, coordinates: Array) -> Array:
-        """Exponential means a day later; they stay where the day is not known."""
-        share = 1 - 0.5 ** (1 / np.array(self.half_lives))
-        return earlier if np.isnan(coordinates[0]) else earlier + share * (coordinates[0] - earlier)
-
-    def columns(self, coordinates: Array, earlier: Array) -> Array:
-        first, second = np.triu_indices(coordinates.shape[1])
-        products, constant = coordinates[:, first] * coordinates[:, second], 1 + 0 * coordinates[:, :1]
-        return np.hstack([constant, coordinates, products, coordinates**3, earlier])
-
     def of_days(self, T: Array, start: Array | None = None) -> tuple[Array, Array]:
-        """Columns of successive days, and the exponential means on the last one."""
-        coordinates, earlier = self.coordinates(T), []
-        known = coordinates[~np.isnan(coordinates).any(axis=1), 0]
-        last = np.full(len(self.half_lives), known[:10].mean() if len(known) else 0.0) if start is None else start
-        for day in coordinates:
-            last = self.later(last, day)
-            earlier.append(last)
-        return self.columns(coordinates, np.array(earlier)), last
+        """Columns of successive days, and the exponential means on the last one, which stay where a day is unknown."""
+        coordinates = (self.usual.completed(T)[0] - self.usual.mean) @ self.axes
+        share, first = 1 - 0.5 ** (1 / np.array(self.half_lives)), coordinates[:, 0]
+        known = first[~np.isnan(first)][:10]
+        last = np.full(len(share), known.mean() if len(known) else 0.0) if start is None else start
+        earlier = np.empty((len(T), len(share)))
+        for day, value in enumerate(first):
+            last = last if np.isnan(value) else last + share * (value - last)
+            earlier[day] = last
+        one, other = np.triu_indices(coordinates.shape[1])
+        products, constant = coordinates[:, one] * coordinates[:, other], 1 + 0 * coordinates[:, :1]
+        return np.hstack([constant, coordinates, products, coordinates**3, earlier]), last
 
 
-def whitened(X: Array, y: Array, correlation: float) -> tuple[Array, Array]:
-    """Rows of one mode less their prediction from the day before; those after gaps are scaled to equal variances."""
+def whitened(X: Array, y: Array, correlation: float, n_before: int = 0) -> tuple[Array, Array]:
+    """Rows of one mode less their prediction from the day before; those after gaps are scaled to equal variances.
+
+    Without the first days, ``n_before``, which only predict.
+    """
     days = np.flatnonzero(~np.isnan(y) & ~np.isnan(X).any(axis=1))
     kept = np.r_[0.0, correlation ** np.diff(days).astype(float)][: len(days)]
     scale = np.sqrt((1 - correlation**2) / (1 - kept**2))
     table = np.column_stack([X, y])[days]
     before = np.vstack([0 * table[:1], table[:-1]])
-    rows = scale[:, np.newaxis] * (table - kept[:, np.newaxis] * before)
+    rows = (scale[:, np.newaxis] * (table - kept[:, np.newaxis] * before))[days >= n_before]
     return rows[:, :-1], rows[:, -1]
 
 
@@ -169,21 +163,20 @@ class NormalEquations:
     moments: Array
 
     @classmethod
-    def summed(cls, X: Array, y: Array, correlation: float) -> NormalEquations:
-        """Those of successive days, whose noise is correlated."""
-        parts = [whitened(X, column, correlation) for column in y.T]
+    def summed(cls, X: Array, y: Array, correlation: float, n_before: int = 0) -> NormalEquations:
+        """Those of successive days, whose noise is correlated; the first ones may only predict."""
+        parts = [whitened(X, column, correlation, n_before) for column in y.T]
         return cls(np.array([rows.T @ rows for rows, _ in parts]), np.array([rows.T @ own for rows, own in parts]))
 
     def first(self, size: int) -> NormalEquations:
         """Without later columns."""
         return NormalEquations(self.information[:, :size, :size], self.moments[:, :size])
 
-    def widened(self, size: int) -> NormalEquations:
-        """With columns that have been zero so far."""
-        more = size - self.moments.shape[1]
-        return NormalEquations(
-            np.pad(self.information, [(0, 0), (0, more), (0, more)]), np.pad(self.moments, [(0, 0), (0, more)])
-        )
+    def __add__(self, later: NormalEquations) -> NormalEquations:
+        """With those of other days, in whose regression there may be more columns."""
+        more = later.moments.shape[1] - self.moments.shape[1]
+        information = np.pad(self.information, [(0, 0), (0, more), (0, more)]) + later.information
+        return NormalEquations(information, np.pad(self.moments, [(0, 0), (0, more)]) + later.moments)
 
     def solved(self, noise: Array, deviations: Array) -> tuple[Array, Array]:
         """Coefficients, (n_modes, n_columns), and roots of their covariances.
@@ -259,7 +252,7 @@ class ModeTrends:
 
 
 @dataclass(frozen=True)
-class Explanation:
+class DriftExplanation:
     """Sets of groups that may drift, by decreasing evidence, beside the trends of the modes.
 
     ``bend`` is the standard deviation of a yearly bend by which the best set explains the trends.
@@ -272,7 +265,7 @@ class Explanation:
     bend: float
 
     @classmethod
-    def weighed(cls, trends: ModeTrends, names: list[str], rate: float = 0.03) -> Explanation:
+    def weighed(cls, trends: ModeTrends, names: list[str], rate: float = 0.03) -> DriftExplanation:
         """All sets of one or two groups, and a change of all alike; most often one group drifts, and steadily."""
         apart = [place for place, name in enumerate(names) if name != ALL_GROUPS]
         sets = [*((place,) for place in range(len(names))), *combinations(apart, 2)]
@@ -341,21 +334,17 @@ def rate_errors(steady: ModeTrends) -> Array:
 class DriftState(SavesFrames):
     """What a `DriftFollower` knows at the end of a day.
 
-    ``equations`` hold the days that are learned. ``waiting`` are the days since, a row each: columns that explain ln f,
-    then the modes. ``sudden`` marks the waiting days of a time that departs from the prediction: these are never
-    learned, and ``n_left_out`` counts them in a row. ``number`` counts days from the end of the baseline to the last
-    one, ``before`` and ``numbers_before`` are the row and the number of the last day that each mode was learned from.
+    ``number`` counts days since the baseline. ``equations`` hold the days that are learned, ``waiting`` are the last of
+    these and the days since, a row each: columns of the weather, then the modes. ``sudden`` marks days of a time that
+    departs from the prediction: these are never learned.
     """
 
     day: pd.Timestamp
     number: int
     equations: NormalEquations
-    before: Array
-    numbers_before: Array
     earlier: Array
     waiting: Array
     sudden: Array
-    n_left_out: int = 0
 
 
 @dataclass(frozen=True)
@@ -396,14 +385,10 @@ class DriftFollower:
         weather, y = DailyWeather.fitted(daily_T.to_numpy()), daily_F.to_numpy()
         columns, earlier = weather.of_days(daily_T.to_numpy())
         years = len(y) * (DAY / YEAR)
-        X = np.hstack([columns, bending_line((np.arange(len(y)) + 1) * (DAY / YEAR) - years / 2, np.empty(0))])
-        equations, noise = regressed(X, y, 1)
-        known = ~np.isnan(y) & ~np.isnan(X).any(axis=1, keepdims=True)
-        last = np.where(known.any(axis=0), len(y) - 1 - known[::-1].argmax(axis=0), 0)
-        before = np.nan_to_num(np.hstack([X[last], y[last, np.arange(y.shape[1])][:, np.newaxis]]))
-        waiting = np.empty((0, columns.shape[1] + y.shape[1]))
-        state = (daily_F.index[-1], 0, equations, before, last - len(y) + 1, earlier, waiting, np.empty(0, dtype=bool))
-        return cls(inputs, list(fem.mode_names_), names, slopes, weather, noise, years, DriftState(*state))
+        line = bending_line((np.arange(len(y)) + 1) * (DAY / YEAR) - years / 2, np.empty(0))
+        equations, noise = regressed(np.hstack([columns, line]), y, 1)
+        state = DriftState(daily_F.index[-1], 0, equations, earlier, np.hstack([columns, y])[-1:], np.array([False]))
+        return cls(inputs, list(fem.mode_names_), names, slopes, weather, noise, years, state)
 
     def start(self) -> DriftState:
         return self.start_
@@ -419,31 +404,27 @@ class DriftFollower:
 
     def corrected(self, state: DriftState, F: pd.DataFrame) -> pd.DataFrame:
         """Measured frequencies of the day after a state without the drift that is taken out."""
-        shift = dict(zip(self.modes, self.slopes @ self.taken_out_logarithms(state), strict=True))
+        shift = dict(zip(self.modes, self.slopes @ np.log1p(self._change(state)), strict=True))
         return F * np.exp([-shift.get(mode, 0.0) for mode in F])
 
     def taken_out(self, state: DriftState) -> pd.Series:
         """Relative change of each group's stiffness that is taken out of the frequencies."""
-        found = pd.Series(
-            np.expm1(self.taken_out_logarithms(state)), pd.Index(self.groups, name="group"), name="change"
-        )
+        found = pd.Series(self._change(state), pd.Index(self.groups, name="group"), name="change")
         return found.drop(ALL_GROUPS, errors="ignore")
 
-    def taken_out_logarithms(self, state: DriftState, rate: float = 0.02, bend: float = 0.01) -> Array:
-        """Ln stiffness of each group that is taken out; 0 for all groups alike, whose change is that of each."""
+    def _change(self, state: DriftState, rate: float = 0.02, bend: float = 0.01) -> Array:
+        """Change that is taken out of each group; 0 for all groups alike, whose change is that of each."""
         trends, line = self._trends(state)
         apart = [place for place, name in enumerate(self.groups) if name != ALL_GROUPS]
-        deviations = np.r_[rate, np.full(trends.n_times - 1, bend)]
-        coefficients, covariance = trends.of_groups(apart, deviations)
-        at_day = np.kron(np.eye(len(apart)), line)
-        change, spread = at_day @ coefficients, at_day @ covariance @ at_day.T
-        shift, spread = self.slopes[:, apart] @ change, self.slopes[:, apart] @ spread @ self.slopes[:, apart].T
-        sizes, axes = np.linalg.eigh(spread)
+        coefficients, covariance = trends.of_groups(apart, np.r_[rate, np.full(trends.n_times - 1, bend)])
+        at_day, slopes = np.kron(np.eye(len(apart)), line), self.slopes[:, apart]
+        change = at_day @ coefficients
+        sizes, axes = np.linalg.eigh(slopes @ at_day @ covariance @ at_day.T @ slopes.T)
         clear = sizes > 1e-8 * sizes[-1]
-        distance = float(((shift @ axes[:, clear]) ** 2 / sizes[clear]).sum())
+        distance = float(((slopes @ change @ axes[:, clear]) ** 2 / sizes[clear]).sum())
         by_chance = float(stats.chi2.isf(0.05, clear.sum()))
         found = np.zeros(len(self.groups))
-        found[apart] = max(1 - (by_chance / distance) ** 2, 0.0) * change if distance > 0 else 0.0
+        found[apart] = np.expm1(max(1 - (by_chance / distance) ** 2, 0.0) * change) if distance > 0 else 0.0
         return found
 
     def report(self, state: DriftState, significance: float = 0.01, limit: float = 0.05) -> pd.DataFrame:
@@ -455,7 +436,7 @@ class DriftFollower:
         """
         trends, line = self._trends(state)
         p_value = self._trends(state, is_straight=True)[0].p_value()
-        explanation = Explanation.weighed(trends, self.groups)
+        explanation = DriftExplanation.weighed(trends, self.groups)
         best = explanation.sets[0] if p_value <= significance else ()
         years, rows = self.years / 2 + state.number * (DAY / YEAR), {}
         for group, name in enumerate(self.groups):
@@ -464,23 +445,14 @@ class DriftFollower:
             beside = [one for one in best if one != group]
             (mean,), (deviation,) = explanation.change(group, beside, line[np.newaxis])
             change, error = np.expm1(mean), np.exp(mean) * deviation
-            is_clear = group in best
-            rows[name] = [
-                change,
-                error,
-                change / years,
-                error / years,
-                p_value,
-                is_clear,
-                is_clear and abs(change) > limit,
-            ]
+            found = group in best, group in best and abs(change) > limit
+            rows[name] = change, error, change / years, error / years, p_value, *found
         columns = ["change", "standard_error", "per_year", "per_year_error", "p_value", "significant", "beyond_limit"]
         return pd.DataFrame.from_dict(rows, "index", columns=columns).rename_axis("group")
 
-    def _line(self, number: int, n_bends: int) -> Array:
-        """The bending line on a day of service: zero in the middle of the baseline, which bends as each year begins."""
-        since = number * (DAY / YEAR)
-        return bending_line(np.array([since + self.years / 2]), np.arange(n_bends) + self.years / 2)[0]
+    def _lines(self, numbers: Array, n_bends: int) -> Array:
+        """The bending line on days of service: zero in the middle of the baseline, which bends as each year begins."""
+        return bending_line(numbers * (DAY / YEAR) + self.years / 2, np.arange(n_bends) + self.years / 2)
 
     def _trends(self, state: DriftState, *, is_straight: bool = False) -> tuple[ModeTrends, Array]:
         """Trends of the modes by the days that are learned, and the line on the last day."""
@@ -489,58 +461,36 @@ class DriftFollower:
         n_days = self.years * (YEAR / DAY) + state.number - len(state.sudden)
         freedom = self.noise.independent(n_days) - n_weather
         equations = state.equations.first(n_weather + n_times)
-        line = self._line(state.number, n_times - 1)
-        return ModeTrends.fitted(equations, self.noise, self.slopes, n_times, freedom), line
+        trends = ModeTrends.fitted(equations, self.noise, self.slopes, n_times, freedom)
+        return trends, self._lines(np.array([state.number]), n_times - 1)[0]
 
     def _with_day(self, state: DriftState, T: Array, y: Array) -> DriftState:
-        """The state after one more day; the day that has waited longest is learned or left out."""
-        coordinates = self.weather.coordinates(T[np.newaxis])
-        earlier = self.weather.later(state.earlier, coordinates[0])
-        row = np.r_[self.weather.columns(coordinates, earlier[np.newaxis])[0], y]
-        waiting, number = np.vstack([state.waiting, row]), state.number + 1
-        sudden = np.append(state.sudden, False) | self._departs(state, waiting, number)
-        state = replace(
-            state, day=days_later(state.day, 1), number=number, earlier=earlier, waiting=waiting, sudden=sudden
-        )
-        if len(sudden) <= self.delay:
-            return state
-        if not sudden[0]:
-            state = self._learned(state, waiting[0], number - self.delay)
-        n_left_out = state.n_left_out + 1 if sudden[0] else 0
-        return replace(state, waiting=waiting[1:], sudden=sudden[1:], n_left_out=n_left_out)
+        """The state after one more day; the day that has waited longest is learned, in a year that may bend."""
+        columns, earlier = self.weather.of_days(T[np.newaxis], state.earlier)
+        waiting, number = np.vstack([state.waiting, np.r_[columns[0], y]]), state.number + 1
+        sudden, equations = np.append(state.sudden, False), state.equations
+        sudden[1:] |= self._departs(equations, waiting[1:], number)
+        if len(waiting) > self.delay + 1:
+            two, y = np.split(waiting[:2], [columns.shape[1]], axis=1)
+            numbers = number - self.delay + np.array([-1, 0])
+            X = np.hstack([two, self._lines(numbers, 1 + int(numbers[1] * (DAY / YEAR)))])
+            y = np.where(sudden[:2, np.newaxis], np.nan, y)
+            equations += NormalEquations.summed(X, y, self.noise.correlation, n_before=1)
+            waiting, sudden = waiting[1:], sudden[1:]
+        return DriftState(days_later(state.day, 1), number, equations, earlier, waiting, sudden)
 
-    def _learned(self, state: DriftState, row: Array, number: int) -> DriftState:
-        """With a day in the regression, in which a bend begins with each year of service."""
-        n_weather = len(row) - len(self.modes)
-        line = self._line(number, 1 + int(number * (DAY / YEAR)))
-        x, y = np.r_[row[:n_weather], line], row[n_weather:]
-        known = np.flatnonzero(~np.isnan(y) & ~np.isnan(x).any())
-        more = len(x) + 1 - state.before.shape[1]
-        before = np.insert(state.before, [state.before.shape[1] - 1] * more, 0.0, axis=1)
-        new = np.column_stack([np.tile(x, (len(known), 1)), y[known]])
-        kept = self.noise.correlation ** (number - state.numbers_before[known])[:, np.newaxis]
-        rows = np.sqrt((1 - self.noise.correlation**2) / (1 - kept**2)) * (new - kept * before[known])
-        equations = state.equations.widened(len(x))
-        information, moments = equations.information.copy(), equations.moments.copy()
-        information[known] += rows[:, :-1, np.newaxis] * rows[:, np.newaxis, :-1]
-        moments[known] += rows[:, :-1] * rows[:, -1:]
-        numbers = state.numbers_before.copy()
-        before[known], numbers[known] = new, number
-        return replace(state, equations=NormalEquations(information, moments), before=before, numbers_before=numbers)
-
-    def _departs(self, state: DriftState, waiting: Array, number: int, trend: float = 0.01) -> bool:
+    def _departs(self, equations: NormalEquations, waiting: Array, number: int, trend: float = 0.01) -> bool:
         """Whether the mean of the days that wait is too far from the prediction."""
         n_modes = len(self.modes)
-        n_weather, size = waiting.shape[1] - n_modes, state.equations.moments.shape[1]
-        numbers = number - np.arange(len(waiting))[::-1]
-        lines = np.array([self._line(one, size - n_weather - 1) for one in numbers])
+        n_weather, size = waiting.shape[1] - n_modes, equations.moments.shape[1]
+        lines = self._lines(number - np.arange(len(waiting))[::-1], size - n_weather - 1)
         X, y = np.hstack([waiting[:, :n_weather], lines]), waiting[:, n_weather:]
         known = ~np.isnan(y) & ~np.isnan(X).any(axis=1, keepdims=True)
         modes = np.flatnonzero(known.any(axis=0))
         if not len(modes):
             return False
         prior = prior_deviations(n_weather, size - n_weather, trend=trend)
-        coefficients, roots = state.equations.solved(self.noise.deviations, prior)
+        coefficients, roots = equations.solved(self.noise.deviations, prior)
         weights = known / np.maximum(known.sum(axis=0), 1)
         usual = weights.T @ np.nan_to_num(X)
         apart = np.einsum("tm,tm->m", weights, np.nan_to_num(y)) - np.einsum("mp,mp->m", usual, coefficients)

@@ -18,7 +18,7 @@ from skthermo._core.warnings import warn_each
 from skthermo.fem.damage import ALL_GROUPS
 from skthermo.monitoring._drift import (
     DailyWeather,
-    Explanation,
+    DriftExplanation,
     ModeTrends,
     bending_line,
     daily_means,
@@ -27,8 +27,6 @@ from skthermo.monitoring._drift import (
     regressed,
 )
 from skthermo.preprocessing import set_aside
-
-N_ERRORS = float(stats.norm.ppf(0.975))  # standard errors of a band of 95 %
 
 
 def track_parameters(
@@ -106,25 +104,35 @@ def track_parameters(
     line = bending_line(years, np.arange(1, int(years[-1])))
     X = DailyWeather.fitted(daily_T.to_numpy()).of_days(daily_T.to_numpy())[0]
     n_known = (~np.isnan(y) & ~np.isnan(X[:, :1])).sum(axis=0)
-    few = _on_few_days(n_known, 3 * (X.shape[1] + line.shape[1]), F.columns)
+    few = n_known < 3 * (X.shape[1] + line.shape[1])
+    if few.all():
+        counts = ", ".join(f"{mode} {number}" for mode, number in zip(F, n_known, strict=True))
+        least = 3 * (X.shape[1] + line.shape[1])
+        raise ValueError(f"modes were measured, with temperatures, on too few days: {counts}; expected {least} or more")
     equations, noise = regressed(np.hstack([X, line]), y[:, ~few], line.shape[1])
     freedom = noise.independent(n_known.max()) - X.shape[1]
     trends = ModeTrends.fitted(equations, noise, slopes[~few], line.shape[1], freedom)
     steady = ModeTrends.fitted(equations.first(X.shape[1] + 1), noise, slopes[~few], 1, freedom)
-    p_value, explanation = steady.p_value(), Explanation.weighed(trends, names)
+    p_value, explanation = steady.p_value(), DriftExplanation.weighed(trends, names)
     best = explanation.sets[0] if p_value <= significance else ()
     alternatives = explanation.alternatives() if best else {}
     changes = {}
     for group, name in enumerate(names):
         beside = [one for one in best if one != group and name not in alternatives[names[one]]]
         changes[name] = explanation.change(group, beside, line)
+    at_end = np.kron(np.eye(len(trends.slopes)), line[-1:])
+    errors = np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T))
     shifts = sum((np.outer(changes[names[group]][0], slopes[:, group]) for group in best), np.zeros(y.shape))
+    modes = pd.DataFrame(np.nan, pd.Index(F.columns, name="mode"), ["measured", "explained", "standard_error"])
+    modes.loc[~few] = np.column_stack([at_end @ trends.mean, shifts[-1, ~few], errors])
     return ParameterHistory(
         table=pd.DataFrame(
             {
                 (name, what): np.exp(mean + side * deviation)[::step]
                 for name, (mean, deviation) in changes.items()
-                for what, side in (("estimate", 0.0), ("ci_low", -N_ERRORS), ("ci_high", N_ERRORS))
+                for what, side in zip(
+                    ["ci_low", "estimate", "ci_high"], stats.norm.ppf([0.025, 0.5, 0.975]), strict=True
+                )
             },
             days[::step],
         ),
@@ -139,33 +147,13 @@ def track_parameters(
             }
         ),
         alternatives=alternatives,
-        modes=_modes(trends, line[-1:], shifts[-1], few, F.columns),
+        modes=modes,
         shifts=pd.DataFrame(shifts, days, F.columns),
     )
 
 
-def _on_few_days(n_known: Array, needed: int, modes: pd.Index) -> Array:
-    """Which modes were measured on fewer days than are needed; an error if all were."""
-    few = n_known < needed
-    if few.all():
-        counts = ", ".join(f"{mode} {number}" for mode, number in zip(modes, n_known, strict=True))
-        raise ValueError(
-            f"modes were measured, with temperatures, on too few days: {counts}; expected {needed} or more"
-        )
-    return few
-
-
-def _modes(trends: ModeTrends, line: Array, shifts: Array, few: Array, names: pd.Index) -> pd.DataFrame:
-    """One row a mode, as in `ParameterHistory`, from the line and the explained shifts on the last day."""
-    at_end = np.kron(np.eye(len(trends.slopes)), line)
-    errors = np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T))
-    table = pd.DataFrame(np.nan, pd.Index(names, name="mode"), ["measured", "explained", "standard_error"])
-    table.loc[~few] = np.column_stack([at_end @ trends.mean, shifts[~few], errors])
-    return table
-
-
 def _rates(
-    explanation: Explanation,
+    explanation: DriftExplanation,
     alternatives: Mapping[str, list[str]],
     changes: Mapping[str, tuple[Array, Array]],
     alone: Array,
@@ -293,22 +281,19 @@ class ParameterHistory(Sentences):
         """
         if not is_real(limit) or not -1 < limit < 1 or limit == 0:
             raise ValueError(f"limit is {limit!r}; expected a relative change, such as -0.1 for a loss of 10 %")
-        rates, rows = self.rates, {}
-        slopes, errors = (
-            np.log1p(rates["change"]) / self.years,
-            rates["change_error"] / (1 + rates["change"]) / self.years,
-        )
-        for name in rates.index:
-            if rates.loc[name, "drifts"] == "unobservable":
-                rows[name] = [pd.NaT, pd.NaT, pd.NaT, np.nan]
-                continue
-            towards, error = np.sign(limit) * slopes[name], max(errors[name], 1e-12)
-            fastest = stats.norm.ppf([0.5, 0.975, 0.025], towards, error)
-            after = [abs(np.log1p(limit)) / rate if rate > 0 else np.inf for rate in fastest]
-            needed = abs(np.log1p(limit)) / (self.years + 10)
-            rows[name] = [*map(self._date, after), float(stats.norm.sf(needed, towards, error))]
-        columns = ["date", "earliest", "latest", "probability"]
-        return pd.DataFrame(list(rows.values()), pd.Index(list(rows), name="group"), columns)
+        change, errors = self.rates["change"], self.rates["change_error"]
+        hidden = (self.rates["drifts"] == "unobservable").to_numpy()
+        error = np.maximum((errors / (1 + change) / self.years).to_numpy(), 1e-12)
+        towards, needed = np.sign(limit) * (np.log1p(change) / self.years).to_numpy(), abs(np.log1p(limit))
+        first, found = self.shifts.index[0], {}
+        for name, share in {"date": 0.5, "earliest": 0.975, "latest": 0.025}.items():
+            rate = stats.norm.ppf(share, towards, error)
+            years = np.where((rate > 0) & ~hidden, needed / np.where(rate > 0, rate, np.nan), np.inf)
+            found[name] = [
+                first + round(365.25 * after) * DAY if after - self.years <= 100 else pd.NaT for after in years
+            ]
+        chance = np.where(hidden, np.nan, stats.norm.sf(needed / (self.years + 10), towards, error))
+        return pd.DataFrame(found | {"probability": chance}, self.rates.index)
 
     def remove_drift(self, F: pd.DataFrame) -> pd.DataFrame:
         """Frequencies as they would be without the drift since the first day; unchanged where there is none.
@@ -350,30 +335,24 @@ class ParameterHistory(Sentences):
         )
         return f"ParameterHistory({found or 'no drift'})"
 
-    def _date(self, years: float) -> pd.Timestamp | Any:
-        first = self.shifts.index[0]
-        return first + round(365.25 * years) * DAY if years - self.years <= 100 else pd.NaT
-
     def _answer(self) -> Iterator[str]:
-        chance, rates = probability_text(self.p_value), self.rates
         first, last = (f"{self.shifts.index[end]:%Y-%m-%d}" for end in (0, -1))
-        if not self.has_drift:
-            yield f"No significant drift of stiffness from {first} to {last} (p value {chance})."
-            return
-        yield f"The drift of stiffness from {first} to {last} is significant (p value {chance})."
+        found = "The" if self.has_drift else "No significant"
+        is_it = " is significant" if self.has_drift else ""
+        chance = probability_text(self.p_value)
+        yield f"{found} drift of stiffness from {first} to {last}{is_it} (p value {chance})."
         for group, others in self.alternatives.items():
-            rate = rates.loc[group]
+            rate = self.rates.loc[group]
             verb = "loses" if rate["per_year"] < 0 else "gains"
             yearly = f"{_share(rate['per_year'])} (±{SPACE}{_share(2 * rate['standard_error'])})"
             yield f"{group} {verb} {yearly} of its stiffness a year, {percent(rate['change'], '+.2g')} in all."
             others = [other for other in others if other != group]
             if others:
-                each = ", ".join(f"{other} {percent(rates.loc[other, 'per_year'], '+.2g')} a year" for other in others)
-                yield f"A drift of {listed(others)} ({each}) explains these frequencies equally well."
+                yield f"A drift of {listed(others)} explains these frequencies equally well."
 
     def _limits(self) -> Iterator[str]:
-        hidden = list(self.rates.index[self.rates["drifts"] == "unobservable"])
-        seen = self.rates["detectable_rates"].drop(hidden)
+        is_hidden = self.rates["drifts"] == "unobservable"
+        hidden, seen = list(self.rates.index[is_hidden]), self.rates["detectable_rates"][~is_hidden]
         if not self.has_drift and len(seen):
             each = ", ".join(f"{group} {_share(rate)}" for group, rate in seen.items())
             yield f"Smallest steady drift a year that is detected with probability 90{SPACE}%: {each}."
@@ -381,14 +360,9 @@ class ParameterHistory(Sentences):
             yield f"A loss of 5{SPACE}% of stiffness in {listed(hidden)} is unobservable in these modes."
         n_groups, n_modes = len(self.rates.index.drop(ALL_GROUPS, errors="ignore")), len(self.modes)
         if n_groups > n_modes:
-            yield (
-                f"{n_groups} groups and {counted(n_modes, 'mode')} do not determine which group drifts: the named "
-                "group may be wrong, such as the mirror image of the right one."
-            )
+            yield f"{n_groups} groups and {counted(n_modes, 'mode')} do not determine which group drifts."
         if self.years < 1.5:
-            yield (
-                f"Records of {self.years:.1f} years hardly distinguish season and drift: confidence intervals are wide."
-            )
+            yield f"Records of {self.years:.1f} years hardly distinguish season and drift."
         missing = list(self.modes.index[self.modes["measured"].isna()])
         if missing:
             yield f"Measured on too few days to be used: {listed(missing)}."
