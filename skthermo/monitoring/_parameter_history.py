@@ -131,7 +131,7 @@ def track_parameters(
                 (name, what): np.exp(mean + side * deviation)[::step]
                 for name, (mean, deviation) in changes.items()
                 for what, side in zip(
-                    ["ci_low", "estimate", "ci_high"], stats.norm.ppf([0.025, 0.5, 0.975]), strict=True
+                    ["estimate", "ci_low", "ci_high"], stats.norm.ppf([0.5, 0.025, 0.975]), strict=True
                 )
             },
             days[::step],
