@@ -162,5 +162,5 @@ def blind_findings(
             f"a fall by {sizes[-1]} standard deviations of the baseline stays at or below the threshold "
             f"{threshold:.3g} for {', '.join(blind)}. The detector does not see damage there. Use another detector, or "
             "allow more false alarms a year",
-            "blind-detector",
+            "undetected-changes",
         )

@@ -146,12 +146,9 @@ class Events:
         dtypes = {"kind": object, "start": stamp, "end": stamp, "peak": float, "peak_time": stamp}
         dtypes |= {"modes": object, "groups": object, "size": float, "n_alarms": np.int64}
         columns = zip(*(rows[n] for n in order), strict=True) if rows else [()] * len(dtypes)
-        self.table = pd.DataFrame(
-            {
-                name: pd.Series(list(one), dtype=dtype)
-                for (name, dtype), one in zip(dtypes.items(), columns, strict=True)
-            }
-        ).set_axis(pd.RangeIndex(1, len(rows) + 1, name="event"))
+        series = zip(dtypes, map(list, columns), dtypes.values(), strict=True)
+        table = pd.DataFrame({name: pd.Series(values, dtype=dtype) for name, values, dtype in series})
+        self.table = table.set_axis(pd.RangeIndex(1, len(rows) + 1, name="event"))
 
 
 def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFrame:
@@ -160,13 +157,9 @@ def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFr
     for event in events.itertuples():
         end = np.inf if pd.isna(event.end) else event.end.value
         own = said[(said["kind"] == event.kind) & (said["time"] >= event.start.value) & (said["time"] < end)]
-        answers.append((True, own["harmless"].iloc[-1], own["note"].iloc[-1]) if len(own) else (False, False, ""))
-    acknowledged, harmless, note = zip(*answers, strict=True) if answers else ((), (), ())
-    return events.assign(
-        acknowledged=np.array(acknowledged, dtype=bool),
-        harmless=np.array(harmless, dtype=bool),
-        note=pd.Series(note, events.index, dtype=object),
-    )
+        answers.append((True, *own[["harmless", "note"]].iloc[-1]) if len(own) else (False, False, ""))
+    table = pd.DataFrame(answers, events.index, ["acknowledged", "harmless", "note"])
+    return events.join(table.astype({"acknowledged": bool, "harmless": bool, "note": object}))
 
 
 def evaluations(decisions: pd.DataFrame, events: Events, said: pd.DataFrame) -> pd.DataFrame:
@@ -189,15 +182,13 @@ def evaluations(decisions: pd.DataFrame, events: Events, said: pd.DataFrame) -> 
     groups, effects = np.full(len(index), "", dtype=object), decisions.filter(regex="^effect ")
     for row in np.flatnonzero(is_shown) if len(effects.columns) else ():
         groups[row] = leading(effects.iloc[row].dropna().rename(lambda name: name[7:]))
-    return pd.DataFrame(
-        {
-            "state": pd.Series(state.tolist(), decisions.index, dtype=object),
-            "index": index,
-            "threshold": decisions["threshold"].to_numpy(),
-            "modes": pd.Series(np.where(is_shown, modes, "").tolist(), decisions.index, dtype=object),
-            "groups": pd.Series(groups.tolist(), decisions.index, dtype=object),
-            "reason": decisions["reason"],
-            "event": np.where(has_index | is_held, number, 0),
-        },
-        decisions.index,
-    )
+    table = {
+        "state": state,
+        "index": index,
+        "threshold": decisions["threshold"].to_numpy(),
+        "modes": np.where(is_shown, modes, ""),
+        "groups": groups,
+        "reason": decisions["reason"],
+        "event": np.where(has_index | is_held, number, 0),
+    }
+    return pd.DataFrame(table, decisions.index).astype(dict.fromkeys(("state", "modes", "groups"), object))

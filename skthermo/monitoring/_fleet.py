@@ -730,18 +730,18 @@ class Fleet:
         return "\n".join([*lines, *([f"Warnings: {kinds(self.warnings)}."] if len(self.warnings) else [])])
 
     def _findings(self, asked: list[Hashable], stage: str) -> Iterator[SkthermoWarning]:
-        """One finding of all bridges that failed, and one of all of their warnings."""
+        """One finding of all bridges that failed or warned."""
         failed = [name for name in asked if self._known[name].errors]
-        if failed:
-            yield SkthermoWarning(
-                f"bridges have failed ({named(failed)}), the first with {self._known[failed[0]].error:.300}. Nothing "
-                "is known of their state. See fleet.errors",
-                "bridges-failed",
-            )
         warned = self.warnings
         warned = warned[warned["bridge"].isin(asked) & (warned["stage"] == stage)]
+        parts = []
+        if failed:
+            error = self._known[failed[0]].error
+            parts.append(f"have failed ({named(failed)}), the first with {error:.300}, and their state is not known")
         if len(warned):
-            yield SkthermoWarning(f"bridges gave warnings: {kinds(warned)}. See fleet.warnings", "bridges-warned")
+            parts.append(f"gave warnings: {kinds(warned)}")
+        if parts:
+            yield SkthermoWarning(f"bridges {', or '.join(parts)}. See fleet.errors and fleet.warnings", "bridges")
 
 
 @contextmanager

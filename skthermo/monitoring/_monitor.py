@@ -27,7 +27,6 @@ from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, midnig
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
-from skthermo.monitoring._columns import usable_baseline, without_what_cannot_be
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._evaluation import (
     blind_findings,
@@ -50,7 +49,14 @@ from skthermo.monitoring._events import (
     with_acknowledgements,
 )
 from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
-from skthermo.monitoring._records import OF_TRAINING, Intake, Lookback, read_records
+from skthermo.monitoring._records import (
+    OF_TRAINING,
+    Intake,
+    Lookback,
+    read_records,
+    usable_baseline,
+    without_what_cannot_be,
+)
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
 from skthermo.monitoring._threshold import EventLevels, SmallestChanges, lowered

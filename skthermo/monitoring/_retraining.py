@@ -16,11 +16,9 @@ from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correl
 from skthermo._core.text import capital, counted, listed, probability_text
 from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, TemperatureCompensator
-from skthermo.monitoring._columns import compensators_of
 from skthermo.monitoring._drift import DailyWeather, ModeTrends, daily_means, regressed
 from skthermo.monitoring._events import WATCH
-
-WEEK = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
+from skthermo.monitoring._records import compensators_of
 
 
 @dataclass(frozen=True)
@@ -120,9 +118,9 @@ def retrained(monitor: Any, records: pd.DataFrame | None, *, until: Any = None, 
         records = monitor.corrected_[monitor.corrected_.index >= oldest]
     records = records[list(trained.columns)].sort_index()
     records = records[~records.index.isin(trained.index) & (True if since is None else records.index >= since)]
-    margin = max(WEEK, monitor.lookback_.duration(usual_step(trained.index)))
+    margin = max(7 * DAY, monitor.lookback_.duration(usual_step(trained.index)))
     new, excluded = may_train(_until(records, until), events, monitor.faults_, margin, is_in_place=not is_given)
-    n_weeks = len(np.unique((new.index - new.index.min()) // WEEK))
+    n_weeks = len(np.unique((new.index - new.index.min()) // (7 * DAY)))
     if n_weeks < 3:
         come = f"{counted(len(new), 'new record')} in {counted(n_weeks, 'week')} may train; expected 3 weeks or more"
         come = come if len(new) else "there are no records since the baseline that may train"
@@ -187,12 +185,13 @@ def may_train(
     records: pd.DataFrame,
     events: pd.DataFrame,
     faults: pd.DataFrame,
-    margin: pd.Timedelta = WEEK,
+    margin: pd.Timedelta = 7 * DAY,
     *,
     is_in_place: bool = False,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Records outside events that nobody called harmless, without values of faulty sensors; the others, with reasons.
 
+    A change may have begun within the ``margin`` before the first alarm of an event.
     Modes that were exchanged for a time stand in their place already with ``is_in_place``.
     """
     kept, masked, rows = np.ones(len(records), dtype=bool), records.copy(), []
@@ -308,7 +307,7 @@ def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[
     old, new, is_relative = residuals_of(monitor.detector_, prior, own, targets)
     counts = new.notna().sum()
     n_independent = (counts / pd.Series(correlation_times(old.to_numpy()), old.columns)).clip(lower=1.0)
-    week = np.asarray((prior.index - prior.index[0]) // WEEK)
+    week = np.asarray((prior.index - prior.index[0]) // (7 * DAY))
     errors = old.cov().fillna(0.0).to_numpy() / np.sqrt(np.outer(n_independent, n_independent))
     random = check_random_state(monitor.random_state)
     missed = random.multivariate_normal(np.zeros(len(targets)), errors, week.max() + 1)[week]
@@ -318,7 +317,7 @@ def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[
     table = table.assign(standard_error=old.std() / np.sqrt(n_independent), n_records=counts)
     middle = pd.Series(prior.index).groupby(week).transform(lambda some: some.iloc[len(some) // 2]).dt.day_of_year
     distance = np.abs(middle.to_numpy()[:, np.newaxis] - np.unique(own.index.day_of_year))
-    return table, moved[np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2]
+    return table, moved[np.minimum(distance, YEAR / DAY - distance).min(axis=1) > 3.5]
 
 
 def residuals_of(

@@ -14,7 +14,7 @@ from scipy.stats import nbinom
 from skthermo._core.arrays import Array
 from skthermo._core.frames import DAY, YEAR
 from skthermo._core.text import counted_number, duration_text, percent
-from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning, WeatherWarning
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning
 from skthermo.monitoring._events import levels, open_events, runs
 
 
@@ -139,30 +139,24 @@ class EventLevels:
         return cls(threshold, min(float(release), threshold), peaks, estimate)
 
     def findings(self, seen: SmallestChanges) -> Iterator[SkthermoWarning]:
-        """What is doubtful: months without records, a threshold from too short a time, or raised by a single peak."""
+        """What is doubtful: a threshold from too short a time, that hides damage, or that a single peak raises."""
         estimate, highest, second = self.estimate, *self.peaks.iloc[:2]
         asked = estimate.expected * estimate.n_years
-        if estimate.missing_season:
-            text = (
-                f"the baseline has no record of {estimate.missing_season}. The number of false alarms is that of the "
-                "other seasons, and unknown for these. Refit with a whole year"
+        if estimate.missing_season or asked < 0.4:
+            without = f" and has no record of {estimate.missing_season}" if estimate.missing_season else ""
+            yield FewRecordsWarning(
+                f"the baseline has {counted_number(estimate.n_years, 'year', 2)} of records{without}: {asked:.2g} "
+                f"events are expected in it (0.4 tell the threshold {self.threshold:.3g}), and other seasons may "
+                f"have more. Now {seen}. Refit with a whole year, or allow more alarms a year",
+                "short-baseline",
             )
-            yield WeatherWarning(text, "missing-seasons")
-        if asked < 0.4:
-            text = (
-                f"at {counted_number(estimate.expected, 'false alarm')} a year, {asked:.2g} events are expected in the "
-                f"{counted_number(estimate.n_years, 'year', 2)} of the baseline; it should be 0.4 or more. The "
-                f"threshold {self.threshold:.3g} is extrapolated from the peaks of its damage index, the highest of "
-                f"them {highest:.3g}. Now {seen}. Use a longer baseline, or allow more alarms a year"
-            )
-            yield FewRecordsWarning(text, "extrapolated-threshold")
-        elif seen.is_relative and seen.common > 0.025:  # 5 % of the stiffness of the structure
-            text = (
+        if asked >= 0.4 and seen.is_relative and seen.common > 0.025:  # 5 % of the stiffness of the structure
+            yield ResultWarning(
                 f"the threshold {self.threshold:.3g} is so high that {seen} (expected an alarm at 2.5 % of all "
                 "responses). Smaller changes count as healthy. Use a longer window or a closer regression, or allow "
-                "more alarms a year"
+                "more alarms a year",
+                "undetected-changes",
             )
-            yield ResultWarning(text, "undetected-changes")
         k, _, excesses = highest_squares(self.peaks.to_numpy())
         by_chance = 1.0 - (0.01 / k) ** (1 / (k - 1))  # share of the largest of k exponential excesses (Cochran)
         if excesses[0] > by_chance * excesses.sum():

@@ -208,7 +208,7 @@ def test_a_plain_zlib_stream_is_no_monitor(tmp_path):
         load_monitor(tmp_path / "bridge.joblib")
 
 
-@pytest.mark.filterwarnings("ignore:.*(missing-seasons|extrapolated-threshold|baseline-peak|few-baseline-records)")
+@pytest.mark.filterwarnings("ignore:.*(short-baseline|baseline-peak|few-baseline-records)")
 def test_a_file_of_version_0_2_is_refused_in_one_sentence_and_its_acknowledgements_are_kept(tmp_path):
     old = Path(__file__).with_name("monitor_of_0_2.joblib")
     with pytest.raises(ValueError, match=r"another version of skthermo; .* skthermo fit FOLDER --replace"):

@@ -17,8 +17,7 @@ WEEKS, YEAR = 60, 365
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
-        "missing-seasons",
-        "extrapolated-threshold",
+        "short-baseline",
         "weather-of-one-fold",
         "few-baseline-records",
         "baseline-peak",
