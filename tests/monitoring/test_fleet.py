@@ -277,12 +277,6 @@ def test_what_the_owner_found_is_kept(tmp_path):
         fleet.acknowledge("x", 1, harmless=True)
 
 
-def test_records_that_are_no_tables_are_reported():
-    makers, records = asked(n=(None, lambda: (1, 2)))
-    fleet = fit_fleet(makers, records)
-    assert "shapes () and (); expected a row" in fleet.table.loc["n", "error"]
-
-
 def test_monitors_that_were_fitted_one_by_one_are_a_fleet_like_any_other(fleet):
     single = {name: pickle.loads(pickle.dumps(fleet.monitors[name])) for name in "abc"}
     new = {

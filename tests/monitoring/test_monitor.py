@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from sklearn.base import BaseEstimator, TransformerMixin, clone
+from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor
@@ -22,7 +22,7 @@ from skthermo.detection import (
     TemperatureCompensator,
 )
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
+from skthermo.preprocessing import HingeFeatures, LagFeatures
 
 TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
 N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
@@ -147,15 +147,6 @@ def test_any_division_into_batches_gives_the_history_of_one_pass(name, data):
 
 
 @pytest.mark.nightly
-def test_hour_by_hour_and_day_by_day():
-    for batches in ([SERVICE.iloc[[n]] for n in range(24)], [day for _, day in SERVICE[:24].resample("D") if len(day)]):
-        monitor, answers, _ = fitted("mean by time")
-        parts = [monitor.update(batch) for batch in batches]
-        pd.testing.assert_frame_equal(pd.concat(parts)[ANSWER], answers[:24][ANSWER], check_exact=True)
-        assert not any(part["revised"].any() for part in parts)
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["raw", "lags", "mean by number", "hinges, mean by time"])
 def test_indices_are_those_of_the_detector_on_all_records(name):
     monitor, _, _ = fitted(name, sensors=False)
@@ -210,20 +201,6 @@ def test_records_without_values_that_their_window_evaluates_are_named(name):
     said = answers["reason"].str.split("; ")
     of_others = {one for reason in said[~lacking & answers["index"].notna()] for one in reason}
     assert all(set(reason) - of_others for reason in said[lacking])
-
-
-def test_answers_do_not_keep_the_frequency_of_a_batch():
-    monitor, records = copy.deepcopy(fitted("lags")[0]), ALL[N_BASELINE : N_BASELINE + 40]
-    assert records.index.freq is not None
-    one = copy.deepcopy(monitor).update(records)
-    parts = [monitor.update(part) for part in (records[:11][::-1], records[5:11], records[11:40])]
-    pd.testing.assert_frame_equal(pd.concat(parts), one)
-    assert records.index.freq is not None
-
-
-def test_a_baseline_without_records_is_refused():
-    with pytest.raises(ValueError, match="the baseline has no records"):
-        Monitor(MahalanobisDetector(), targets=MODES).fit(BASELINE[:0])
 
 
 def test_too_late_records_are_reported_and_not_evaluated():
@@ -303,12 +280,6 @@ def test_a_batch_without_records_changes_nothing():
     assert monitor.last_ == BASELINE.index[-1]
 
 
-def test_a_detector_that_looks_at_later_records_is_refused():
-    detector = make_pipeline(HampelFilter(5), compensator(), MahalanobisDetector())
-    with pytest.raises(ValueError, match="compares records with later ones"):
-        Monitor(detector).fit(BASELINE)
-
-
 class RunningMean(TransformerMixin, BaseEstimator):
     """A user's step that looks back, which no inspection finds."""
 
@@ -334,14 +305,6 @@ def test_memory_of_steps_that_are_not_known_is_asked_for():
     pd.testing.assert_frame_equal(whole, pd.concat(parts))
 
 
-def test_frequency_columns_have_to_be_known():
-    with pytest.raises(ValueError, match="expected targets="):
-        Monitor(MahalanobisDetector()).fit(BASELINE)
-    with pytest.raises(ValueError, match="expected different names among the columns"):
-        Monitor(MahalanobisDetector(), targets=["f9"]).fit(BASELINE)
-    assert Monitor(DETECTORS["lags"][0], sensors=False).fit(BASELINE).targets_ == MODES
-
-
 def test_what_the_owner_says_of_an_event_stays_with_it():
     monitor, _, _ = fitted("lags")
     held = SERVICE.index[64:68]
@@ -355,26 +318,3 @@ def test_what_the_owner_says_of_an_event_stays_with_it():
     assert "acknowledged as harmless (crane on the deck)" in monitor.summary()
     with pytest.raises(ValueError, match="expected the number of one of the"):
         monitor.acknowledge(99, harmless=True)
-
-
-def test_a_monitor_is_cloned_and_has_parameters():
-    monitor, _, after = fitted("lags")
-    twin = clone(monitor)
-    assert not hasattr(twin, "detector_")
-    assert twin.get_params()["max_delay"] == "7D"
-    assert twin.set_params(max_delay="2D", detector__mahalanobisdetector__contamination=0.01).max_delay == "2D"
-    again = pickle.loads(pickle.dumps(after))
-    pd.testing.assert_frame_equal(again.evaluations_, after.evaluations_)
-    assert again.summary() == after.summary()
-
-
-@pytest.mark.nightly
-def test_calendar_days_of_a_time_zone_with_summer_time():
-    records = campaign(N_BASELINE + 40, 3, "2024-06-06").tz_localize("UTC").tz_convert("Europe/Zurich")
-    monitor = Monitor(DETECTORS["lags"][0], targets=MODES).fit(records[:N_BASELINE])
-    other = copy.deepcopy(monitor)
-    whole = monitor.update(records[N_BASELINE:])
-    parts = [other.update(records[n : n + 3]) for n in range(N_BASELINE, len(records), 3)]
-    pd.testing.assert_frame_equal(whole, pd.concat(parts))
-    assert monitor.days_.index.equals(records[N_BASELINE:].index.normalize().unique())
-    assert monitor.days_.equals(other.days_)
