@@ -77,7 +77,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/_evaluate.py", "fem/test_modes_at_sensors.py"): [
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
-    ("monitoring/fleet/_bridge.py", "monitoring/test_fleet.py"): [
+    ("monitoring/_fleet.py", "monitoring/test_fleet.py"): [
         ("bridges whose records failed called healthy", "if not self.errors:", "if True:"),
     ],
     ("surrogate/_fleet_mapper.py", "surrogate/test_fleet_mapper.py"): [

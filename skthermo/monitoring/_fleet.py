@@ -35,9 +35,9 @@ from skthermo._core.text import counted, counted_number, listed, percent, signif
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import SkthermoWarning
 from skthermo.metrics import mape
+from skthermo.monitoring._events import times_exceeded
 from skthermo.monitoring._monitor import Monitor
 from skthermo.monitoring._status import MonitorStatus
-from skthermo.monitoring._threshold import times_exceeded
 
 Fitted = tuple[Any, Monitor | None]  # an estimator and the monitor of its bridge
 

@@ -42,10 +42,13 @@ from skthermo.monitoring._events import (
     DAMAGE,
     MEASUREMENT,
     WATCH,
+    EventLevels,
     Events,
+    SmallestChanges,
     evaluations,
     event_changes,
     leading,
+    lowered,
     with_acknowledgements,
 )
 from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
@@ -59,7 +62,6 @@ from skthermo.monitoring._records import (
 )
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
-from skthermo.monitoring._threshold import EventLevels, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 
