@@ -81,25 +81,16 @@ def test_drift_and_faulty_sensors_go_on_where_they_stopped(records, path):
 
 
 @each_form
-def test_a_file_that_was_cut_off_is_refused(monitor, path):
+def test_a_file_that_was_cut_off_or_has_a_changed_bit_is_refused(monitor, path):
     monitor.save(path)
     content = path.read_bytes()
-    for share in (0.0, 0.3, 0.999):
-        path.write_bytes(content[: int(share * len(content))])
+    values = monitor.baseline_.to_numpy()[0].tobytes()
+    place = len(content) // 3 if path.suffix == ".joblib" else content.index(values[:8])
+    changed = content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+    for damaged in (b"", content[: len(content) // 3], content[:-9], changed):
+        path.write_bytes(damaged)
         with pytest.raises(ValueError, match=rf"{path.name} cannot be read: .*; expected the whole file of a monitor"):
             load_monitor(path)
-
-
-@each_form
-def test_a_changed_bit_is_noticed(monitor, path):
-    monitor.save(path)
-    content = bytearray(path.read_bytes())
-    values = monitor.baseline_.to_numpy()[0].tobytes()
-    place = len(content) // 3 if path.suffix == ".joblib" else bytes(content).index(values[:8])
-    content[place] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match="cannot be read"):
-        load_monitor(path)
 
 
 @each_form

@@ -194,16 +194,6 @@ def test_a_damaged_file_is_fitted_anew(tmp_path):
     assert bits(fit_fleet(makers, records, monitor=watch, folder=tmp_path)) == bits(first)
 
 
-def test_an_interrupt_keeps_what_is_finished(tmp_path):
-    def interrupt():
-        raise KeyboardInterrupt
-
-    makers, records = asked(stop=(interrupt, None), late=(None, None))
-    with pytest.raises(KeyboardInterrupt):
-        fit_fleet(makers, records, folder=tmp_path)
-    assert len(Fleet(tmp_path).chains) == 4
-
-
 def test_monitors_evaluate_new_records_each_alone(fleet):
     made = pickle.loads(pickle.dumps(fleet))  # also a pickled fleet goes on
     new = {"a": year(31, 60, "2026-01-01"), "b": partial(year, 32, 60, "2026-01-01", step=0.05), "c": missing_file}

@@ -121,11 +121,6 @@ def test_a_change_without_an_alarm_is_not_learned(monitor, records):
     assert quietly(monitor.refit, until=changed.index[495], force=True).baseline.index[-1] == changed.index[495]
 
 
-def test_given_records_need_all_columns(monitor, records):
-    with pytest.raises(ValueError, match=r"lack the columns \['f1'\]"):
-        monitor.refit(records["healthy"].drop(columns="f1"))
-
-
 def test_after_an_intervention_indices_are_as_before(renewed, fitted, records):
     monitor, found = renewed
     assert found.accepted
