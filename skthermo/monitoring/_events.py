@@ -15,7 +15,7 @@ from scipy.stats import nbinom
 
 from skthermo._core.arrays import Array
 from skthermo._core.frames import DAY, YEAR
-from skthermo._core.text import counted_number, duration_text, percent
+from skthermo._core.text import counted_number, duration_text, percent, plain
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning
 
 DAMAGE, MEASUREMENT, WATCH = "damage", "measurement or structure", "watch"
@@ -434,11 +434,8 @@ class SmallestChanges:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values: NaN is None, ``within`` in seconds."""
-        single, groups = (
-            {str(name): _known(value) for name, value in some.items()} for some in (self.single, self.groups)
-        )
-        within = self.within.total_seconds()
-        return {"common": _known(self.common), "single": single, "groups": groups, "within": within}
+        facts = {name: getattr(self, name) for name in ("common", "single", "groups", "within")}
+        return plain(facts)
 
     def __str__(self) -> str:
         parts = [f"a fall of all responses by {percent(self.common, '.2g')}"] if np.isfinite(self.common) else []
@@ -460,7 +457,3 @@ def _range_text(changes: Mapping[Any, float], form: str) -> str:
     ends = dict.fromkeys((min(seen, key=seen.__getitem__), max(seen, key=seen.__getitem__)))
     factor = 100 if "%" in form else 1
     return "by " + " to ".join(f"{form.format(factor * seen[name])} ({name})" for name in ends)
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -490,10 +490,9 @@ class Fleet:
         return len(self._known)
 
     def __repr__(self) -> str:
-        counts = self._counts()
         words = {"alarm": "in alarm", "watch": "to be watched", "not evaluated": "not evaluated"}
-        watched = [f"{counted(len(self.monitors), 'monitor')}"] if len(self.monitors) else []
-        watched += [f"{counts[state]} {text}" for state, text in words.items() if counts[state]]
+        watched = [counted(len(self.monitors), "monitor")] if len(self.monitors) else []
+        watched += [f"{self._counts()[state]} {text}" for state, text in words.items() if self._counts()[state]]
         parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
         return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
 
@@ -503,17 +502,16 @@ class Fleet:
     @property
     def chains(self) -> Mapping[Hashable, BaseEstimator]:
         """Fitted estimators by name, read when asked for."""
-        return self._objects(0, [name for name, one in self._known.items() if one.is_fitted])
+        fitted = [name for name, one in self._known.items() if one.is_fitted]
+        return ReadWhenAsked({name: partial(self._object, name, 0) for name in fitted})
 
     @property
     def monitors(self) -> Mapping[Hashable, Monitor]:
         """Monitors by name, read when asked for."""
-        return self._objects(1, [name for name, one in self._known.items() if one.status is not None])
+        watched = [name for name, one in self._known.items() if one.status is not None]
+        return ReadWhenAsked({name: partial(self._object, name, 1) for name in watched})
 
-    def _objects(self, part: int, names: Iterable[Hashable]) -> Mapping[Hashable, Any]:
-        return ReadWhenAsked({name: partial(self._object, part, name) for name in names})
-
-    def _object(self, part: int, name: Hashable) -> Any:
+    def _object(self, name: Hashable, part: int) -> Any:
         return opened(self._kept[name], name)[part]
 
     @property

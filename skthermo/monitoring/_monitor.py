@@ -385,8 +385,23 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing; if the detector does not see
             even large changes of a response.
         """
-        self._check_times()
-        given = _read_baseline(X)
+        for name in ("max_delay", "retention"):
+            check_duration(getattr(self, name), name)
+        if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
+            raise ValueError(
+                f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
+                "expected more watches than alarms a year, such as 12 and 1"
+            )
+        given = read_records(X)
+        if not len(given):
+            raise ValueError(
+                "the baseline has no records; expected those of the healthy structure, of a year if possible"
+            )
+        if given.index.has_duplicates:
+            again = given.index[given.index.duplicated()]
+            raise ValueError(
+                f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once"
+            )
         with collected() as findings:
             baseline, detector, columns, found = usable_baseline(self, given)
             seed_parts(detector, seeded(self.random_state))
@@ -874,15 +889,6 @@ class Monitor(SavesFrames, Estimator):
         """Records in the columns of `fit`, without those that are left out."""
         return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
-    def _check_times(self) -> None:
-        for name in ("max_delay", "retention"):
-            check_duration(getattr(self, name), name)
-        if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
-            raise ValueError(
-                f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
-                "expected more watches than alarms a year, such as 12 and 1"
-            )
-
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
         after, trained, today = self._twin(), retraining.baseline, midnight(self.last_)
@@ -937,16 +943,6 @@ class Monitor(SavesFrames, Estimator):
         return "\n".join(summary_lines(self))
 
 
-def _read_baseline(X: pd.DataFrame) -> pd.DataFrame:
-    baseline = read_records(X)
-    if not len(baseline):
-        raise ValueError("the baseline has no records; expected those of the healthy structure, of a year if possible")
-    if baseline.index.has_duplicates:
-        again = baseline.index[baseline.index.duplicated()]
-        raise ValueError(f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once")
-    return baseline
-
-
 def _news(before: pd.DataFrame, after: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
     """Evaluations of new records, and of known ones whose evaluation has changed."""
     answers = after[after.index >= fresh[0]]
@@ -961,12 +957,10 @@ def _not_evaluated(answers: pd.DataFrame) -> Iterable[UnevaluatedRowsWarning]:
     new = answers[~answers["revised"]]
     unknown = new[new["state"] == "not evaluated"]
     if len(unknown):
-        counts = unknown["reason"].value_counts()
-        reasons = [f"{n} because {cause}" for cause, n in counts.iloc[:3].items()]
-        more = f"; and {counts.iloc[3:].sum()} for other reasons" if len(counts) > 3 else ""
+        counts = unknown["reason"].value_counts()[:3]
         yield UnevaluatedRowsWarning(
             f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: "
-            f"{'; '.join(reasons)}{more}",
+            f"{'; '.join(f'{n} because {cause}' for cause, n in counts.items())}",
             "not-evaluated",
         )
 

@@ -172,22 +172,6 @@ def windows(rest: Array) -> Array:
     return np.array([*last.values(), *(last[n] - typical(rest[-30 - n : -n], 30) for n in (3, 7))])
 
 
-def start_of_change(days: Counts, rest: Array) -> tuple[int, float, float]:
-    """Day from which departures have an offset or drift, its size on the last day, and rate in a day.
-
-    The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
-    """
-    known = ~np.isnan(rest)
-    at, values = days[known].astype(float), rest[known]
-    slow = at[: max(len(at) - 6, 0)]
-    shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
-    shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
-    gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
-    best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
-    first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
-    return first, size, float(size / (at[-1] - first + 1)) if is_drift[best] else 0.0
-
-
 @dataclass(frozen=True)
 class Responses:
     """Responses in their own units beside what the weather predicts.
@@ -500,12 +484,23 @@ class SensorWatch:
             if len(known) == n_days and (np.abs(own[known]) < abs(fault.size) / 2).all():
                 state = state.changed(fault, until=self._midnight(days[known[0]]))
             elif (days[-1] - 60) * DAY_NS < fault.detected:
-                state = state.changed(fault, **self._described(days, own))
+                state = state.changed(fault, **self._change(days, own))
         return state
 
-    def _described(self, days: Counts, own: Array) -> dict[str, Any]:
-        """What the departures of a thermometer that is at fault look like."""
-        first, size, rate = start_of_change(days, own)
+    def _change(self, days: Counts, rest: Array) -> dict[str, Any]:
+        """Offset or drift of a thermometer at fault: its first day, its size on the last one, and its rate in a day.
+
+        The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
+        """
+        known = ~np.isnan(rest)
+        at, values = days[known].astype(float), rest[known]
+        slow = at[: max(len(at) - 6, 0)]
+        shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
+        shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
+        gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
+        best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
+        first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
+        rate = float(size / (at[-1] - first + 1)) if is_drift[best] else 0.0
         return {"kind": "drift" if rate else "offset", "since": self._midnight(first), "size": size, "rate": rate}
 
     def _with_departures(self, state: WatchState) -> WatchState:
@@ -522,7 +517,7 @@ class SensorWatch:
                 resolved.append(int(sensor))
         if len(resolved) != 1:
             return state
-        found = self._described(state.days_of_means, rest[:, resolved[0]])
+        found = self._change(state.days_of_means, rest[:, resolved[0]])
         return state.opened(column=resolved[0], detected=self._midnight(state.days[-1]), **found)
 
     def _excess(self, rest: Array, trusted: Mask) -> Array:
