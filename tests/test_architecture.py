@@ -47,7 +47,6 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate": {"fem.affine", "preprocessing.checks"},  # polynomials of ln f, periods of records
     "detection": {"preprocessing.checks"},  # misplaced columns
     "monitoring": {"preprocessing.checks"},
-    "monitoring.fleet": set(),
     "studies.detectability": set(),
     "studies.identification": set(),
 }

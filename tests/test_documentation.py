@@ -52,7 +52,7 @@ def run_code(page):
     return namespace
 
 
-@pytest.mark.filterwarnings("ignore:.*(bridges-warned|set-aside)")  # of a fleet whose records have outliers
+@pytest.mark.filterwarnings("ignore:.*(bridges|set-aside)")  # of a fleet whose records have outliers
 @by_page(lambda page: page not in (README, HOME) and python_blocks(page))
 @pytest.mark.usefixtures("chains_fitted_once")
 def test_a_pages_code_runs_from_top_to_bottom(page):

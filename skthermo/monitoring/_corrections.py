@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -14,7 +14,7 @@ from skthermo._core.arrays import Array
 from skthermo._core.frames import MISSING_CODES, midnights
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._drift import DriftFollower
-from skthermo.monitoring._sensors import SensorWatch
+from skthermo.monitoring._sensors import SensorWatch, Watched
 from skthermo.preprocessing.checks import Plausible
 
 
@@ -25,20 +25,6 @@ class DayState(SavesFrames):
     day: pd.Timestamp
     sensors: Any = None
     drift: Any = None
-
-
-@dataclass(frozen=True)
-class Corrected:
-    """Records as the detector sees them, and what became of their values.
-
-    ``notes`` has a row for each record: ``n_held`` responses that were set aside although the structure may have moved
-    them, ``held`` names them; ``n_left_out`` values; ``note``; and the shares of stiffness by group, as in "drift top",
-    that are taken out of the frequencies. ``states`` are those at the beginning of each day.
-    """
-
-    records: pd.DataFrame
-    notes: pd.DataFrame
-    states: tuple[DayState, ...]
 
 
 @dataclass(frozen=True)
@@ -79,10 +65,15 @@ class Corrections:
         """Records without what no sensor measures."""
         return raw.mask(self.plausible.implausible(raw.to_numpy()))
 
-    def corrected(self, begin: DayState, raw: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Corrected:
+    def corrected(
+        self, begin: DayState, raw: pd.DataFrame, acknowledged: Sequence[int] = ()
+    ) -> tuple[pd.DataFrame, pd.DataFrame, tuple[DayState, ...]]:
         """Raw records from a day on as the detector sees them, each day by what was known at its beginning.
 
-        ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a sensor.
+        Also what became of their values, a row for each record (``n_held`` responses that were set aside although the
+        structure may have moved them, ``held`` names them; ``n_left_out`` values; ``note``; and the shares of stiffness
+        by group, as in "drift top", that are taken out of the frequencies), and the states at the beginning of each
+        day. ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a sensor.
         """
         days = midnights(raw.index)
         bounds = [*np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[0] - 1)), len(raw)]
@@ -90,58 +81,43 @@ class Corrections:
             bounds = [0, len(raw)]
         state, states, parts = begin, [], []
         for first, stop in pairwise(bounds):
-            day = raw.iloc[first:stop]
-            states.append(state := DayState(days[first], state.sensors, state.drift))
-            parts.append(self._seen(state, day, acknowledged))
-            if stop < len(raw):
-                state = self._after(state, day)
+            states.append(replace(state, day=days[first]))
+            *part, state = self._after(states[-1], raw.iloc[first:stop], acknowledged)
+            parts.append(part)
         records, notes = (pd.concat(list(some)) for some in zip(*parts, strict=True))
-        return Corrected(records, notes, tuple(states))
+        return records, notes, tuple(states)
+
+    def _after(
+        self, state: DayState, raw: pd.DataFrame, acknowledged: Sequence[int]
+    ) -> tuple[pd.DataFrame, pd.DataFrame, DayState]:
+        """Records of one day, what became of their values, and the state after it."""
+        wrong = self.plausible.implausible(raw.to_numpy())
+        T, F = self._split(raw.mask(wrong))
+        notes, sensors, drift, taken_out = self._missing(raw, wrong), state.sensors, state.drift, {}
+        if self.sensors is None:
+            none = np.zeros(len(raw), dtype=np.int64)
+            seen = Watched(T.drop(columns=self.reference), F, np.zeros(F.shape, dtype=bool), [""] * len(raw), none)
+        else:  # it is to see what is implausible, but not what stands for a missing value
+            seen = self.sensors.masked(sensors, T, F, acknowledged)
+            is_missing = wrong & (raw.isin(MISSING_CODES) | np.isinf(raw))
+            sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
+        responses = seen.F
+        if self.drift is not None:
+            responses = self.drift.corrected(drift, seen.F)
+            taken_out = self.drift.taken_out(drift).add_prefix("drift ").to_dict()
+            drift = self.drift.advance(drift, seen.T, seen.F.where(seen.F > 0))
+        table = {
+            "n_held": seen.held.sum(axis=1).astype(float),
+            "held": [", ".join(str(name) for name, is_one in zip(F, row, strict=True) if is_one) for row in seen.held],
+            "n_left_out": seen.n_left_out + wrong.sum(axis=1),
+            "note": ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)],
+        }
+        records = seen.T.join(responses)[[name for name in raw.columns if name not in self.reference]]
+        notes = pd.DataFrame(table | taken_out, raw.index).astype({"held": object, "note": object})
+        return records, notes, DayState(state.day, sensors, drift)
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
         return records.drop(columns=self.targets), records[self.targets]
-
-    def _after(self, state: DayState, raw: pd.DataFrame) -> DayState:
-        """The state after one more complete day."""
-        T, F = self._split(self.cleaned(raw))
-        drift, sensors = state.drift, state.sensors
-        if self.drift is not None:
-            seen = None if self.sensors is None else self.sensors.masked(sensors, T, F)
-            inputs, responses = (T.drop(columns=self.reference), F) if seen is None else (seen.T, seen.F)
-            drift = self.drift.advance(drift, inputs, responses.where(responses > 0))
-        if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
-            is_missing = self.plausible.implausible(raw.to_numpy()) & (raw.isin(MISSING_CODES) | np.isinf(raw))
-            sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
-        return DayState(state.day, sensors, drift)
-
-    def _seen(
-        self, state: DayState, raw: pd.DataFrame, acknowledged: Sequence[int]
-    ) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Records of one day, and what became of their values."""
-        wrong = self.plausible.implausible(raw.to_numpy())
-        T, F = self._split(raw.mask(wrong))
-        held, notes, n_left_out = np.zeros(F.shape, dtype=bool), self._missing(raw, wrong), wrong.sum(axis=1)
-        if self.sensors is None:
-            T = T.drop(columns=self.reference)
-        else:
-            seen = self.sensors.masked(state.sensors, T, F, acknowledged)
-            T, F, held, n_left_out = seen.T, seen.F, seen.held, n_left_out + seen.n_left_out
-            notes = ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)]
-        drift = {}
-        if self.drift is not None:
-            F = self.drift.corrected(state.drift, F)
-            drift = self.drift.taken_out(state.drift).add_prefix("drift ").to_dict()
-        names = [""] * len(raw)
-        for row in np.flatnonzero(held.any(axis=1)):
-            names[row] = ", ".join(str(self.targets[k]) for k in np.flatnonzero(held[row]))
-        table = {
-            "n_held": held.sum(axis=1).astype(float),
-            "held": names,
-            "n_left_out": n_left_out,
-            "note": notes,
-        } | drift
-        records = T.join(F)[[name for name in raw.columns if name not in self.reference]]
-        return records, pd.DataFrame(table, raw.index).astype({"held": object, "note": object})
 
     def _missing(self, raw: pd.DataFrame, wrong: Array) -> list[str]:
         """What is taken as missing of each record."""

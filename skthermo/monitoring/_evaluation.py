@@ -15,8 +15,8 @@ from skthermo._core.estimators import BaseSearchCV
 from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, DirectionalDetector, TemperatureCompensator
 from skthermo.exceptions import ResultWarning
+from skthermo.monitoring._events import lowered
 from skthermo.monitoring._records import Lookback
-from skthermo.monitoring._threshold import lowered
 
 
 def index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
@@ -162,5 +162,5 @@ def blind_findings(
             f"a fall by {sizes[-1]} standard deviations of the baseline stays at or below the threshold "
             f"{threshold:.3g} for {', '.join(blind)}. The detector does not see damage there. Use another detector, or "
             "allow more false alarms a year",
-            "blind-detector",
+            "undetected-changes",
         )

@@ -27,7 +27,6 @@ from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, midnig
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
-from skthermo.monitoring._columns import usable_baseline, without_what_cannot_be
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._evaluation import (
     blind_findings,
@@ -43,17 +42,26 @@ from skthermo.monitoring._events import (
     DAMAGE,
     MEASUREMENT,
     WATCH,
+    EventLevels,
     Events,
+    SmallestChanges,
     evaluations,
     event_changes,
     leading,
+    lowered,
     with_acknowledgements,
 )
 from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
-from skthermo.monitoring._records import OF_TRAINING, Intake, Lookback, read_records
+from skthermo.monitoring._records import (
+    OF_TRAINING,
+    Intake,
+    Lookback,
+    read_records,
+    usable_baseline,
+    without_what_cannot_be,
+)
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
-from skthermo.monitoring._threshold import EventLevels, SmallestChanges, lowered
 from skthermo.residuals.weather import BEYOND, TrainingRange
 
 
@@ -377,8 +385,23 @@ class Monitor(SavesFrames, Estimator):
             As the detector does; if values are no measurements and are taken as missing; if the detector does not see
             even large changes of a response.
         """
-        self._check_times()
-        given = _read_baseline(X)
+        for name in ("max_delay", "retention"):
+            check_duration(getattr(self, name), name)
+        if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
+            raise ValueError(
+                f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
+                "expected more watches than alarms a year, such as 12 and 1"
+            )
+        given = read_records(X)
+        if not len(given):
+            raise ValueError(
+                "the baseline has no records; expected those of the healthy structure, of a year if possible"
+            )
+        if given.index.has_duplicates:
+            again = given.index[given.index.duplicated()]
+            raise ValueError(
+                f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once"
+            )
         with collected() as findings:
             baseline, detector, columns, found = usable_baseline(self, given)
             seed_parts(detector, seeded(self.random_state))
@@ -470,12 +493,15 @@ class Monitor(SavesFrames, Estimator):
             return
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
             self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
-        seen = self.corrections_.corrected(begin, raw, self._explained())
-        self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen.records])
-        states = [*(one for one in earlier if one.day < begin.day), *seen.states]
+        said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT].drop_duplicates(
+            "time", keep="last"
+        )
+        seen, notes, states = self.corrections_.corrected(begin, raw, said["at"][said["harmless"]].tolist())
+        self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen])
+        states = [*(one for one in earlier if one.day < begin.day), *states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
-        new = self._decided(first, seen.notes[seen.notes.index >= first])
+        new = self._decided(first, notes[notes.index >= first])
         self.decisions_ = pd.concat([self.decisions_[self.decisions_.index < first], new])
         self._explain(first)
 
@@ -523,23 +549,14 @@ class Monitor(SavesFrames, Estimator):
         places = place + rows - rows[0]
         records = records.iloc[: places[-1] + 1]
         sizes = np.abs(departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places])
-        sizes = np.round(np.nan_to_num(sizes), 2)
-        effects = group_effects(self.detector_, records[self.features_]).iloc[places]
-        decisions = self.decisions_.copy()
-        modes = decisions["modes"].to_numpy(copy=True)
-        modes[rows] = [leading(dict(zip(map(str, self.targets_), size, strict=True))) for size in sizes]
-        decisions["modes"] = modes
-        for name in effects:
-            column = decisions[name].to_numpy(copy=True) if name in decisions else np.full(len(decisions), np.nan)
-            column[rows] = effects[name]
-            decisions[name] = column
+        sizes = pd.DataFrame(np.round(np.nan_to_num(sizes), 2), columns=list(map(str, self.targets_)))
+        found = group_effects(self.detector_, records[self.features_]).iloc[places]
+        found = found.assign(modes=[leading(row) for _, row in sizes.iterrows()]).astype({"modes": object})
+        decisions = self.decisions_.reindex(
+            columns=[*self.decisions_, *found.columns.difference(self.decisions_.columns)]
+        )
+        decisions.loc[found.index, found.columns] = found
         self.decisions_ = decisions
-
-    def _explained(self) -> list[int]:
-        """Times (nanoseconds) at which the owner called values that were set aside the fault of a sensor."""
-        said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT]
-        last = said.drop_duplicates("time", keep="last")
-        return last["at"][last["harmless"]].tolist()
 
     def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
         """Append the changes since a former state to the transitions, after the actions that made them."""
@@ -783,8 +800,8 @@ class Monitor(SavesFrames, Estimator):
             return table[(table.index < first) | (False if last is None else table.index > last)]
 
         after = self._twin()
-        for name in ("records_", "ahead_", "corrected_", "decisions_"):
-            setattr(after, name, others(getattr(self, name)))
+        after.records_, after.ahead_ = others(self.records_), others(self.ahead_)
+        after.corrected_, after.decisions_ = others(self.corrected_), others(self.decisions_)
         n_discarded = len(self.records_) - len(after.records_) + len(self.ahead_) - len(after.ahead_)
         if not n_discarded:
             until = "on" if last is None else f"to {last}"
@@ -872,15 +889,6 @@ class Monitor(SavesFrames, Estimator):
         """Records in the columns of `fit`, without those that are left out."""
         return read_records(records, self.columns_, self.baseline_.index.tz).drop(columns=list(self.left_out_))
 
-    def _check_times(self) -> None:
-        for name in ("max_delay", "retention"):
-            check_duration(getattr(self, name), name)
-        if self.watch_per_year is not None and not self.watch_per_year > self.false_alarms_per_year:
-            raise ValueError(
-                f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
-                "expected more watches than alarms a year, such as 12 and 1"
-            )
-
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
         after, trained, today = self._twin(), retraining.baseline, midnight(self.last_)
@@ -935,16 +943,6 @@ class Monitor(SavesFrames, Estimator):
         return "\n".join(summary_lines(self))
 
 
-def _read_baseline(X: pd.DataFrame) -> pd.DataFrame:
-    baseline = read_records(X)
-    if not len(baseline):
-        raise ValueError("the baseline has no records; expected those of the healthy structure, of a year if possible")
-    if baseline.index.has_duplicates:
-        again = baseline.index[baseline.index.duplicated()]
-        raise ValueError(f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once")
-    return baseline
-
-
 def _news(before: pd.DataFrame, after: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
     """Evaluations of new records, and of known ones whose evaluation has changed."""
     answers = after[after.index >= fresh[0]]
@@ -959,12 +957,10 @@ def _not_evaluated(answers: pd.DataFrame) -> Iterable[UnevaluatedRowsWarning]:
     new = answers[~answers["revised"]]
     unknown = new[new["state"] == "not evaluated"]
     if len(unknown):
-        counts = unknown["reason"].value_counts()
-        reasons = [f"{n} because {cause}" for cause, n in counts.iloc[:3].items()]
-        more = f"; and {counts.iloc[3:].sum()} for other reasons" if len(counts) > 3 else ""
+        counts = unknown["reason"].value_counts()[:3]
         yield UnevaluatedRowsWarning(
             f"{len(unknown)} of {len(new)} new records are not evaluated, the first {unknown.index[0]}: "
-            f"{'; '.join(reasons)}{more}",
+            f"{'; '.join(f'{n} because {cause}' for cause, n in counts.items())}",
             "not-evaluated",
         )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,13 +14,11 @@ from sklearn.utils import check_random_state
 from skthermo._core.arrays import Array
 from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correlation_times, usual_step
 from skthermo._core.text import capital, counted, listed, probability_text
-from skthermo._core.warnings import without_warnings
+from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, TemperatureCompensator
-from skthermo.monitoring._columns import compensators_of
 from skthermo.monitoring._drift import DailyWeather, ModeTrends, daily_means, regressed
 from skthermo.monitoring._events import WATCH
-
-WEEK = pd.Timedelta("7D")  # before the first alarm of an event, in which a change may have begun without an alarm
+from skthermo.monitoring._records import compensators_of
 
 
 @dataclass(frozen=True)
@@ -114,36 +111,40 @@ class Retraining:
 
 def retrained(monitor: Any, records: pd.DataFrame | None, *, until: Any = None, force: bool = False) -> Retraining:
     """A detector that has learned from the baseline and what came since, unless these differ from it."""
-    targets, since, prior = list(monitor.targets_), monitor.since_, monitor.prior_
-    margin = max(WEEK, monitor.lookback_.duration(usual_step(monitor.trained_.index)))
-    kept = _until(_kept(monitor, records), until)
-    new, excluded = may_train(kept, monitor.events_, monitor.faults_, margin, is_in_place=records is None)
-    n_weeks = len(np.unique((new.index - new.index.min()) // WEEK))
+    since, prior, events, trained = monitor.since_, monitor.prior_, monitor.events_, monitor.trained_
+    is_given = records is not None
+    if not is_given:
+        oldest = monitor.last_ - check_duration(monitor.retention, "retention")
+        records = monitor.corrected_[monitor.corrected_.index >= oldest]
+    records = records[list(trained.columns)].sort_index()
+    records = records[~records.index.isin(trained.index) & (True if since is None else records.index >= since)]
+    margin = max(7 * DAY, monitor.lookback_.duration(usual_step(trained.index)))
+    new, excluded = may_train(_until(records, until), events, monitor.faults_, margin, is_in_place=not is_given)
+    n_weeks = len(np.unique((new.index - new.index.min()) // (7 * DAY)))
     if n_weeks < 3:
-        come = f"{counted(len(new), 'new record')} in {counted(n_weeks, 'week')}; expected 3 weeks or more"
-        return _none("refit", come if len(new) else "there are no records since the baseline that may train", excluded)
-    baseline = pd.concat([monitor.trained_, new])
+        come = f"{counted(len(new), 'new record')} in {counted(n_weeks, 'week')} may train; expected 3 weeks or more"
+        come = come if len(new) else "there are no records since the baseline that may train"
+        return Retraining("refit", False, (come,), (), pd.DataFrame(), excluded)
+    baseline = pd.concat([trained, new])
     if prior is not None:
         own = baseline[baseline.index >= since]
         moved = at_new_level(monitor, prior, own)[1]
         baseline, prior = pd.concat([moved, own]), prior if len(moved) else None
-    is_harmless, events = np.zeros(len(baseline), dtype=bool), monitor.events_
+    is_harmless = np.zeros(len(baseline), dtype=bool)
     for event in events[events["harmless"]].itertuples():
         is_harmless |= (baseline.index >= event.start) & (pd.isna(event.end) | (baseline.index <= event.end))
-    changes = level_changes(baseline[~is_harmless], targets, new.index[0])
-    reasons, step, steady = [*objections(changes)], changes[0], changes[-1]
-    years = (baseline.index[-1] - baseline.index[0]) / YEAR
-    table = pd.DataFrame(
-        {
-            "change": step.change,
-            "standard_error": step.standard_error,
-            "per_year": steady.change / years,
-            "per_year_error": steady.standard_error / years,
-        }
-    )
+    changes = level_changes(baseline[~is_harmless], list(monitor.targets_), new.index[0])
+    reasons, notes = what_speaks(changes)
+    step, steady, years = changes[0], changes[-1], (baseline.index[-1] - baseline.index[0]) / YEAR
+    columns = {
+        "change": step.change,
+        "standard_error": step.standard_error,
+        "per_year": steady.change / years,
+        "per_year_error": steady.standard_error / years,
+    }
     learned = {"baseline": baseline, "prior": prior, "since": since, "detector": _fitted(monitor, baseline)}
-    notes = tuple(notes_of(changes))
-    return Retraining("refit", force or not reasons, tuple(reasons), notes, table, excluded, **learned)
+    accepted = force or not reasons
+    return Retraining("refit", accepted, reasons, notes, pd.DataFrame(columns), excluded, **learned)
 
 
 def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
@@ -163,38 +164,43 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
     trained = trained[trained.index >= first]
     known = pd.concat([trained, kept[~kept.index.isin(trained.index)]]).sort_index()
     own, excluded = may_train(_until(known[known.index >= since], until), damage, monitor.faults_, is_in_place=True)
-    missing = [str(name) for name in monitor.targets_ if not len(own) or own[name].notna().sum() < 2]
+    missing = [str(name) for name in monitor.targets_ if own[name].notna().sum() < 2]
     if missing:
-        return _none("new baseline", f"fewer than two records of {listed(missing)} since {since}", excluded)
+        few = f"fewer than two records of {listed(missing)} since {since}"
+        return Retraining("new baseline", False, (few,), (), pd.DataFrame(), excluded)
     table, moved = at_new_level(monitor, prior, own)
     baseline = pd.concat([moved, own])
-    notes = [
+    note = (
         f"{counted((own.index[-1] - own.index[0]).days + 1, 'day')} and {counted(len(own), 'record')} since "
         f"{since:%Y-%m-%d %H:%M}; {counted(len(moved), 'older record')}, moved to the new level, stand for weather not "
         "met since"
-    ]
+    )
     learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since}
-    learned["detector"] = _fitted(monitor, baseline)
-    return Retraining("new baseline", True, (), tuple(notes), table, excluded, **learned)
+    return Retraining(
+        "new baseline", True, (), (note,), table, excluded, **learned, detector=_fitted(monitor, baseline)
+    )
 
 
 def may_train(
     records: pd.DataFrame,
     events: pd.DataFrame,
     faults: pd.DataFrame,
-    margin: pd.Timedelta = WEEK,
+    margin: pd.Timedelta = 7 * DAY,
     *,
     is_in_place: bool = False,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Records outside events that nobody called harmless, without values of faulty sensors; the others, with reasons.
 
+    A change may have begun within the ``margin`` before the first alarm of an event.
     Modes that were exchanged for a time stand in their place already with ``is_in_place``.
     """
     kept, masked, rows = np.ones(len(records), dtype=bool), records.copy(), []
-    for start, end, reason in _spans(events, margin):
-        inside = (records.index >= start) & (pd.isna(end) | (records.index <= end))
+    for event in events[~events["harmless"] & (events["kind"] != WATCH)].itertuples():
+        start = event.start - margin
+        inside = (records.index >= start) & (pd.isna(event.end) | (records.index <= event.end))
         kept &= ~inside
-        rows.append((start, end, "all", int(inside.sum()), reason))
+        reason = f"event {event.Index} ({event.kind}), {'' if event.acknowledged else 'not '}acknowledged"
+        rows.append((start, event.end, "all", int(inside.sum()), reason))
     for fault in faults.itertuples():
         if (is_in_place and fault.kind == "swapped") or fault.column not in records:  # or the sensor is a reference
             continue
@@ -214,22 +220,22 @@ class LevelChange:
 
     Changes are relative, or in the unit of a response that is not positive. ``size`` is their length in standard
     deviations of a day's noise, ``p_value`` the probability of one as large by chance, allowing for ``what`` else was
-    tried.
+    tried, and ``is_clear`` says whether weather could hide it.
     """
 
     what: str
     change: pd.Series
     standard_error: pd.Series
-    scatter: pd.Series
     size: float
     p_value: float
+    is_clear: bool
 
-    def sentence(self) -> str:
+    def __str__(self) -> str:
         worst = (self.change / self.standard_error).abs().idxmax()
-        change = f"{self.change[worst]:+.2g} +- {self.standard_error[worst]:.1g}"
         return (
-            f"{self.what}, with the weather taken out, {worst} changes by {change} (of its level, or in its unit), all "
-            f"modes together by {self.size:.2g} standard deviations of a day (p value {probability_text(self.p_value)})"
+            f"{self.what}, beside the weather, {worst} changes by {self.change[worst]:+.2g} +- "
+            f"{self.standard_error[worst]:.1g}, all modes together by {self.size:.2g} standard deviations of a day "
+            f"(p value {probability_text(self.p_value)})"
         )
 
 
@@ -247,52 +253,47 @@ def level_changes(records: pd.DataFrame, targets: list[Any], since: pd.Timestamp
     daily_T, daily_y = daily_means(records.drop(columns=targets), y)
     T, y, days = daily_T.to_numpy(), daily_y.to_numpy(), daily_y.index
     X = DailyWeather.fitted(T, half_lives=(5.0,)).of_days(T)[0] if T.shape[1] else np.ones((len(y), 1))
-    first = days.searchsorted(since, side="right") - 1
-    places = np.arange(len(days))
+    first, places = days.searchsorted(since, side="right") - 1, np.arange(len(days))
     profiles = {
         f"from {days[start]:%Y-%m-%d} on": (places >= start).astype(float)
         for start in range(first, max(len(days) - 20, first + 1), 30)
     }
     for what, start in (("steadily over the new records", first), ("steadily over all records", 0)):
         profiles[what] = np.maximum((places - start) / max(len(days) - 1 - start, 1), 0.0)
-    found = []
+    found, n = [], len(targets)
     for what, profile in profiles.items():
         equations, noise = regressed(np.column_stack([X, profile]), y, 1, lasts_for_months=False)
         freedom = noise.independent((~np.isnan(y)).sum(axis=0).max()) - X.shape[1]
-        trend = ModeTrends.fitted(equations, noise, np.eye(y.shape[1]), 1, freedom)
+        trend = ModeTrends.fitted(equations, noise, np.eye(n), 1, freedom)
         day = noise.covariance / (1 - noise.correlation**2)
-        size = float(np.sqrt(trend.mean @ np.linalg.solve(day, trend.mean)))
-        errors = (trend.mean, np.sqrt(np.diag(trend.covariance)), np.sqrt(np.diag(day)))
-        named = (pd.Series(one, pd.Index(targets)) * scale for one in errors)
-        found.append(LevelChange(what, *named, size, min(_hotelling(trend) * len(profiles), 1.0)))
+        squares = [float(trend.mean @ np.linalg.solve(one, trend.mean)) for one in (trend.covariance, day)]
+        own = max(freedom - n + 1, 1.0)
+        p_value = stats.f.sf(squares[0] * own / (n * max(freedom, n)), n, own) * len(profiles)
+        errors = np.sqrt(np.diag(trend.covariance))
+        is_clear = bool(np.median(errors / np.sqrt(np.diag(day))) <= 0.5)
+        named = (pd.Series(one, pd.Index(targets)) * scale for one in (trend.mean, errors))
+        found.append(LevelChange(what, *named, squares[1] ** 0.5, min(float(p_value), 1.0), is_clear))
     return found
 
 
-def _hotelling(trend: ModeTrends) -> float:
-    """Probability of changes of all modes that are together as far from zero by chance."""
-    size, freedom = len(trend.mean), max(trend.freedom - len(trend.mean) + 1, 1.0)
-    squared = float(trend.mean @ np.linalg.solve(trend.covariance, trend.mean))
-    return float(stats.f.sf(squared * freedom / (size * max(trend.freedom, size)), size, freedom))
-
-
-def objections(changes: list[LevelChange], chance: float = 1e-3, matters: float = 0.2) -> Iterator[str]:
-    """What speaks against learning from new records: a change beyond chance that moves a detector's rates."""
-    clearest = min(changes, key=lambda one: one.p_value)
-    if clearest.p_value < chance and clearest.size > matters:
-        what = f"the new records are not those of the baseline's structure: {clearest.sentence()}"
-        yield f"{what}; a detector fitted to them would not detect that change"
-
-
-def notes_of(changes: list[LevelChange]) -> Iterator[str]:
-    """What the engineer should know besides."""
-    clearest, step = min(changes, key=lambda one: one.p_value), changes[0]
-    if clearest.p_value < 0.01 and not [*objections(changes)]:
-        yield f"small but significant change: {clearest.sentence()}"
-    if (step.standard_error / step.scatter).median() > 0.5:
-        yield (
+def what_speaks(
+    changes: list[LevelChange], chance: float = 1e-3, matters: float = 0.2
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What speaks against learning: a change beyond chance that moves a detector's rates; and notes."""
+    clearest, step, notes = min(changes, key=lambda one: one.p_value), changes[0], []
+    reasons = (
+        f"the new records are not those of the baseline's structure: {clearest}; a detector fitted to them would not "
+        "detect that change",
+    )
+    if clearest.p_value >= chance or clearest.size <= matters:
+        reasons = ()
+        notes += [f"small but significant change: {clearest}"] if clearest.p_value < 0.01 else []
+    if not step.is_clear:
+        notes.append(
             "the new records have hardly any weather in common with the baseline: a change between the two of up "
             f"to {2 * step.standard_error.median():.2g} could not be distinguished from weather"
         )
+    return reasons, tuple(notes)
 
 
 def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -305,17 +306,18 @@ def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[
     targets = list(monitor.targets_)
     old, new, is_relative = residuals_of(monitor.detector_, prior, own, targets)
     counts = new.notna().sum()
-    lasting = pd.Series(correlation_times(old.to_numpy()), old.columns)
-    n_independent = (counts / lasting).clip(lower=1.0)
-    table = pd.DataFrame({"change": new.mean(), "standard_error": old.std() / np.sqrt(n_independent)})
-    week = np.asarray((prior.index - prior.index[0]) // WEEK)
+    n_independent = (counts / pd.Series(correlation_times(old.to_numpy()), old.columns)).clip(lower=1.0)
+    week = np.asarray((prior.index - prior.index[0]) // (7 * DAY))
     errors = old.cov().fillna(0.0).to_numpy() / np.sqrt(np.outer(n_independent, n_independent))
     random = check_random_state(monitor.random_state)
     missed = random.multivariate_normal(np.zeros(len(targets)), errors, week.max() + 1)[week]
-    values, change, moved = prior[targets].to_numpy(), table["change"].to_numpy(), prior.copy()
+    values, change, moved = prior[targets].to_numpy(), new.mean().to_numpy(), prior.copy()
     moved[targets] = np.where(is_relative, values * np.exp(change - missed), values + change - missed)
-    table["change"] = np.where(is_relative, np.expm1(change), change)
-    return table.assign(n_records=counts), moved[_season_is_missing(prior.index, own.index)]
+    table = pd.DataFrame({"change": np.where(is_relative, np.expm1(change), change)}, old.columns)
+    table = table.assign(standard_error=old.std() / np.sqrt(n_independent), n_records=counts)
+    middle = pd.Series(prior.index).groupby(week).transform(lambda some: some.iloc[len(some) // 2]).dt.day_of_year
+    distance = np.abs(middle.to_numpy()[:, np.newaxis] - np.unique(own.index.day_of_year))
+    return table, moved[np.minimum(distance, YEAR / DAY - distance).min(axis=1) > 3.5]
 
 
 def residuals_of(
@@ -326,17 +328,17 @@ def residuals_of(
     Also which are relative, ln f - ln f expected. Without weather, they are departures from the mean.
     """
     if len(baseline.columns) == len(targets):
-        level, is_relative = baseline[targets].mean(), (baseline[targets].min() > 0).to_numpy()
+        level, is_relative = baseline[targets].mean(), baseline[targets].min() > 0
         old, own = (
             np.log((one / level).where(is_relative, 1.0)).where(is_relative, one - level)
             for one in (baseline[targets], new[targets])
         )
-        return old, own, is_relative
+        return old, own, is_relative.to_numpy()
     plain = TemperatureCompensator(targets=targets)
     for part in compensators_of(detector):
         is_whole = isinstance(part, CompensatedDetector)
         plain = TemperatureCompensator(part.regressor, targets=part.targets, cv=part.cv) if is_whole else clone(part)
-    with without_warnings():
+    with collected(drop_others=True):
         left = np.asarray(plain.fit_transform(baseline)), np.asarray(plain.transform(new))
     names = list(plain.get_feature_names_out())
     old, own = (
@@ -345,42 +347,10 @@ def residuals_of(
     return old, own, pd.Series(plain.relative_, names)[targets].to_numpy()
 
 
-def _season_is_missing(old: pd.DatetimeIndex, new: pd.DatetimeIndex) -> Array:
-    """Which old records are of a week of the year that no new record is near, within half a week."""
-    week = np.asarray((old - old[0]) // WEEK)
-    middle = pd.Series(old).groupby(week).transform(lambda some: some.iloc[len(some) // 2]).dt.day_of_year.to_numpy()
-    distance = np.abs(middle[:, np.newaxis] - np.unique(new.day_of_year))
-    return np.minimum(distance, YEAR / DAY - distance).min(axis=1) > WEEK.days / 2
-
-
 def _fitted(monitor: Any, baseline: pd.DataFrame) -> BaseEstimator:
-    with without_warnings():
+    with collected(drop_others=True):
         return clone(monitor.detector_).fit(baseline[monitor.features_])
-
-
-def _kept(monitor: Any, records: pd.DataFrame | None) -> pd.DataFrame:
-    """Given records, or those that the monitor keeps as its detector saw them, that are not in the baseline."""
-    if records is None:
-        start = monitor.last_ - check_duration(monitor.retention, "retention")
-        records = monitor.corrected_[monitor.corrected_.index >= start]
-    records = records[list(monitor.trained_.columns)].sort_index()
-    is_new = ~records.index.isin(monitor.trained_.index)
-    return records[is_new if monitor.since_ is None else is_new & (records.index >= monitor.since_)]
 
 
 def _until(records: pd.DataFrame, until: Any) -> pd.DataFrame:
     return records if until is None else records[records.index <= check_stamp(until, records.index, "until")]
-
-
-def _none(kind: str, reason: str, excluded: pd.DataFrame) -> Retraining:
-    return Retraining(kind, False, (reason,), (), pd.DataFrame(), excluded)
-
-
-def _spans(events: pd.DataFrame, margin: pd.Timedelta) -> Iterator[tuple[Any, Any, str]]:
-    for number, event in zip(events.index, events.itertuples(), strict=True):
-        if event.harmless or event.kind == WATCH:
-            continue
-        is_open = pd.isna(event.end)
-        state = "acknowledged, but not as harmless" if event.acknowledged else "not acknowledged"
-        still = ", and still open: nothing after its start may train" if is_open else ""
-        yield event.start - margin, event.end, f"event {number} ({event.kind}), {state}{still}"

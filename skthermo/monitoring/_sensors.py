@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -19,7 +19,6 @@ from skthermo.residuals.gaussian import Gaussian
 
 Counts = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-COLUMNS = ["column", "kind", "since", "detected", "until", "detail"]
 
 
 @dataclass(frozen=True)
@@ -39,23 +38,20 @@ class Fault:
     until: int | None = None
 
     def detail(self, other: Hashable, unit: str) -> str:
-        value, beside = quantity(self.size, unit, 6), "beside what the other thermometers predict; left out"
+        value = f"{self.size:.6g} {unit}".rstrip()
         return {
             "dead": "has had no value for longer than gaps of the baseline",
             "stuck": f"repeats {value}; left out",
             "implausible": f"shows implausible values, such as {value}; left out",
-            "offset": f"{self.size:+.1f} degrees {beside}",
-            "drift": f"{self.rate * YEAR.days / 12:+.2f} degrees a month, {self.size:+.1f} so far, {beside}",
+            "offset": f"{self.size:+.1f} degrees beside the other thermometers; left out",
+            "drift": f"{self.rate * YEAR.days / 12:+.2f} degrees a month beside the other thermometers; left out",
             "swapped": f"its values are in the column of {other!r}; put back in place",
         }[self.kind]
 
 
 @dataclass(frozen=True)
 class WatchState:
-    """Records of the last days, and all faults in the order in which they were detected.
-
-    ``means`` are daily means of the thermometers over the last months, of ``days_of_means``.
-    """
+    """Records of the last days, daily means of thermometers over the last months, and all faults as they were found."""
 
     stamps: Counts
     days: Counts
@@ -71,19 +67,18 @@ class WatchState:
         """By position of each column that is left out, the fault for which it is."""
         return {fault.column: fault for fault in self.lasting("dead", "stuck", "implausible", "offset", "drift")}
 
-    def opened(self, fault: Fault) -> WatchState:
-        return replace(self, faults=(*self.faults, fault))
+    def opened(self, *args: Any, **values: Any) -> WatchState:
+        return replace(self, faults=(*self.faults, Fault(*args, **values)))
 
     def changed(self, fault: Fault, **values: Any) -> WatchState:
         return replace(self, faults=tuple(replace(one, **values) if one is fault else one for one in self.faults))
 
-    def in_place(self, responses: Array, n_sensors: int) -> Array:
-        """Responses with exchanged ones back in their columns."""
-        responses = responses.copy()
+    def in_place(self, values: Array) -> Array:
+        """Values with exchanged ones back in their columns."""
+        order = np.arange(values.shape[1])
         for fault in self.lasting("swapped"):
-            pair = np.array([fault.column, fault.other]) - n_sensors
-            responses[:, pair] = responses[:, pair[::-1]]
-        return responses
+            order[[fault.column, fault.other]] = order[[fault.other, fault.column]]
+        return values[:, order]
 
 
 @dataclass(frozen=True)
@@ -103,72 +98,64 @@ class Watched:
 
 @dataclass(frozen=True)
 class Thermometers:
-    """Daily means of thermometers, each predicted by the others.
+    """Daily means of thermometers, each predicted from the others and, after a whole year, the season.
 
-    ``usual`` are coefficients of the season, ``together`` is the distribution of anomalies beside it, ``known`` has the
-    lowest and highest ones, and ``limits``, (n_windows, n_thermometers), are medians of departures that are beyond
-    chance, of the `windows`.
+    ``known`` are the lowest and highest means of the baseline; ``limits``, (n_windows, n_thermometers), medians of
+    departures that are beyond chance, of the `windows`.
     """
 
-    usual: Array
     together: Gaussian
     known: Array
-    limits: Array = field(default_factory=lambda: np.empty((0, 0)))
+    limits: Array
 
     @classmethod
     def fitted(cls, days: Counts, means: Array, least: float = 1.0, sigmas: float = 5.0) -> Thermometers:
-        """Learn from the daily means of a baseline.
+        """Limits are so many standard deviations of a median, as far as the baseline itself goes, and a degree."""
+        has_season = bool(days[-1] - days[0] >= 330)
+        rows = np.hstack([means, harmonics(days)]) if has_season else means
+        folds = days // 15 % 5 if has_season else np.arange(len(days)) * 5 // len(days)
 
-        Limits are so many standard deviations of a median, as far as the baseline itself goes, and a degree.
-        """
+        def learned(train: NDArray[np.intp]) -> Thermometers:
+            found = Gaussian.fitted(rows[train][~np.isnan(means[train]).all(axis=1)])
+            own = np.diag(1e-6 * np.diag(found.covariance) + 0.05**2)  # thermometers are not better than that
+            known = np.array([f.reduce(means[train]) for f in (np.fmin, np.fmax)])
+            return cls(Gaussian(found.mean, found.covariance + own), known, np.empty(0))
 
-        def departures_by(train: NDArray[np.intp]) -> Any:
-            part = cls._learned(days[train], means[train], has_season)
+        def departures(train: NDArray[np.intp]) -> Any:
+            part = learned(train)
             return lambda test: part.departures(days[test], means[test])
 
-        has_season = bool(days[-1] - days[0] >= 330)
-        folds = days // 15 % 5 if has_season else np.arange(len(days)) * 5 // len(days)
-        rest = out_of_fold(departures_by, folds)
+        rest = out_of_fold(departures, folds)
         found = np.array([windows(rest[max(stop - 40, 0) : stop]) for stop in range(1, len(rest) + 1)])
         spread = sigmas * robust_deviation(found.reshape(len(found), -1)).reshape(found.shape[1:])
         largest = 1.2 * np.nanmax(np.abs(found), axis=0, initial=0.0)
-        limits = np.fmax(np.fmax(spread, largest), least)
-        return replace(cls._learned(days, means, has_season), limits=limits)
-
-    @classmethod
-    def _learned(cls, days: Counts, means: Array, has_season: bool) -> Thermometers:
-        waves = season(days)[:, : 5 if has_season else 1]
-        usual = np.zeros((5, means.shape[1]))
-        for sensor, column in enumerate(means.T):
-            known = ~np.isnan(column)
-            usual[: waves.shape[1], sensor] = np.linalg.lstsq(waves[known], column[known], rcond=1e-8)[0]
-        anomalies = means - season(days) @ usual
-        found = Gaussian.fitted(anomalies[~np.isnan(anomalies).all(axis=1)])
-        own = np.diag(1e-6 * np.diag(found.covariance) + 0.05**2)  # thermometers are not better than that
-        known = np.array([np.fmin.reduce(anomalies), np.fmax.reduce(anomalies)])
-        return cls(usual, Gaussian(found.mean, found.covariance + own), known)
+        return replace(learned(np.arange(len(days))), limits=np.fmax(np.fmax(spread, largest), least))
 
     def departures(self, days: Counts, means: Array, trusted: Mask | None = None) -> Array:
         """Daily means less what the other trusted thermometers predict; NaN where either has no value.
 
         In weather that the baseline does not have, only what goes beyond the prediction's own change by it counts.
         """
-        anomalies, found = means - season(days) @ self.usual, np.full(means.shape, np.nan)
-        for sensor in range(means.shape[1]):
-            others = anomalies if trusted is None else np.where(trusted, anomalies, np.nan)
-            others = np.where(np.arange(means.shape[1]) == sensor, np.nan, others)
-            expected, within = (
-                self.together.completed(one)[0][:, sensor] for one in (others, np.clip(others, *self.known))
+        n, found = means.shape[1], np.full(means.shape, np.nan)
+        season = harmonics(days)[:, : len(self.together.mean) - n]
+        for sensor in range(n):
+            others = np.where(
+                np.arange(n) == sensor, np.nan, means if trusted is None else np.where(trusted, means, np.nan)
             )
-            rest, beyond = anomalies[:, sensor] - expected, np.abs(expected - within) / 2
+            has_others = ~np.isnan(others).all(axis=1)
+            expected, within = (
+                np.where(has_others, self.together.completed(np.hstack([one, season]))[0][:, sensor], np.nan)
+                for one in (others, np.clip(others, *self.known))
+            )
+            rest, beyond = means[:, sensor] - expected, np.abs(expected - within) / 2
             found[:, sensor] = np.sign(rest) * np.maximum(np.abs(rest) - beyond, 0.0)
         return found
 
 
-def season(days: Counts) -> Array:
-    """A constant, and two harmonics of the year."""
+def harmonics(days: Counts) -> Array:
+    """Two harmonics of the year."""
     angle = 2 * np.pi * days[:, np.newaxis] / (YEAR / DAY)
-    return np.hstack([np.ones_like(angle), np.sin(angle), np.cos(angle), np.sin(2 * angle), np.cos(2 * angle)])
+    return np.hstack([np.sin(angle), np.cos(angle), np.sin(2 * angle), np.cos(2 * angle)])
 
 
 def windows(rest: Array) -> Array:
@@ -176,37 +163,20 @@ def windows(rest: Array) -> Array:
 
     NaN where fewer than half of the days have a value, (n_windows, n_thermometers).
     """
-    last = {n_days: median_of_most(rest[-n_days:], n_days) for n_days in (3, 7, 30)}
-    steps = [last[n_days] - median_of_most(rest[-30 - n_days : -n_days], 30) for n_days in (3, 7)]
-    return np.array([*last.values(), *steps])
 
+    def typical(rows: Array, n_days: int) -> Array:
+        is_known = (~np.isnan(rows)).sum(axis=0) > n_days / 2
+        return np.where(is_known, median(rows) if len(rows) else np.nan, np.nan)
 
-def median_of_most(rows: Array, n_days: int) -> Array:
-    """Medians of columns that have a value on most of so many days; else NaN."""
-    known = (~np.isnan(rows)).sum(axis=0)
-    return np.where(known > n_days / 2, median(rows) if len(rows) else np.nan, np.nan)
-
-
-def start_of_change(days: Counts, rest: Array) -> tuple[int, float, float]:
-    """Day from which departures have an offset or drift, its size on the last day, and rate in a day.
-
-    The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
-    """
-    known = ~np.isnan(rest)
-    at, values = days[known].astype(float), rest[known]
-    slow = at[: max(len(at) - 6, 0)]
-    shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
-    shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
-    gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
-    best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
-    first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
-    return first, size, float(size / (at[-1] - first + 1)) if is_drift[best] else 0.0
+    last = {n_days: typical(rest[-n_days:], n_days) for n_days in (3, 7, 30)}
+    return np.array([*last.values(), *(last[n] - typical(rest[-30 - n : -n], 30) for n in (3, 7))])
 
 
 @dataclass(frozen=True)
 class Responses:
     """Responses in their own units beside what the weather predicts.
 
+    ``together`` is the distribution of temperatures and of responses in robust deviations from their ``centre``.
     ``limits`` are departures from which a value that moves alone is implausible: more than 25 robust deviations, a
     quarter of its level, and three times the departure that one value in a thousand of the baseline exceeds.
     ``deviations`` are those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may
@@ -216,8 +186,7 @@ class Responses:
     together: Gaussian
     centre: Array
     scatter: Array
-    lowest: Array
-    highest: Array
+    reach: Array
     limits: Array
     deviations: Array
     pairs: list[tuple[int, int]]
@@ -228,35 +197,28 @@ class Responses:
         least = 1e-4 * np.fmax(np.where(scatter > 0, scatter, np.abs(centre)), 1e-8)
         scatter = np.fmax(scatter, least)
         rows = np.hstack([temperatures, (values - centre) / scatter])
-        together = Gaussian.fitted(rows[~np.isnan(rows).all(axis=1)])
-        own = np.diag(1e-6 * np.maximum(np.diag(together.covariance), 1e-8))
-        bare = cls(
-            Gaussian(together.mean, together.covariance + own),
-            centre,
-            scatter,
-            *(f.reduce(values) for f in (np.fmin, np.fmax)),
-            scatter,
-            scatter,
-            [],
-        )
+        found = Gaussian.fitted(rows[~np.isnan(rows).all(axis=1)])
+        own = np.diag(1e-6 * np.maximum(np.diag(found.covariance), 1e-8))
+        reach = np.array([f.reduce(values) for f in (np.fmin, np.fmax)])
+        together = Gaussian(found.mean, found.covariance + own)
+        bare = cls(together, centre, scatter, reach, scatter, scatter, [])
         rest = bare.residuals(temperatures, values)[0]
         usual = np.fmax(25 * robust_deviation(rest), 0.25 * np.abs(centre))
-        reached = 3 * np.nanquantile(np.abs(rest), 0.999, axis=0)
-        by_day = pd.DataFrame(rest).groupby(days).median().to_numpy()
+        limits = np.fmax(usual, 3 * np.nanquantile(np.abs(rest), 0.999, axis=0))
+        deviations = np.fmax(robust_deviation(pd.DataFrame(rest).groupby(days).median().to_numpy()), least)
         sizes = np.fmax(np.abs(centre), scatter), scatter
         pairs = [
             (a, b)
             for a, b in combinations(range(len(centre)), 2)
-            if units[a] == units[b] and all(max(size[[a, b]]) <= 10 * min(size[[a, b]]) for size in sizes)
+            if units[a] == units[b] and all(max(size[a], size[b]) <= 10 * min(size[a], size[b]) for size in sizes)
         ]
-        limits, deviations = np.fmax(usual, reached), np.fmax(robust_deviation(by_day), least)
         return replace(bare, limits=limits, deviations=deviations, pairs=pairs)
 
     def residuals(self, temperatures: Array, values: Array) -> tuple[Array, Array]:
         """Responses minus those that the weather predicts, and these."""
         rows = np.hstack([temperatures, np.full(values.shape, np.nan)])
         expected = self.centre + self.scatter * self.together.completed(rows)[0][:, temperatures.shape[1] :]
-        expected = np.clip(np.where(np.isnan(expected), self.centre, expected), self.lowest, self.highest)
+        expected = np.clip(np.where(np.isnan(expected), self.centre, expected), *self.reach)
         return values - expected, expected
 
     def implausible(self, values: Array, rest: Array) -> Mask:
@@ -265,10 +227,9 @@ class Responses:
         Whatever the others do, none is a thousand times as far, and none zero or below where the baseline is above.
         """
         size = np.abs(rest) / self.limits
-        with np.errstate(invalid="ignore"):
-            far, never = size > 1, (size > 1000) | ((values <= 0) & (self.lowest > 0))
-        alone = np.zeros(far.shape, dtype=bool)
+        far, never = size > 1, (size > 1000) | ((values <= 0) & (self.reach[0] > 0))
         rows = far.any(axis=1) & (rest.shape[1] >= 3)
+        alone = np.zeros(far.shape, dtype=bool)
         alone[rows] = far[rows] & (median(size[rows].T) < 0.2)[:, np.newaxis]
         return alone | never
 
@@ -319,10 +280,8 @@ class SensorWatch:
     zone: str
     weather: Plausible
     runs: Counts
-    least: float
-    span: int
+    per_day: float
     thermometers: Thermometers | None
-    filler: Gaussian
     expected: Responses
 
     @classmethod
@@ -338,34 +297,26 @@ class SensorWatch:
 
         ``reference`` names columns of T, ``units`` are texts by column.
         """
-        by_sensor = columns_by_sensor(T)
-        order = np.argsort(T.index.asi8, kind="stable")
-        stamps, columns = T.index[order], list(by_sensor.values())
-        temperatures, responses = as_floats(T)[order][:, [own[0] for own in columns]], as_floats(F)[order]
+        by_sensor, T, F = columns_by_sensor(T), T.sort_index(kind="stable"), F.sort_index(kind="stable")
+        columns, days, n_sensors = list(by_sensor.values()), local_days(T.index), len(by_sensor)
+        temperatures, responses = as_floats(T)[:, [own[0] for own in columns]], as_floats(F)
         texts = [dict(units or {}).get(name, "") for name in (*by_sensor, *F.columns)]
-        days = local_days(stamps)
         n_days = len(np.unique(days))
-        per_day, n_sensors = len(stamps) / max(n_days, 1), len(columns)
-        least, thermometers = 0.3 * per_day, None
+        per_day, thermometers = len(days) / max(n_days, 1), None
         if n_sensors > 1 and n_days >= 3 * n_sensors + 5 and not np.isnan(temperatures).all(axis=0).any():
-            thermometers = Thermometers.fitted(*means_by_day(days, temperatures, least))
-        known = temperatures[~np.isnan(temperatures).all(axis=1)] if n_sensors else np.empty((0, 0))
-        filler = Gaussian.fitted(known) if known.size else Gaussian(np.empty(0), np.empty((0, 0)))
-        runs = run_limits(np.hstack([temperatures, responses]), per_day)
+            thermometers = Thermometers.fitted(*means_by_day(days, temperatures, 0.3 * per_day))
         return cls(
-            list(by_sensor),
-            columns,
-            np.array([sensor in set(reference) for sensor in by_sensor], dtype=bool),
-            list(F.columns),
-            texts,
-            "" if stamps.tz is None else str(stamps.tz),
-            Plausible.of_weather(temperatures),
-            runs,
-            least,
-            5 + int(np.ceil(runs.max(initial=0) / per_day)),
-            thermometers,
-            filler,
-            Responses.fitted(temperatures, responses, days, texts[n_sensors:]),
+            sensors=list(by_sensor),
+            columns=columns,
+            is_reference=np.array([sensor in set(reference) for sensor in by_sensor], dtype=bool),
+            modes=list(F.columns),
+            units=texts,
+            zone="" if T.index.tz is None else str(T.index.tz),
+            weather=Plausible.of_weather(temperatures),
+            runs=run_limits(np.hstack([temperatures, responses]), per_day),
+            per_day=per_day,
+            thermometers=thermometers,
+            expected=Responses.fitted(temperatures, responses, days, texts[n_sensors:]),
         )
 
     def start(self) -> WatchState:
@@ -379,107 +330,112 @@ class SensorWatch:
         """
         names = [*self.sensors, *self.modes]
         rows = [
-            [names[own], one.kind, one.since, one.detected, one.until, one.detail(names[other], self.units[own])]
+            (names[own], one.kind, one.since, one.detected, one.until, one.detail(names[other], self.units[own]))
             for one in state.faults
             for own, other in [(one.column, one.other), (one.other, one.column)][: 1 if one.other < 0 else 2]
         ]
-        columns = dict(zip(COLUMNS, zip(*rows, strict=True) if rows else [()] * len(COLUMNS), strict=True))
-        table = {name: pd.Series(list(values), dtype=object) for name, values in columns.items()}
-        return pd.DataFrame(
-            table | {name: as_index(columns[name], self.zone) for name in ("since", "detected", "until")}
-        )
+        table = pd.DataFrame(rows, columns=["column", "kind", "since", "detected", "until", "detail"], dtype=object)
+        stamps = ("since", "detected", "until")
+        return table.assign(**{name: as_index(table[name].tolist(), self.zone) for name in stamps})
 
     def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Watched:
         """Records without what sensors at fault show: NaN there, and exchanged responses back in place.
 
         What has been ``acknowledged`` as a fault of a sensor, at times in nanoseconds, is not held afterwards.
         """
-        n_sensors, own = len(self.sensors), [columns[0] for columns in self.columns]
-        temperatures, responses = as_floats(T).copy(), state.in_place(as_floats(F), n_sensors)
-        given = np.hstack([temperatures[:, own], responses])
-        is_far, _, expected = self._evaluated(given)
-        far = is_far[:, n_sensors:]
-        out = np.isin(np.arange(given.shape[1]), list(state.left_out()))
-        removed = (is_far | out) & ~np.isnan(given)
-        held, moments = far.copy(), T.index.as_unit("ns").asi8
-        for column, fault in state.left_out().items():
-            if column >= n_sensors and fault.kind in ("stuck", "implausible"):
+        n, own = len(self.sensors), [columns[0] for columns in self.columns]
+        values, out = as_floats(T).copy(), state.left_out()
+        given = state.in_place(np.hstack([values[:, own], as_floats(F)]))
+        is_far, is_out = self._evaluated(given)[0], np.isin(np.arange(given.shape[1]), list(out))
+        removed, held = (is_far | is_out) & ~np.isnan(given), is_far[:, n:].copy()
+        for column, fault in out.items():
+            if column >= n and fault.kind in ("stuck", "implausible"):
                 said = [time for time in acknowledged if time >= fault.since]
-                held[:, column - n_sensors] = moments <= min(said) if said else True
-        notes = self._notes(state, given, is_far & ~out, expected)
-        for sensor, columns in enumerate(self.columns):
-            temperatures[removed[:, sensor], columns[0]] = np.nan
-            if out[sensor]:
-                temperatures[:, columns] = np.nan
+                held[:, column - n] = T.index.as_unit("ns").asi8 <= min(said) if said else True
+        kept = np.where(removed, np.nan, given)
+        for sensor in np.flatnonzero(is_out[:n]):
+            values[:, self.columns[sensor]] = np.nan
+        values[:, own] = kept[:, :n]
         if self.is_reference.any():
-            filled = self.filler.completed(temperatures[:, own])[0]
-            temperatures[:, own] = np.where(np.isnan(temperatures[:, own]), filled, temperatures[:, own])
-        kept = T.columns.delete(
-            [k for columns, is_one in zip(self.columns, self.is_reference, strict=True) if is_one for k in columns]
-        )
-        responses = np.where(removed[:, n_sensors:], np.nan, responses)
-        return Watched(frame_like(T, temperatures)[kept], frame_like(F, responses), held, notes, removed.sum(axis=1))
+            rows = np.hstack([kept[:, :n], np.full((len(kept), len(self.modes)), np.nan)])
+            values[:, own] = self.expected.together.completed(rows)[0][:, :n]
+        references = [
+            k for columns, is_one in zip(self.columns, self.is_reference, strict=True) if is_one for k in columns
+        ]
+        inputs = frame_like(T, values)[T.columns.delete(references)]
+        notes = self._notes(state, given, is_far & ~is_out)
+        return Watched(inputs, frame_like(F, kept[:, n:]), held, notes, removed.sum(axis=1))
+
+    def _notes(self, state: WatchState, given: Array, far: Mask) -> list[str]:
+        """What was left out of each record, and why."""
+        names = [*map(str, self.sensors), *map(str, self.modes)]
+        lasting = [
+            f"{names[one.column]} is left out ({one.kind} since {as_index([one.since], self.zone)[0]:%Y-%m-%d})"
+            for one in state.left_out().values()
+        ]
+        lasting += [
+            f"{names[one.column]} and {names[one.other]} are exchanged and were put back in place"
+            for one in state.lasting("swapped")
+        ]
+        notes = ["; ".join(lasting)] * len(given)
+        for row in np.flatnonzero(far.any(axis=1)):
+            values = [f"{names[k]} is {given[row, k]:.4g} {self.units[k]}".rstrip() for k in np.flatnonzero(far[row])]
+            notes[row] = "; ".join([f"{', '.join(values)}: implausible, left out", *lasting])
+        return notes
 
     def advance(self, state: WatchState, T_day: pd.DataFrame, F_day: pd.DataFrame) -> WatchState:
         """The state after one complete day with these records, if any."""
         if not len(T_day):
             return state
-        days, stamps = local_days(T_day.index), T_day.index.as_unit("ns").asi8
-        own = np.hstack([as_floats(T_day)[:, [columns[0] for columns in self.columns]], as_floats(F_day)])
-        kept, known = state.days > days[-1] - self.span, state.days_of_means > days[-1] - 120
-        temperatures = own[:, : len(self.sensors)]
-        means = means_by_day(days, np.where(self.weather.implausible(temperatures), np.nan, temperatures), self.least)[
-            1
-        ]
-        state = replace(
-            state,
-            stamps=np.r_[state.stamps[kept], stamps],
-            days=np.r_[state.days[kept], days],
-            values=np.vstack([state.values[kept], own]),
-            days_of_means=np.append(state.days_of_means[known], days[-1]),
-            means=np.vstack([state.means[known], means[-1:]]),
+        days, n = local_days(T_day.index), len(self.sensors)
+        values = np.hstack([as_floats(T_day)[:, [columns[0] for columns in self.columns]], as_floats(F_day)])
+        known = np.where(self.weather.implausible(values[:, :n]), np.nan, values[:, :n])
+        day, mean = means_by_day(days, known, 0.3 * self.per_day)
+        span = 5 + int(np.ceil(self.runs.max(initial=0) / self.per_day))
+        recent, recent_means = state.days > days[-1] - span, state.days_of_means > days[-1] - 120
+        state = WatchState(
+            stamps=np.r_[state.stamps[recent], T_day.index.as_unit("ns").asi8],
+            days=np.r_[state.days[recent], days],
+            values=np.vstack([state.values[recent], values]),
+            days_of_means=np.r_[state.days_of_means[recent_means], day],
+            means=np.vstack([state.means[recent_means], mean]),
+            faults=state.faults,
         )
-        state = self._with_exchanges(state)
-        state = self._with_runs(state)
-        if self.thermometers is None:
-            return state
-        return self._with_departures(self._without_ended(state))
+        state = self._with_runs(self._with_exchanges(state))
+        return state if self.thermometers is None else self._with_departures(self._without_ended(state))
 
     def _evaluated(self, values: Array) -> tuple[Mask, Array, Array]:
         """Which values are implausible, responses minus the expected ones, and the expected ones."""
-        n_sensors = len(self.sensors)
-        temperatures, responses = values[:, :n_sensors], values[:, n_sensors:]
+        temperatures, responses = np.split(values, [len(self.sensors)], axis=1)
         impossible = self.weather.implausible(temperatures)
         rest, expected = self.expected.residuals(np.where(impossible, np.nan, temperatures), responses)
         return np.hstack([impossible, self.expected.implausible(responses, rest)]), rest, expected
 
     def _with_exchanges(self, state: WatchState) -> WatchState:
         """Modes that are exchanged from now on, or no longer."""
-        n_sensors, recent = len(self.sensors), state.days > state.days[-1] - 5
-        recent &= state.stamps >= max((one.detected for one in state.faults if one.kind == "swapped"), default=0)
-        values = state.values[recent]
-        _, rest, expected = self._evaluated(
-            np.hstack([values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)])
-        )
+        n, since = len(self.sensors), max((one.detected for one in state.faults if one.kind == "swapped"), default=0)
+        recent = (state.days > state.days[-1] - 5) & (state.stamps >= since)
+        _, rest, expected = self._evaluated(state.in_place(state.values[recent]))
         for first, second, day in self.expected.exchanged(rest, expected, state.days[recent]):
-            pair, since = {n_sensors + first, n_sensors + second}, self._midnight(day)
-            known = [one for one in state.lasting("swapped") if pair == {one.column, one.other}]
+            known = [one for one in state.lasting("swapped") if {one.column, one.other} == {n + first, n + second}]
             if known:
-                state = state.changed(known[0], until=since)
+                state = state.changed(known[0], until=self._midnight(day))
             else:
                 today = self._midnight(state.days[-1])
-                state = state.opened(Fault("swapped", n_sensors + first, since, today, n_sensors + second))
+                state = state.opened("swapped", n + first, self._midnight(day), today, n + second)
         return state
 
     def _with_runs(self, state: WatchState) -> WatchState:
         """Columns that are dead, stuck or implausible from now on, or no longer."""
-        n_sensors, out = len(self.sensors), state.left_out()
-        is_given = ~np.isnan(state.values).all(axis=1)  # records without any value tell nothing of a single column
-        values, stamps, today = state.values[is_given], state.stamps[is_given], self._midnight(state.days[-1])
-        values = np.hstack([values[:, :n_sensors], state.in_place(values[:, n_sensors:], n_sensors)])
+        is_given, out = ~np.isnan(state.values).all(axis=1), state.left_out()  # empty records tell nothing of a column
+        values, stamps, today = (
+            state.in_place(state.values[is_given]),
+            state.stamps[is_given],
+            self._midnight(state.days[-1]),
+        )
         far = self._evaluated(values)[0]
         for column, series in enumerate(values.T):
-            kind, since, size = self._run(series, far[:, column], self.runs[:, column])
+            kind, first, size = self._run(series, far[:, column], self.runs[:, column])
             fault = out.get(column)
             known = fault.kind if fault is not None and fault.kind in ("dead", "stuck", "implausible") else None
             if known == kind:
@@ -487,7 +443,7 @@ class SensorWatch:
             if fault is not None and (known or kind):
                 state = state.changed(fault, until=today)
             if kind:
-                state = state.opened(Fault(kind, column, int(stamps[since]), today, size=size))
+                state = state.opened(kind, column, int(stamps[first]), today, size=size)
         return state
 
     def _run(self, series: Array, is_far: Mask, limits: Counts) -> tuple[str | None, int, float]:
@@ -498,59 +454,71 @@ class SensorWatch:
             return "dead", last + 1, 0.0
         if not len(known):
             return None, 0, 0.0
-        n_far = int(np.append(~is_far[known][::-1], True).argmax())
+        n_far, n_equal = (
+            int(np.append(is_other[known][::-1], True).argmax()) for is_other in (~is_far, series != series[last])
+        )
         if n_far >= 3:
             return "implausible", known[-n_far], float(series[last])
-        n_equal = int(np.append(series[known][::-1] != series[last], True).argmax())
         return ("stuck" if n_equal >= limits[1] else None), known[-n_equal], float(series[last])
 
-    def _departures(self, state: WatchState, trusted: Mask) -> tuple[Counts, Array]:
-        """Days, and departures of thermometers from what the trusted ones predict, without values of other faults."""
-        means = state.means.copy()
+    def _departures(self, state: WatchState, trusted: Mask) -> Array:
+        """Departures of thermometers from what the trusted ones predict, without values of other faults."""
+        means, days = state.means.copy(), state.days_of_means
         for fault in state.faults:
             if fault.column < len(self.sensors) and (fault.until is not None or fault.kind not in ("offset", "drift")):
-                is_later = state.days_of_means >= self._day(fault.since)
-                is_over = False if fault.until is None else state.days_of_means >= self._day(fault.until)
-                means[is_later & ~np.asarray(is_over), fault.column] = np.nan
-        return state.days_of_means, self.thermometers.departures(state.days_of_means, means, trusted)
+                first, stop = (
+                    local_days(as_index([time], self.zone))[0] for time in (fault.since, fault.until or 2**62)
+                )
+                means[(days >= first) & (days < stop), fault.column] = np.nan
+        return self.thermometers.departures(days, means, trusted)
 
     def _without_ended(self, state: WatchState, n_days: int = 4) -> WatchState:
         """Thermometers that have come back to less than half of their departure for some days are used again.
 
         In its first two months, an offset that goes on may turn out to be a drift.
         """
-        days, rest = self._departures(state, self._trusted(state))
+        days, rest = state.days_of_means, self._departures(state, self._trusted(state))
         for fault in state.lasting("offset", "drift"):
             own = rest[:, fault.column]
             known = np.flatnonzero(~np.isnan(own) & (days * DAY_NS > fault.detected - DAY_NS))[-n_days:]
             if len(known) == n_days and (np.abs(own[known]) < abs(fault.size) / 2).all():
                 state = state.changed(fault, until=self._midnight(days[known[0]]))
             elif (days[-1] - 60) * DAY_NS < fault.detected:
-                state = state.changed(fault, **self._described(days, own))
+                state = state.changed(fault, **self._change(days, own))
         return state
 
-    def _described(self, days: Counts, own: Array) -> dict[str, Any]:
-        """What the departures of a thermometer that is at fault look like."""
-        first, size, rate = start_of_change(days, own)
-        kind = "drift" if rate else "offset"
-        return {"kind": kind, "since": self._midnight(first), "size": size, "rate": rate}
+    def _change(self, days: Counts, rest: Array) -> dict[str, Any]:
+        """Offset or drift of a thermometer at fault: its first day, its size on the last one, and its rate in a day.
+
+        The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
+        """
+        known = ~np.isnan(rest)
+        at, values = days[known].astype(float), rest[known]
+        slow = at[: max(len(at) - 6, 0)]
+        shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
+        shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
+        gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
+        best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
+        first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
+        rate = float(size / (at[-1] - first + 1)) if is_drift[best] else 0.0
+        return {"kind": "drift" if rate else "offset", "since": self._midnight(first), "size": size, "rate": rate}
 
     def _with_departures(self, state: WatchState) -> WatchState:
         """The thermometer that departs from the others, if without it, and without no other one, none does."""
         trusted = self._trusted(state)
-        days, rest = self._departures(state, trusted)
+        rest = self._departures(state, trusted)
         far = self._excess(rest, trusted)
-        if not (far > 1).any():
+        if not (far > 1).any() or 2 * (1 + len(state.lasting("offset", "drift"))) > len(self.sensors):
             return state
         resolved = []
         for sensor in np.flatnonzero((far > far.max() / 2) & ~self.is_reference):
             others = trusted & (np.arange(len(trusted)) != sensor)
-            if not (self._excess(self._departures(state, others)[1], others) > 1).any():
+            if not (self._excess(self._departures(state, others), others) > 1).any():
                 resolved.append(int(sensor))
-        if len(resolved) != 1 or 2 * (1 + len(state.lasting("offset", "drift"))) > len(self.sensors):
+        if len(resolved) != 1:
             return state
-        found = self._described(days, rest[:, resolved[0]])
-        return state.opened(Fault(column=resolved[0], detected=self._midnight(state.days[-1]), **found))
+        found = self._change(state.days_of_means, rest[:, resolved[0]])
+        return state.opened(column=resolved[0], detected=self._midnight(state.days[-1]), **found)
 
     def _excess(self, rest: Array, trusted: Mask) -> Array:
         """The largest median departure of each trusted thermometer over its limit."""
@@ -559,39 +527,9 @@ class SensorWatch:
     def _trusted(self, state: WatchState) -> Mask:
         return ~np.isin(np.arange(len(self.sensors)), list(state.left_out()))
 
-    def _notes(self, state: WatchState, given: Array, far: Mask, expected: Array) -> list[str]:
-        """What was left out of each record, and why."""
-        names, n_sensors = [str(name) for name in (*self.sensors, *self.modes)], len(self.sensors)
-        lasting = [
-            f"{names[fault.column]} and {names[fault.other]} are exchanged and were put back in place"
-            if fault.kind == "swapped"
-            else f"{names[fault.column]} is left out ({fault.kind} since {since:%Y-%m-%d})"
-            for fault in (*state.left_out().values(), *state.lasting("swapped"))
-            for since in as_index([fault.since], self.zone)
-        ]
-        notes = ["; ".join(lasting)] * len(given)
-        for row in np.flatnonzero(far.any(axis=1)):
-            parts = [
-                f"{names[k]} is {quantity(given[row, k], self.units[k])}"
-                + (
-                    f", expected about {quantity(expected[row, k - n_sensors], self.units[k])}"
-                    if k >= n_sensors
-                    else ""
-                )
-                + ": implausible, left out"
-                for k in np.flatnonzero(far[row])
-            ]
-            notes[row] = "; ".join([*parts, *lasting])
-        return notes
-
-    def _day(self, moment: int) -> int:
-        return int(local_days(as_index([moment], self.zone))[0])
-
     def _midnight(self, day: int) -> int:
         stamp = pd.Timestamp(int(day) * DAY_NS)
-        if self.zone:
-            stamp = stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True)
-        return int(stamp.value)
+        return (stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True) if self.zone else stamp).value
 
 
 def local_days(stamps: pd.DatetimeIndex) -> Counts:
@@ -612,18 +550,11 @@ def run_limits(values: Array, per_day: float) -> Counts:
     The third longest run of the baseline is its usual one: its own faults are no rule.
     """
     limits = np.empty((2, values.shape[1]), dtype=np.int64)
-    seen = values[~np.isnan(values).all(axis=1)]
-    for column, series in enumerate(seen.T):
+    for column, series in enumerate(values[~np.isnan(values).all(axis=1)].T):
         known = np.flatnonzero(~np.isnan(series))
-        for kind, (runs, least, factors) in enumerate(
-            [(np.diff(known) - 1, max(3, round(per_day)), (1.7, 3.0)), (equal_runs(series[known])[1], 5, (4.0, 4.0))]
-        ):
-            longest = np.sort(np.append(runs[runs > kind], [0, 0, 0]))[::-1]
-            usual = int(np.ceil(min(factors[0] * longest[0], factors[1] * longest[2])))
-            limits[kind, column] = max(least * (2 if kind == 0 and longest[0] else 1), usual)
+        equal = equal_runs(series[known])[1]
+        gaps, equal = (np.sort(np.append(runs, [0, 0, 0]))[::-1] for runs in (np.diff(known) - 1, equal[equal > 1]))
+        least = max(3, round(per_day)) * (2 if gaps[0] else 1)
+        limits[0, column] = max(least, np.ceil(min(1.7 * gaps[0], 3.0 * gaps[2])))
+        limits[1, column] = max(5, 4 * equal[2])
     return limits
-
-
-def quantity(value: float, unit: str, digits: int = 2) -> str:
-    """A number with its unit, if it has one."""
-    return f"{value:.{digits}g} {unit}".rstrip()

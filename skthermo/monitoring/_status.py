@@ -10,10 +10,8 @@ from typing import Any
 import pandas as pd
 
 from skthermo._core.frames import DAY, as_moment, check_duration, usual_step
-from skthermo._core.text import counted, counted_number, duration_text, plain, probability_text
+from skthermo._core.text import counted, duration_text, plain, probability_text
 from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH
-
-FAULT = ("column", "kind", "since", "detail")
 
 
 @dataclass(frozen=True)
@@ -253,78 +251,43 @@ def status_of(monitor: Any) -> MonitorStatus:
             smallest_change=monitor.smallest_changes_.as_dict(),
         ),
         events=tuple(
-            {
-                "event": int(number),
-                "kind": event["kind"],
-                "since": event["start"],
-                "peak": float(event["peak"]),
-                "modes": [mode for mode in event["modes"].split(", ") if mode],
-                "groups": [group for group in event["groups"].split(", ") if group],
-                "acknowledged": bool(event["acknowledged"]),
-            }
-            for number, event in events[events["end"].isna()].iterrows()
+            {"event": one.Index, "kind": one.kind, "since": one.start, "peak": one.peak}
+            | {name: [part for part in getattr(one, name).split(", ") if part] for name in ("modes", "groups")}
+            | {"acknowledged": one.acknowledged}
+            for one in events[events["end"].isna()].itertuples()
         ),
         faults=tuple(
-            {name: fault[name] if name == "since" else str(fault[name]) for name in FAULT}
-            for _, fault in faults[faults["until"].isna()].iterrows()
+            {"column": str(one.column), "kind": one.kind, "since": one.since, "detail": one.detail}
+            for one in faults[faults["until"].isna()].itertuples()
         ),
         transition=len(monitor.transitions()),
     )
 
 
-def summary_lines(monitor: Any) -> Iterator[str]:
-    """State, records, events, sensors and drift of a fitted monitor."""
-    events, status = monitor.events_, status_of(monitor)
-    newest = [f"newest record {monitor.last_}", status.reason] if status.records.newest is not None else []
-    yield f"state: {status.state} ({'; '.join(filter(None, newest)) or 'no record since the baseline'})"
-    yield f"records: {status.records}"
-    yield (
-        f"damage events: open when {monitor.persistence} of {2 * monitor.persistence - 1} damage indices exceed "
-        f"{monitor.threshold_:.4g}, close at or below {monitor.clear_threshold_:.4g}"
-    )
-    yield f"expected: {monitor.false_alarm_estimate_}"
-    is_watch = events["kind"] == WATCH
+def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
+    """State, records, latest events, sensors and drift of a fitted monitor."""
+    status, events, drift, aside = status_of(monitor), monitor.events_, monitor.drift_, monitor.set_aside_
+    yield f"state: {status.state}" + (f" ({status.reason})" if status.reason else "")
+    yield f"records: {status.records}, the newest of {monitor.last_}"
+    yield f"damage events: {status.levels}; expected: {monitor.false_alarm_estimate_}"
     if monitor.watch_threshold_ is not None:
-        since = [
-            f"event {n} is open since {one}" for n, one in events["start"][is_watch & events["end"].isna()].items()
-        ]
-        expected = f"{counted_number(monitor.watch_per_year, 'false one')} a year expected"
-        parts = [f"opens above {monitor.watch_threshold_:.4g}", expected, f"{is_watch.sum()} so far", *since]
-        yield f"watch: {'; '.join(parts)}"
+        yield f"watch: opens above {monitor.watch_threshold_:.4g}"
     yield f"smallest change: {monitor.smallest_changes_} in weather of the baseline"
-    yield from _of_events(events[~is_watch])
-    aside = monitor.set_aside_
-    if len(aside):
-        values, details = counted(int(aside["n_rows"].sum()), "value"), "; ".join(aside["detail"].head(3))
-        yield f"baseline: {values} set aside, as no measurement can be so: {details}"
-    for fault in status.faults:
-        yield f"sensor: {fault['column']} {fault['kind']} since {fault['since']}"
-    if monitor.drift_ is not None:
-        yield from _of_drift(monitor.drift_)
-
-
-def _of_events(events: pd.DataFrame, most: int = 5) -> Iterator[str]:
-    """A line for each of the latest events, and one for those that nobody has acknowledged."""
-    if not len(events):
-        yield "events: none"
-        return
     for number, event in events.iloc[-most:].iterrows():
         until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
-        said = f", acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
+        harmless = "harmless" if event["harmless"] else "not harmless"
+        said = f"acknowledged as {harmless}" if event["acknowledged"] else "not acknowledged"
+        parts = [f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""
-        peak = f"peak {event['peak']:.4g} on {event['peak_time']} by {event['modes'] or 'no mode named'}"
-        peak += f", explained by a loss of stiffness of {event['groups']}" if event["groups"] else ""
-        yield f"event {number}: {event['kind']} from {event['start']} {until}, {peak}{said}{note}"
-    if len(events) > most:
-        yield f"events: {len(events) - most} earlier ones are in events_"
-    waiting = events.index[events["end"].notna() & ~events["acknowledged"]]
-    if len(waiting):
-        yield f"ended, not acknowledged: event{'s' if len(waiting) > 1 else ''} {', '.join(map(str, waiting))}"
-
-
-def _of_drift(drift: pd.DataFrame) -> Iterator[str]:
-    found = "significant" if drift["significant"].any() else "not significant"
-    yield f"drift: {found} (p value {probability_text(drift['p_value'].iloc[0])})"
-    for group, one in drift[drift["significant"]].iterrows():
-        beyond = "; beyond the limit" if one["beyond_limit"] else ""
+        yield f"event {number}: {event['kind']} from {event['start']} {until}, {', '.join(filter(None, parts))}{note}"
+    yield f"events: {len(events)}, {events['end'].isna().sum()} of them open"
+    if len(aside):
+        n_values = counted(int(aside["n_rows"].sum()), "value")
+        yield f"baseline: {n_values} set aside: {'; '.join(aside['detail'].head(3))}"
+    for fault in status.faults:
+        yield f"sensor: {fault['column']} {fault['kind']} since {fault['since']}"
+    for group, one in () if drift is None else drift[drift["significant"]].iterrows():
+        beyond = ", beyond the limit" if one["beyond_limit"] else ""
         yield f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year{beyond}"
+    if drift is not None and not drift["significant"].any():
+        yield f"drift: none that is significant (p value {probability_text(drift['p_value'].iloc[0])})"

@@ -6,11 +6,11 @@ PLACES = {
     "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
     "fem.external._files": ["form_of", "read_file"],
-    "monitoring.fleet._bridge": ["KnownBridge"],
-    "monitoring._events": ["find_events", "followed"],
+    "monitoring._fleet": ["KnownBridge"],
+    "monitoring._events": ["EventLevels", "find_events", "followed"],
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._sensors": ["SensorWatch"],
-    "monitoring._threshold": ["EventLevels", "estimate_false_alarms"],
+    "monitoring._threshold": ["estimate_false_alarms"],
     "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
 }
 

@@ -47,10 +47,8 @@ LOSSES = {"bottom": 0.15, "top": 0.15, "diagonal": 0.1, "bottom ": -0.2}
 @pytest.mark.parametrize(
     ("window", "groups"),
     [
-        (None, ["top", "bottom "]),
-        (7, ["diagonal"]),
+        (7, ["diagonal", "bottom "]),
         pytest.param(None, [*LOSSES], marks=pytest.mark.nightly),
-        pytest.param(7, [*LOSSES], marks=pytest.mark.nightly),
     ],
 )
 def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_loss(fem, window, groups):

@@ -16,16 +16,14 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import CompensatedDetector, DirectionalDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing.checks import Plausible
+from skthermo.preprocessing import HampelFilter
 from tests.nights import by_day
 
 PER_DAY, N_BASELINE = 4, 4 * 365
 SETTLED = 3 * PER_DAY  # records after which also a window of two days has to see a change
 KINDS = {"damage", "measurement or structure"}
 
-pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-peak|not-evaluated)"
-)
+pytestmark = pytest.mark.filterwarnings("ignore:.*(short-baseline|few-baseline-records|baseline-peak|not-evaluated)")
 
 
 @cache
@@ -112,15 +110,14 @@ def about_zero():
 
 
 @cache
-def saved_about_zero(options):
+def saved_about_zero():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        monitor = Monitor(targets=MODES, units="mm", **dict(options)).fit(about_zero()[:N_BASELINE])
+        monitor = Monitor(targets=MODES, units="mm").fit(about_zero()[:N_BASELINE])
     return pickle.dumps(monitor)
 
 
 @pytest.mark.one_case
-@pytest.mark.parametrize("options", [(), (("sensors", False),)], ids=["with sensors", "without"])
 @some
 @given(
     shifts=st.dictionaries(
@@ -133,10 +130,8 @@ def saved_about_zero(options):
     start=st.integers(0, 300),
     n_days=st.integers(4, 20),
 )
-def test_responses_of_any_sign_that_move_by_up_to_a_thousand_times_their_range_are_in_alarm(
-    options, shifts, start, n_days
-):
-    monitor, records = pickle.loads(saved_about_zero(options)), about_zero()
+def test_responses_of_any_sign_that_move_by_up_to_a_thousand_times_their_range_are_in_alarm(shifts, start, n_days):
+    monitor, records = pickle.loads(saved_about_zero()), about_zero()
     begin, baseline = N_BASELINE + PER_DAY * start, records[:N_BASELINE]
     usual = baseline.max() - baseline.min()
     new = records[begin : begin + PER_DAY * n_days].copy()
@@ -191,16 +186,6 @@ def test_what_is_set_aside_is_healthy_only_once_it_is_acknowledged_or_comes_back
     assert monitor.days_["n_left_out"].sum() == n_values
 
 
-def test_a_single_value_that_cannot_be_is_explained_and_counted():
-    monitor, new = fitted(), changed({}, 2)
-    new.iloc[5, new.columns.get_loc("f2")] = 1e6
-    answers = monitor.update(new)
-    assert answers["state"].eq("not evaluated").tolist() == [n == 5 for n in range(8)]
-    assert "f2 is 1e+06" in answers["reason"].iloc[5]
-    assert monitor.counts_["n_left_out"] == 1
-    assert not len(monitor.events_)
-
-
 class DropsOutliers(TransformerMixin, BaseEstimator):
     """A step that leaves out what is far from the baseline."""
 
@@ -224,7 +209,7 @@ def test_a_detector_that_drops_large_changes_is_refused_and_a_blind_one_is_repor
     with pytest.raises(ValueError, match="drops or fills large changes"):
         Monitor(drops, sensors=False).fit(truss()[:N_BASELINE])
     blind = Monitor(detector(MODES, Bounded()), sensors=False, persistence=1, false_alarms_per_year=0.5)
-    with pytest.warns(UserWarning, match="blind-detector"):
+    with pytest.warns(UserWarning, match="undetected-changes"):
         blind.fit(truss()[:N_BASELINE])
 
 
@@ -255,7 +240,7 @@ def test_responses_may_have_any_sign_and_unit():
     assert "healthy" not in set(stuck.update(new.assign(d=0.0))["state"][2 * SETTLED :])
     assert "repeats 0 mm" in stuck.faults_["detail"].iloc[0]
     monitor.update(new[:1].assign(d=500.0))
-    assert "d is 5e+02 mm, expected about" in monitor.evaluations_["reason"].iloc[0]
+    assert "d is 500 mm: implausible" in monitor.evaluations_["reason"].iloc[0]
 
 
 @pytest.mark.nightly
@@ -272,19 +257,6 @@ def test_a_new_baseline_moves_responses_of_any_sign_by_their_change():
     later = records[N_BASELINE + len(new) :][: 20 * PER_DAY]
     assert (monitor.update(later.assign(d=later["d"] + 3.0))["state"] == "healthy").mean() > 0.9
     assert set(monitor.update(records[N_BASELINE + len(new) + len(later) :][:40])["state"][SETTLED:]) == {"alarm"}
-
-
-def test_units_are_honest_and_checked():
-    assert set(fitted().units_.values()) == {"", "°C"}
-    assert {pickle.loads(saved_about_zero(())).units_[name] for name in MODES} == {"mm"}
-    with pytest.raises(ValueError, match="units"):
-        Monitor(detector(MODES), units={"f9": "Hz"}).fit(truss()[:N_BASELINE])
-
-
-def test_a_number_that_loggers_write_is_a_value_where_the_baseline_reaches_it():
-    records = pd.DataFrame({"d": [-150.0, -99.0, 120.0], "f": [2.0, -99.0, 2.1]})
-    wrong = Plausible.learned(records, ["d", "f"]).implausible(records.to_numpy())
-    assert wrong.tolist() == [[False, False], [False, True], [False, False]]
 
 
 def with_station():
@@ -318,11 +290,6 @@ def test_a_reference_finds_the_drift_of_the_only_thermometer_and_fills_its_place
     assert late["reason"].str.contains("T1 is left out").all()
     gap = healthy.update(records[N_BASELINE + n_healthy :][:8].assign(T1=np.nan))
     assert set(gap["state"]) == {"healthy"}
-
-
-def test_references_are_columns_and_no_responses():
-    with pytest.raises(ValueError, match="reference"):
-        Monitor(detector(MODES), reference=["station"]).fit(truss()[:N_BASELINE])
 
 
 def test_records_of_a_wrong_clock_are_set_aside_and_true_ones_are_not_late():
@@ -361,12 +328,6 @@ def test_a_record_of_the_present_needs_no_confirmation():
     assert monitor.update(new)["state"].tolist() == ["healthy"]
 
 
-@pytest.mark.parametrize("wanted", [MODES[:4], [*MODES, "T1"]])
-def test_other_targets_than_those_of_the_compensator_are_refused(wanted):
-    with pytest.raises(ValueError, match="expected those of the compensator"):
-        Monitor(detector(MODES), targets=wanted).fit(truss()[:N_BASELINE])
-
-
 @pytest.mark.one_case
 @pytest.mark.parametrize(
     ("own", "options"), [(["f6", "f1", "f3", "f2", "f5", "f4"], {}), (MODES, {"targets": MODES[::-1]})]
@@ -378,19 +339,7 @@ def test_modes_are_named_whatever_the_order_of_targets(own, options):
     assert monitor.events_["modes"].iloc[-1].split(",")[0] == "f6"
 
 
-def test_results_do_not_share_the_state():
-    monitor = fitted()
-    answers = monitor.update(changed({}, 2))
-    for table in (answers, monitor.days_, monitor.evaluations_):
-        table.iloc[:, 0] = 0
-    monitor.counts_["n_records"] = 0
-    assert monitor.counts_["n_records"] == 8
-    assert set(monitor.evaluations_["state"]) == {"healthy"}
-
-
-@pytest.mark.parametrize(
-    ("value", "kind"), [(1e6, "implausible"), (-1e6, "implausible"), (300.0, "implausible"), (-999.0, "dead")]
-)
+@pytest.mark.parametrize(("value", "kind"), [(300.0, "implausible"), (-999.0, "dead")])
 def test_a_thermometer_that_gives_what_no_weather_gives_is_implausible_and_a_marker_is_a_missing_value(value, kind):
     monitor, new = fitted(), changed({})
     name = new.columns[0]
@@ -407,10 +356,8 @@ def test_a_thermometer_that_gives_what_no_weather_gives_is_implausible_and_a_mar
     [
         (1.0, detector(MODES)),
         (1e-3, MahalanobisDetector()),
-        pytest.param(1.0, MahalanobisDetector(), marks=pytest.mark.nightly),
-        pytest.param(1e-3, detector(MODES), marks=pytest.mark.nightly),
     ],
-    ids=["in hertz, compensated", "about zero", "in hertz", "about zero, compensated"],
+    ids=["in hertz, compensated", "about zero"],
 )
 def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(scale, last):
     wrong = truss()[:N_BASELINE].copy()
@@ -434,7 +381,7 @@ def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(s
     assert monitor.threshold_ == expected.threshold_
 
 
-@pytest.mark.filterwarnings("ignore:.*(missing-seasons|few-baseline-records)")
+@pytest.mark.filterwarnings("ignore:.*(short-baseline|few-baseline-records)")
 def test_a_column_that_says_nothing_is_left_out_and_named():
     records = truss()
     baseline = records[:N_BASELINE].assign(f2=records["f2"].iloc[0], T1=np.where(np.arange(N_BASELINE) % 4, 484.6, 5))
@@ -451,8 +398,24 @@ def test_a_column_that_says_nothing_is_left_out_and_named():
     pd.testing.assert_frame_equal(answers, alone.update(records[N_BASELINE : N_BASELINE + 40][others]))
 
 
-def test_a_baseline_in_kelvin_is_refused():
-    kelvin = truss()[:N_BASELINE].copy()
-    kelvin[kelvin.columns[:2]] += 273.15
-    with pytest.raises(ValueError, match="kelvin"):
-        Monitor(detector(MODES)).fit(kelvin)
+@pytest.mark.parametrize(
+    ("options", "change", "match"),
+    [
+        ({"targets": MODES[:4]}, {}, "expected those of the compensator"),
+        ({"targets": [*MODES, "T1"]}, {}, "expected those of the compensator"),
+        ({"targets": ["f9"]}, {}, "expected different names among the columns"),
+        ({"reference": ["station"]}, {}, "reference"),
+        ({"units": {"f9": "Hz"}}, {}, "units"),
+        ({"detector": MahalanobisDetector()}, {}, "expected targets="),
+        ({"detector": make_pipeline(HampelFilter(5), detector(MODES))}, {}, "compares records with later ones"),
+        ({}, {"T1": 273.15, "T2": 273.15}, "kelvin"),
+    ],
+)
+def test_settings_and_records_that_do_not_fit_each_other_are_refused(options, change, match):
+    baseline = truss()[:N_BASELINE].copy()
+    for name, shift in change.items():
+        baseline[name] += shift
+    with pytest.raises(ValueError, match=match):
+        Monitor(**{"detector": detector(MODES)} | options).fit(baseline)
+    with pytest.raises(ValueError, match="the baseline has no records"):
+        Monitor(detector(MODES)).fit(baseline[:0])

@@ -4,7 +4,6 @@ import copy
 import json
 import sys
 import zipfile
-import zlib
 from pathlib import Path
 
 import joblib
@@ -81,37 +80,17 @@ def test_drift_and_faulty_sensors_go_on_where_they_stopped(records, path):
     assert_same_history(loaded, monitor)
 
 
-@pytest.mark.parametrize("ending", ["skops"])
-def test_a_time_zone_comes_back(records, path):
-    zoned = records.tz_localize("Europe/Brussels")
-    monitor = fitted_monitor(zoned)
-    monitor.update(zoned[FIRST : FIRST + 5])
-    monitor.save(path)
-    loaded = load_monitor(path)
-    assert str(loaded.last_.tz) == "Europe/Brussels"
-    assert_same_history(loaded, monitor)
-
-
 @each_form
-def test_a_file_that_was_cut_off_is_refused(monitor, path):
+def test_a_file_that_was_cut_off_or_has_a_changed_bit_is_refused(monitor, path):
     monitor.save(path)
     content = path.read_bytes()
-    for share in (0.0, 0.3, 0.999):
-        path.write_bytes(content[: int(share * len(content))])
+    values = monitor.baseline_.to_numpy()[0].tobytes()
+    place = len(content) // 3 if path.suffix == ".joblib" else content.index(values[:8])
+    changed = content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+    for damaged in (b"", content[: len(content) // 3], content[:-9], changed):
+        path.write_bytes(damaged)
         with pytest.raises(ValueError, match=rf"{path.name} cannot be read: .*; expected the whole file of a monitor"):
             load_monitor(path)
-
-
-@each_form
-def test_a_changed_bit_is_noticed(monitor, path):
-    monitor.save(path)
-    content = bytearray(path.read_bytes())
-    values = monitor.baseline_.to_numpy()[0].tobytes()
-    place = len(content) // 3 if path.suffix == ".joblib" else bytes(content).index(values[:8])
-    content[place] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match="cannot be read"):
-        load_monitor(path)
 
 
 @each_form
@@ -122,20 +101,6 @@ def test_something_else_is_no_monitor(path, ending):
         pytest.importorskip("skops.io").dump(LinearRegression(), path)
     with pytest.raises(ValueError, match="holds 'LinearRegression'; expected a fitted Monitor"):
         load_monitor(path)
-
-
-def test_joblib_itself_reads_and_writes_such_files(monitor, tmp_path):
-    monitor.save(tmp_path / "saved.joblib")
-    joblib.dump(monitor, tmp_path / "dumped.joblib")
-    assert_same_history(joblib.load(tmp_path / "saved.joblib"), load_monitor(tmp_path / "dumped.joblib"))
-
-
-def test_skops_itself_reads_such_files(monitor, tmp_path):
-    io = pytest.importorskip("skops.io")
-    monitor.save(tmp_path / "saved.skops")
-    types = io.get_untrusted_types(file=tmp_path / "saved.skops")
-    assert all(name.startswith(("skthermo.", "sklearn.")) for name in types)
-    assert_same_history(io.load(tmp_path / "saved.skops", trusted=types), monitor)
 
 
 @pytest.mark.parametrize(
@@ -161,15 +126,6 @@ def test_a_file_of_skops_runs_nothing_of_others(monitor, tmp_path, module, name)
             archive.writestr(member, content)
     with pytest.raises(ValueError, match=rf"\['{module}.{name}'\] are no classes of this skthermo or scikit-learn"):
         load_monitor(path)
-
-
-@each_form
-def test_a_baseline_that_has_trained_the_detector_is_saved_once(monitor, path):
-    monitor.save(path)
-    loaded = load_monitor(path)
-    assert loaded.trained_ is loaded.baseline_
-    pd.testing.assert_frame_equal(loaded.trained_, monitor.trained_)
-    assert monitor.trained_ is monitor.baseline_
 
 
 def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_path):
@@ -202,13 +158,7 @@ def test_a_missing_skops_is_named(monitor, tmp_path, monkeypatch):
             function(tmp_path / "bridge.skops")
 
 
-def test_a_plain_zlib_stream_is_no_monitor(tmp_path):
-    (tmp_path / "bridge.joblib").write_bytes(zlib.compress(np.zeros(3).tobytes()))
-    with pytest.raises(ValueError, match="cannot be read"):
-        load_monitor(tmp_path / "bridge.joblib")
-
-
-@pytest.mark.filterwarnings("ignore:.*(missing-seasons|extrapolated-threshold|baseline-peak|few-baseline-records)")
+@pytest.mark.filterwarnings("ignore:.*(short-baseline|baseline-peak|few-baseline-records)")
 def test_a_file_of_version_0_2_is_refused_in_one_sentence_and_its_acknowledgements_are_kept(tmp_path):
     old = Path(__file__).with_name("monitor_of_0_2.joblib")
     with pytest.raises(ValueError, match=r"another version of skthermo; .* skthermo fit FOLDER --replace"):

@@ -1,9 +1,6 @@
 """Laws of a monitor whose baseline is a few weeks, and whose regression knows what it does not know."""
 
-import itertools
-
 import numpy as np
-import pandas as pd
 import pytest
 from sklearn.pipeline import make_pipeline
 
@@ -17,8 +14,7 @@ WEEKS, YEAR = 60, 365
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
-        "missing-seasons",
-        "extrapolated-threshold",
+        "short-baseline",
         "weather-of-one-fold",
         "few-baseline-records",
         "baseline-peak",
@@ -38,17 +34,6 @@ def monitor_of(regressor=BayesianLogs, **options):
     estimator = regressor(MEAN, WIDTH, NOISE)
     compensator = TemperatureCompensator(estimator, targets=MODES, **options)
     return Monitor(make_pipeline(compensator, MahalanobisDetector()), sensors=False)
-
-
-def test_any_batches_give_the_decisions_of_one_pass():
-    records = served(0, WEEKS + 120)
-    whole, parts = (monitor_of().fit(records[:WEEKS]) for _ in range(2))
-    whole.update(records[WEEKS:])
-    cuts = [WEEKS, *np.sort(np.random.default_rng(1).integers(WEEKS, WEEKS + 120, 4)), WEEKS + 120]
-    for first, last in itertools.pairwise(cuts):
-        parts.update(records[first:last])
-    pd.testing.assert_frame_equal(whole.evaluations_, parts.evaluations_)
-    pd.testing.assert_frame_equal(whole.events_, parts.events_)
 
 
 def test_a_record_in_unknown_weather_is_healthy_only_if_a_large_fall_would_be_seen_there():

@@ -21,7 +21,7 @@ from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Fleet, Monitor, fit_fleet
 
 MODES = ["f1", "f2"]
-pytestmark = pytest.mark.filterwarnings("ignore:.*bridges-(warned|failed)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*bridges")
 
 
 def year(seed, n=365, start="2025-01-01", step=0.0):
@@ -99,17 +99,17 @@ def test_warnings_of_all_bridges_are_one_and_counted_by_kind(fleet):
     numbers = fleet.warnings.set_index(["bridge", "kind"])["times"].to_dict()
     assert numbers == {("odd", "odd records"): 2}
     assert fleet.table["warnings odd records"].to_dict() == dict.fromkeys("abcd", 0) | {"broken": 0, "odd": 2}
-    failed, warned = fleet.caught
-    assert "(broken), the first with FileNotFoundError: no records" in failed
-    assert "odd records (1 bridge)" in warned
+    (found,) = fleet.caught
+    assert "(broken), the first with FileNotFoundError: no records" in found
+    assert "odd records (1 bridge)" in found
 
 
 def test_nothing_known_is_never_healthy(fleet):
     assert set(fleet.table["state"]) == {"not evaluated", ""}
     text = fleet.summary()
-    assert "5 of 6 bridges are fitted." in text
-    assert "Not fitted: broken." in text
-    assert "5 of 5 monitors have had no record since they were fitted; the state of their bridges is not known." in text
+    assert "5 of 6 bridges are fitted, 0 healthy." in text
+    assert "Not fitted: 1 (broken)." in text
+    assert "Without a record since the fit, state not known: 5 (a, b, c, d, odd)." in text
     assert repr(fleet) == "Fleet(6 bridges, 5 fitted, 5 monitors, 5 not evaluated)"
 
 
@@ -194,16 +194,6 @@ def test_a_damaged_file_is_fitted_anew(tmp_path):
     assert bits(fit_fleet(makers, records, monitor=watch, folder=tmp_path)) == bits(first)
 
 
-def test_an_interrupt_keeps_what_is_finished(tmp_path):
-    def interrupt():
-        raise KeyboardInterrupt
-
-    makers, records = asked(stop=(interrupt, None), late=(None, None))
-    with pytest.raises(KeyboardInterrupt):
-        fit_fleet(makers, records, folder=tmp_path)
-    assert len(Fleet(tmp_path).chains) == 4
-
-
 def test_monitors_evaluate_new_records_each_alone(fleet):
     made = pickle.loads(pickle.dumps(fleet))  # also a pickled fleet goes on
     new = {"a": year(31, 60, "2026-01-01"), "b": partial(year, 32, 60, "2026-01-01", step=0.05), "c": missing_file}
@@ -275,12 +265,6 @@ def test_what_the_owner_found_is_kept(tmp_path):
         assert known.discoveries().bridges == []
     with pytest.raises(ValueError, match="'x' is no bridge with a monitor"):
         fleet.acknowledge("x", 1, harmless=True)
-
-
-def test_records_that_are_no_tables_are_reported():
-    makers, records = asked(n=(None, lambda: (1, 2)))
-    fleet = fit_fleet(makers, records)
-    assert "shapes () and (); expected a row" in fleet.table.loc["n", "error"]
 
 
 def test_monitors_that_were_fitted_one_by_one_are_a_fleet_like_any_other(fleet):

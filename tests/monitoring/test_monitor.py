@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from sklearn.base import BaseEstimator, TransformerMixin, clone
+from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor
@@ -22,15 +22,13 @@ from skthermo.detection import (
     TemperatureCompensator,
 )
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import HampelFilter, HingeFeatures, LagFeatures
+from skthermo.preprocessing import HingeFeatures, LagFeatures
 
 TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
 N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
 ANSWER = ["state", "index", "threshold", "modes", "groups", "reason", "event"]
 
-pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*(missing-seasons|few-baseline-records|extrapolated-threshold|baseline-peak|not-evaluated)"
-)
+pytestmark = pytest.mark.filterwarnings("ignore:.*(short-baseline|few-baseline-records|baseline-peak|not-evaluated)")
 
 
 def campaign(n, seed, start="2025-01-01"):
@@ -83,13 +81,13 @@ def lagged(regressor=None):
 HINGES = make_pipeline(HingeFeatures(), LinearRegression())
 FOREST = OutlierDetector(IsolationForest(n_estimators=20, random_state=0), block="1D")
 DETECTORS = {
-    "raw": (MahalanobisDetector(), "nothing"),
-    "lags": (make_pipeline(compensator(lagged()), MahalanobisDetector()), "30 h"),
-    "mean by time": (whole(lagged(), "36h"), "66 h"),
-    "mean by number": (whole(lagged(), 5), "4 records and 30 h"),
-    "neighbours, mean by number": (whole(KNeighborsRegressor(20), 6), "5 records"),
-    "hinges, mean by time": (whole(HINGES, "2D"), "48 h"),
-    "forest": (make_pipeline(compensator(lagged()), FOREST), "30 h"),
+    "raw": MahalanobisDetector(),
+    "lags": make_pipeline(compensator(lagged()), MahalanobisDetector()),
+    "mean by time": whole(lagged(), "36h"),
+    "mean by number": whole(lagged(), 5),
+    "neighbours, mean by number": whole(KNeighborsRegressor(20), 6),
+    "hinges, mean by time": whole(HINGES, "2D"),
+    "forest": make_pipeline(compensator(lagged()), FOREST),
 }
 SETTINGS = settings(
     max_examples=2,
@@ -107,7 +105,7 @@ def fitted(name, **options):
     if key not in _fitted:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            monitor = Monitor(DETECTORS[name][0], targets=MODES, **options).fit(BASELINE)
+            monitor = Monitor(DETECTORS[name], targets=MODES, **options).fit(BASELINE)
             after = copy.deepcopy(monitor)
             _fitted[key] = monitor, after.update(SERVICE), after
     monitor, answers, after = _fitted[key]
@@ -149,15 +147,6 @@ def test_any_division_into_batches_gives_the_history_of_one_pass(name, data):
 
 
 @pytest.mark.nightly
-def test_hour_by_hour_and_day_by_day():
-    for batches in ([SERVICE.iloc[[n]] for n in range(24)], [day for _, day in SERVICE[:24].resample("D") if len(day)]):
-        monitor, answers, _ = fitted("mean by time")
-        parts = [monitor.update(batch) for batch in batches]
-        pd.testing.assert_frame_equal(pd.concat(parts)[ANSWER], answers[:24][ANSWER], check_exact=True)
-        assert not any(part["revised"].any() for part in parts)
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["raw", "lags", "mean by number", "hinges, mean by time"])
 def test_indices_are_those_of_the_detector_on_all_records(name):
     monitor, _, _ = fitted(name, sensors=False)
@@ -168,12 +157,6 @@ def test_indices_are_those_of_the_detector_on_all_records(name):
         warnings.simplefilter("ignore")
         expected = -monitor.detector_.score_samples(pd.concat([BASELINE, service])[columns])
     np.testing.assert_allclose(answers["index"], expected[N_BASELINE:], atol=1e-6)
-
-
-@pytest.mark.one_case
-@pytest.mark.parametrize("name", DETECTORS)
-def test_lookback_is_what_lags_and_windows_need(name):
-    assert str(fitted(name)[0].lookback_) == DETECTORS[name][1]
 
 
 def test_days_summarise_their_records():
@@ -200,32 +183,6 @@ def test_reasons_say_why_a_record_is_not_evaluated():
     held = answers["reason"].str.contains("implausible")
     assert (answers["state"] == "not evaluated").equals(answers["index"].isna() | held)
     assert after.counts_["n_left_out"] >= 3
-
-
-@pytest.mark.parametrize("name", ["mean by time", "neighbours, mean by number"])
-def test_records_without_values_that_their_window_evaluates_are_named(name):
-    _, answers, _ = fitted(name, sensors=False)
-    seen = SERVICE.mask(SERVICE == -999)
-    lacking = seen[MODES].isna().all(axis=1) | seen.drop(columns=MODES).isna().all(axis=1)
-    lacking &= answers["index"].notna()
-    assert lacking.any()
-    said = answers["reason"].str.split("; ")
-    of_others = {one for reason in said[~lacking & answers["index"].notna()] for one in reason}
-    assert all(set(reason) - of_others for reason in said[lacking])
-
-
-def test_answers_do_not_keep_the_frequency_of_a_batch():
-    monitor, records = copy.deepcopy(fitted("lags")[0]), ALL[N_BASELINE : N_BASELINE + 40]
-    assert records.index.freq is not None
-    one = copy.deepcopy(monitor).update(records)
-    parts = [monitor.update(part) for part in (records[:11][::-1], records[5:11], records[11:40])]
-    pd.testing.assert_frame_equal(pd.concat(parts), one)
-    assert records.index.freq is not None
-
-
-def test_a_baseline_without_records_is_refused():
-    with pytest.raises(ValueError, match="the baseline has no records"):
-        Monitor(MahalanobisDetector(), targets=MODES).fit(BASELINE[:0])
 
 
 def test_too_late_records_are_reported_and_not_evaluated():
@@ -305,12 +262,6 @@ def test_a_batch_without_records_changes_nothing():
     assert monitor.last_ == BASELINE.index[-1]
 
 
-def test_a_detector_that_looks_at_later_records_is_refused():
-    detector = make_pipeline(HampelFilter(5), compensator(), MahalanobisDetector())
-    with pytest.raises(ValueError, match="compares records with later ones"):
-        Monitor(detector).fit(BASELINE)
-
-
 class RunningMean(TransformerMixin, BaseEstimator):
     """A user's step that looks back, which no inspection finds."""
 
@@ -336,14 +287,6 @@ def test_memory_of_steps_that_are_not_known_is_asked_for():
     pd.testing.assert_frame_equal(whole, pd.concat(parts))
 
 
-def test_frequency_columns_have_to_be_known():
-    with pytest.raises(ValueError, match="expected targets="):
-        Monitor(MahalanobisDetector()).fit(BASELINE)
-    with pytest.raises(ValueError, match="expected different names among the columns"):
-        Monitor(MahalanobisDetector(), targets=["f9"]).fit(BASELINE)
-    assert Monitor(DETECTORS["lags"][0], sensors=False).fit(BASELINE).targets_ == MODES
-
-
 def test_what_the_owner_says_of_an_event_stays_with_it():
     monitor, _, _ = fitted("lags")
     held = SERVICE.index[64:68]
@@ -357,26 +300,3 @@ def test_what_the_owner_says_of_an_event_stays_with_it():
     assert "acknowledged as harmless (crane on the deck)" in monitor.summary()
     with pytest.raises(ValueError, match="expected the number of one of the"):
         monitor.acknowledge(99, harmless=True)
-
-
-def test_a_monitor_is_cloned_and_has_parameters():
-    monitor, _, after = fitted("lags")
-    twin = clone(monitor)
-    assert not hasattr(twin, "detector_")
-    assert twin.get_params()["max_delay"] == "7D"
-    assert twin.set_params(max_delay="2D", detector__mahalanobisdetector__contamination=0.01).max_delay == "2D"
-    again = pickle.loads(pickle.dumps(after))
-    pd.testing.assert_frame_equal(again.evaluations_, after.evaluations_)
-    assert again.summary() == after.summary()
-
-
-@pytest.mark.nightly
-def test_calendar_days_of_a_time_zone_with_summer_time():
-    records = campaign(N_BASELINE + 40, 3, "2024-06-06").tz_localize("UTC").tz_convert("Europe/Zurich")
-    monitor = Monitor(DETECTORS["lags"][0], targets=MODES).fit(records[:N_BASELINE])
-    other = copy.deepcopy(monitor)
-    whole = monitor.update(records[N_BASELINE:])
-    parts = [other.update(records[n : n + 3]) for n in range(N_BASELINE, len(records), 3)]
-    pd.testing.assert_frame_equal(whole, pd.concat(parts))
-    assert monitor.days_.index.equals(records[N_BASELINE:].index.normalize().unique())
-    assert monitor.days_.equals(other.days_)

@@ -15,7 +15,7 @@ from skthermo.monitoring import Monitor
 
 MODES, PER_DAY = ["f1", "f2", "f3"], 4
 pytestmark = pytest.mark.filterwarnings(
-    "ignore:.*(weather-of-one-fold|not-evaluated|missing-seasons|few-baseline-records|extrapolated-threshold)"
+    "ignore:.*(weather-of-one-fold|not-evaluated|short-baseline|few-baseline-records)"
 )
 
 
@@ -82,6 +82,6 @@ def test_a_short_baseline_says_in_its_warning_what_is_seen():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         monitor = fitted(bridge(noise=0.01)[: 24 * PER_DAY], MahalanobisDetector())
-    (found,) = [one for one in caught if "is extrapolated" in str(one.message)]
+    (found,) = [one for one in caught if "short-baseline" in str(one.message)]
     assert issubclass(found.category, FewRecordsWarning)
     assert str(monitor.smallest_changes_) in str(found.message)

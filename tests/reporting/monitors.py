@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from skthermo.monitoring._events import SmallestChanges
+from skthermo.monitoring._fleet import Discoveries
 from skthermo.monitoring._status import status_of
-from skthermo.monitoring._threshold import SmallestChanges
-from skthermo.monitoring.fleet._discoveries import Discoveries
 
 NO_FAULTS = pd.DataFrame(columns=["column", "kind", "since", "detected", "until", "detail"])
 
