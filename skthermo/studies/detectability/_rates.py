@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,19 +103,19 @@ def _scatter(decisions: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedRecords:
-    """What a detector makes of the records of one scenario and source: their damage index in the first repeat, with
-    their index, and decisions in each repeat, (n_repeats, n_records), NaN where there is none."""
+    """What a detector makes of the records of one scenario and source: decisions in each repeat, (n_repeats,
+    n_records), NaN where there is none, and ``rows`` with the times of the records."""
 
     detector: str
     scenario: BaseScenario
     source: str
-    damage_index: pd.Series
+    rows: Table
     decisions: Array
 
     def from_onset(self) -> tuple[Array, Array]:
         """Decisions from the onset of the damage on, in order of time, and the times since then."""
-        times, onset = row_times(self.damage_index), self.scenario.onset
-        start = times.min() if onset is None else time_of(self.damage_index, onset, "onset")
+        times, onset = row_times(self.rows), self.scenario.onset
+        start = times.min() if onset is None else time_of(self.rows, onset, "onset")
         order = np.argsort(times, kind="stable")
         order = order[times[order] >= start]
         return self.decisions[:, order], times[order] - start
@@ -125,7 +126,7 @@ class EvaluatedRecords:
         rate = rate_of(decisions, confidence, whole_repeats=scenario.n_draws > 1)
         if not rate.n_records:
             raise ValueError(
-                f"none of {len(self.damage_index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
+                f"none of {len(self.rows)} records of scenario {scenario.name!r}, source {self.source!r}, can "
                 "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
                 "after the onset"
             )
@@ -147,7 +148,7 @@ class EvaluatedRecords:
             "n_not_evaluated": decisions.size - rate.n_records,
             "n_effective": rate.n_effective,
             "n_repeats": len(decisions),
-            "time_to_detection": _mean_wait(decisions < 0, waits, self.damage_index),
+            "time_to_detection": _mean_wait(decisions < 0, waits, self.rows),
             "error": "",
         }
 
@@ -171,3 +172,14 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
     if isinstance(getattr(rows, "index", None), pd.DatetimeIndex):
         return pd.Timedelta(int(waits[detected].mean()), "ns") if detected.size else pd.NaT
     return float(detected.mean()) if detected.size else float("nan")
+
+
+def rates_by_scenario(
+    decisions: Mapping[tuple[str, ...], Array], scenarios: Sequence[BaseScenario], T: Table
+) -> dict[tuple[str, str], float]:
+    """Rates of alarms of one repeat from the onset of the damage on, by detector and scenario."""
+    by_name, rates = {one.name: one for one in scenarios}, {}
+    for (name, scenario, source), values in decisions.items():
+        kept = EvaluatedRecords(name, by_name[scenario], source, T, values[np.newaxis]).from_onset()[0]
+        rates[name, scenario] = float((kept < 0).sum() / max(np.count_nonzero(~np.isnan(kept)), 1))
+    return rates
