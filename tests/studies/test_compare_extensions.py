@@ -116,7 +116,6 @@ def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_no
     assert abs(table["gain"][1]) < 0.01
 
 
-@pytest.mark.filterwarnings("ignore:.*poor-curve-fit")  # the law of this structure is linear in severity
 def test_a_family_of_other_changes_keeps_its_severities(fem):
     scenarios = [
         Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (5.0, 10.0, 20.0, 40.0)

@@ -9,10 +9,8 @@ import pytest
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector
 from skthermo.exceptions import RecordsWarning
 from skthermo.studies import Scenario, compare_extensions, sweep
 from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of, windowed
@@ -101,34 +99,6 @@ def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, s
         for key, decisions in mine.items():
             np.testing.assert_array_equal(decisions, others[key])
     pd.testing.assert_frame_equal(other.ranking(), study.ranking())
-
-
-class Counted(LinearRegression):
-    """Counts its fits."""
-
-    n_fits = 0
-
-    def fit(self, X, y, sample_weight=None):
-        type(self).n_fits += 1
-        return super().fit(X, y, sample_weight)
-
-
-def test_a_memory_remembers_regressions_that_detectors_share(fem, tmp_path):
-    def counted(last=None, memory=None):
-        compensator = TemperatureCompensator(Counted(), targets=MODES)
-        return make_pipeline(compensator, last or MahalanobisDetector(), memory=memory)
-
-    def n_fits_of(memory=None, **detectors):
-        before = Counted.n_fits
-        study_of(fem, detectors, SCENARIOS[:1], memory=memory).run(WEATHER)
-        return Counted.n_fits - before
-
-    once = n_fits_of(one=counted())
-    assert once > 1
-    of_pipeline, of_study = str(tmp_path / "pipeline"), str(tmp_path / "study")
-    assert n_fits_of(one=counted(memory=of_pipeline)) == once
-    assert n_fits_of(one=counted(memory=of_pipeline), two=counted(DirectionalDetector(), of_pipeline)) == 0
-    assert n_fits_of(of_study, one=counted(), two=counted(DirectionalDetector())) == once
 
 
 class CountedForest(IsolationForest):
@@ -290,9 +260,7 @@ def test_one_warning_of_each_kind_and_those_of_other_packages_pass(fem):
         for category in (RecordsWarning, ConvergenceWarning)
     }
     (evaluated,) = given[RecordsWarning]
-    assert str(evaluated.message) == (
-        "detector 'first': 365 odd records (in the simulations of this study, more than once) [odd]"
-    )
+    assert str(evaluated.message) == "detector 'first': 365 odd records [odd]"
     assert evaluated.filename == __file__
     assert study.warnings_ == [str(evaluated.message)]
     assert {str(one.message) for one in given[ConvergenceWarning]} == {"no convergence in 7 steps"}

@@ -81,7 +81,7 @@ class Replicates:
     def _rates(self, simulation: Simulation, candidates: Mapping[str, Candidate], number: int) -> Any:
         random = np.random.RandomState(self.seeds[number])
         weather, records, noise = random.randint(LARGEST_SEED, size=3).tolist()
-        chain, T, rates = simulation.fem, self.years[0], {}
+        chain, T, measurement, rates = simulation.fem, self.years[0], simulation.measurement, {}
         with collected(drop_others=True), single_blas_thread():
             try:
                 for part in self.parts:
@@ -93,8 +93,11 @@ class Replicates:
                         chain = refitted(simulation.fem, model=self.models[number % len(self.models)])
                     if part == "baseline" or (part == "model" and "baseline" in self.parts):
                         chain = resampled(chain, records)
+                    if part == "baseline":  # the training records determine the noise up to an error
+                        errors = simulation.fem.recorder_.residuals.level_errors
+                        measurement = replace(measurement, levels=np.exp(errors * random.standard_normal(len(errors))))
                     clean = clean_frequencies(chain, simulation.scenarios, T, 1, first=number)
-                    here = replace(simulation, T=T, clean=clean)
+                    here = replace(simulation, T=T, clean=clean, measurement=measurement)
                     found = Decided.by(candidates, here.records(0, [noise if self.with_noise else 0]))
                     if found.errors:
                         raise next(iter(found.errors.values()))

@@ -203,11 +203,13 @@ def by_detector(findings: Iterable[SkthermoWarning], name: str, detectors: Mappi
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`."""
+    """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`, and factors
+    of the noise of each mode."""
 
     noise: Any
     gaps: Any
     outliers: Any
+    levels: Any = 1.0
 
     @classmethod
     def asked(cls, fem: DataInformedFEM, noise: Any, gaps: Any, outliers: Any) -> Measurement:
@@ -217,6 +219,7 @@ class Measurement:
     def drawn(self, fem: DataInformedFEM, weather: Any, seed: int) -> tuple[Array, Array]:
         """Relative noise, (n_records, n_modes), NaN where a mode is missing, and the temperatures with gaps."""
         noise, T = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed), as_floats(weather.given)
+        noise = noise * self.levels
         if isinstance(self.gaps, str) and np.isnan(as_floats(fem.records_.temperatures)).any():
             missing = fem.recorder_.gaps(weather, self.gaps, self.outliers, seed)[0]
             T = np.where(missing, np.nan, T)

@@ -622,12 +622,12 @@ class DetectabilityStudy(BaseEstimator):
         Significantly worse at 95% confidence: 'forest' (18.7% at 1.2%).
         These comparisons include noise only: another year, baseline or FE model may change the order.
         """
-        limit = check_probability(max_false_alarms, "max_false_alarms")
+        results, limit = self._results, check_probability(max_false_alarms, "max_false_alarms")
         asked = self.confidence_ if confidence is None else check_probability(confidence, "confidence")
         if by not in ("pod", "pod_at_equal_pfa"):
             raise ValueError(f"by is {by!r:.100}; expected 'pod' or 'pod_at_equal_pfa'")
         self._check_source(source)
-        rows = self._results[self._results["source"] == source]
+        rows = results[results["source"] == source]
         for measure, kind in (("PFA", "healthy"), ("POD", "damaged")):
             if not (rows["measure"] == measure).any():
                 raise ValueError(
