@@ -38,8 +38,7 @@ class BaselineResiduals:
     ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
     n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
     mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
-    of the training records they are. ``ratios``, (n_records, n_parameters), are the parameters of the records over
-    out-of-fold predictions. ``findings`` say in which weather residuals are not to be trusted.
+    of the training records they are. ``findings`` say in which weather residuals are not to be trusted.
     """
 
     weather: Array
@@ -47,7 +46,6 @@ class BaselineResiduals:
     own: Array
     folds: NDArray[np.intp]
     rows: NDArray[np.intp] | None = None
-    ratios: Array | None = None
     findings: tuple[WeatherWarning, ...] = ()
 
     @cached_property
@@ -107,7 +105,7 @@ class BaselineResiduals:
         taken, other = self._taken(similar, random_state), self._taken(similar, random_state)
         n_modes, n_independent = self.n_modes, len(values) / self.correlation_time
         bandwidth = (4 / ((n_modes + 2) * n_independent)) ** (1 / (n_modes + 4))
-        angle, mean = np.arctan(bandwidth), similar @ self._levels[0][:, :n_modes]
+        angle, mean = np.arctan(bandwidth), similar @ self._levels[0]
         first = self._completed(values[taken], random_state) if is_complete else values[taken]
         second = self._completed(self.usual[other], random_state)
         first, second = self._carried(first, taken, similar) - mean, self._carried(second, other, similar) - mean
@@ -160,13 +158,6 @@ class BaselineResiduals:
         found = Gaussian.fitted(self.usual)
         return Gaussian(found.mean, found.covariance + JITTER * np.diag(np.diag(found.covariance)))
 
-    def draw_records(self, weather: Array, random_state: np.random.RandomState) -> tuple[NDArray[np.intp], list[Array]]:
-        """Positions of the records drawn for each row, and their residuals and ratios as they are in its weather."""
-        similar = self._similar(weather)
-        taken = self._taken(similar, random_state)
-        columns = self.drawn if self.ratios is None else np.hstack([self.drawn, self.ratios])
-        return taken, np.split(self._carried(columns[taken], taken, similar), [self.n_modes], axis=1)
-
     def _similar(self, weather: Array) -> scipy.sparse.csr_array:
         """Equal weights of the records with the most similar weather, (n_rows, n_records)."""
         some = one_in_each_part(len(self.places), MOST_PLACES)
@@ -190,8 +181,7 @@ class BaselineResiduals:
         taken = similar.indices.reshape(n_rows, -1)[np.arange(n_rows), which].astype(np.intp)
         if len(ends) == n_rows:
             return taken
-        logs = np.log(self._levels[1][:, : self.n_modes])
-        here = np.log(np.sqrt(similar @ self._levels[1] ** 2)[:, : self.n_modes])
+        logs, here = np.log(self._levels[1]), np.log(np.sqrt(similar @ self._levels[1] ** 2))
         starts = np.union1d([0], ends)
         stops = np.append(starts[1:], n_rows)
         while len(starts):  # runs, each of which may end early, where another one begins
@@ -212,20 +202,18 @@ class BaselineResiduals:
 
     def _carried(self, values: Array, taken: NDArray[np.intp], similar: scipy.sparse.csr_array) -> Array:
         """Values of the records that rows took, with the mean and the deviation of the weather of the rows."""
-        n_columns = values.shape[1]
-        mean, deviation = self._levels[0][:, :n_columns], self._levels[1][:, :n_columns]
-        scale = np.sqrt(similar @ self._levels[1] ** 2)[:, :n_columns] / deviation[taken]
+        mean, deviation = self._levels
+        scale = np.sqrt(similar @ deviation**2) / deviation[taken]
         return np.asarray(similar @ mean + (values - mean[taken]) * scale)
 
     @cached_property
     def _levels(self) -> tuple[Array, Array]:
-        """Mean and standard deviation of residuals and ratios in the weather of each record, outliers left out.
+        """Mean and standard deviation of residuals in the weather of each record, outliers left out.
 
         The 100 records with the most similar weather give them.
         """
-        columns = self.usual if self.ratios is None else np.hstack([self.usual, self.ratios])
-        mean = np.nan_to_num(self._local_mean(columns, self.weather, 100, MOST_PLACES))
-        square = np.nan_to_num(self._local_mean(columns**2, self.weather, 100, MOST_PLACES))
+        mean = np.nan_to_num(self._local_mean(self.usual, self.weather, 100, MOST_PLACES))
+        square = np.nan_to_num(self._local_mean(self.usual**2, self.weather, 100, MOST_PLACES))
         size = np.sqrt(np.maximum(np.nanmax(square, axis=0, initial=0), np.finfo(float).tiny))
         return mean, np.maximum(np.sqrt(np.maximum(square - mean**2, 0.0)), JITTER * size)
 

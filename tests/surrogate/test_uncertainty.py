@@ -118,7 +118,7 @@ def test_quantiles_measure_each_period_by_the_others():
 
 def drawn_records(found, weather, seed=0):
     """Which record the noise of each row begins with; its gaps are those of that record."""
-    taken = found.draw_records(weather, np.random.RandomState(seed))[0]
+    taken = found._taken(found._similar(weather), np.random.RandomState(seed))
     values = found.draw(weather, np.random.RandomState(seed))
     np.testing.assert_array_equal(np.isnan(values), np.isnan(found.values[taken]))
     return taken

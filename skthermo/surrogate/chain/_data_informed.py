@@ -846,9 +846,11 @@ def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | 
     rows = np.concatenate([of_week[week] for week in random.randint(len(of_week), size=len(of_week))])
     weights = None if records.weights is None else records.weights[rows]
     with collected():
-        learner = clone(last_step(fem.mapper_))
+        seen, inputs = inputs_of_last_step(fem.mapper_, filled), records.inputs[rows]
+        if isinstance(seen, pd.DataFrame):
+            inputs = pd.DataFrame(inputs, columns=seen.columns)
         targets = pd.DataFrame(records.targets[rows], columns=fem.parameter_names_)
-        mapper = with_last_step(fem.mapper_, fit_checked(learner, records.inputs[rows], targets, weights))
+        mapper = with_last_step(fem.mapper_, fit_checked(clone(last_step(fem.mapper_)), inputs, targets, weights))
         learned = possible(mapper.predict(filled))[0]
         modelled = fem.thermal_.frequencies(learned)
         known, parts = records.usable[rows] / modelled[rows], {"sensors": fem.sensors_, "mapper": mapper}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,29 +61,6 @@ class TrainingRecords(SavesFrames):
             return np.ones(len(self.inputs), dtype=bool)
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
-    def resampled(
-        self, residuals: BaselineResiduals, discrepancy: Discrepancy, random_state: np.random.RandomState
-    ) -> TrainingRecords:
-        """Records that this structure could have given as well in the same weather, before a mapper learns them.
-
-        Each takes what a record of similar weather left unexplained, of its parameters and of its frequencies, in runs.
-        """
-        known = ~np.isnan(self.inputs).any(axis=1)
-        order = np.argsort(row_times(self.temperatures), kind="stable")
-        order = order[known[order]]
-        taken, (values, ratios) = residuals.draw_records(self.inputs[order], random_state)
-        targets, measured = np.full_like(self.targets, np.nan), np.full(np.shape(self.frequencies), np.nan)
-        targets[order] = self.learned[order] * ratios
-        expected = self.modelled[order] * np.exp(discrepancy.at(self.inputs[order]))
-        measured[order] = expected * (1 + values)
-        weights = None
-        if self.weights is not None:
-            weights = np.zeros(len(targets))
-            weights[order] = self.weights[residuals.rows[taken]]
-        return replace(
-            self, frequencies=frame_like(self.frequencies, measured), usable=measured, targets=targets, weights=weights
-        )
-
     def residuals(self, model: ThermalModel) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
@@ -124,8 +101,7 @@ class TrainingRecords(SavesFrames):
         known = ~np.isnan(values).all(axis=1)
         consequence = "Standard deviations, intervals and noise are unreliable there"
         doubts = tuple(unseen_weather(records, fold_of, consequence))
-        ratios = (theta / predicted)[known]
-        return BaselineResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], ratios, doubts)
+        return BaselineResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], doubts)
 
 
 def remembering_folds(records: Table, inputs: Array, own: Array) -> NDArray[np.intp]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
@@ -99,11 +99,6 @@ class ServiceRecords:
                 record = (record + 1) % n_records
             taken[row] = record
         return taken
-
-    def resampled(self, random_state: np.random.RandomState) -> ServiceRecords:
-        """Gaps and outliers that the training records could have had as well, in their own weather."""
-        taken = self.draw(self.places, random_state)
-        return replace(self, missing=self.missing[taken], outliers=self.outliers[taken])
 
     def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
         """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
