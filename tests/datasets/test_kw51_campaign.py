@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pandas.testing import assert_frame_equal
+from scipy.stats import kurtosis
 
 from skthermo.datasets import kw51_structure, make_kw51, make_kw51_campaign
 from skthermo.fem import mac
@@ -12,6 +13,7 @@ from skthermo.studies import Scenario
 
 SHIFTS = np.array([-1.13, -0.58, -1.18, -0.34, 2.07])  # %, modes 2 to 6
 COVERAGE = np.array([0.344, 0.950, 0.503, 0.879, 0.965])
+LEVELS = np.array([0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0013])
 CORRELATIONS = np.array([-0.428, -0.553, -0.310, -0.644])  # modes 2 to 5
 
 
@@ -190,10 +192,18 @@ def test_weather_is_that_of_the_region(several):
 
 @pytest.mark.nightly
 def test_moisture_is_smooth_noise_of_a_closed_form(several):
-    noise = np.array([(one.theta["M_b"] - 1) / 0.0018 for one in several])
+    noise = np.array([(one.theta["M_b"] - 1) / 0.0033 for one in several])
     lags = np.arange(0, 144, 24)
     found = [(noise[:, lag:] * noise[:, : noise.shape[1] - lag]).mean() for lag in lags]
-    assert_allclose(found, (1 + lags / 36) * np.exp(-lags / 36), atol=0.1)
+    assert_allclose(found, (1 + lags / 16) * np.exp(-lags / 16), atol=0.1)
+
+
+@pytest.mark.nightly
+def test_noise_is_correlated_and_has_heavy_tails(several):
+    noise = np.concatenate([(one.frequencies / one.clean_frequencies - 1) / LEVELS for one in several])
+    assert_allclose(np.nanstd(noise, axis=0), 1.0, atol=0.02)
+    assert_allclose([pd.Series(column).autocorr(1) for column in noise.T], 0.15, atol=0.02)
+    assert np.median(kurtosis(noise, fisher=False, nan_policy="omit")) == pytest.approx(3 + 6 / (9 - 4), abs=0.3)
 
 
 def test_the_slab_forgets_the_steels_past_exponentially():
