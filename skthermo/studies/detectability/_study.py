@@ -21,8 +21,7 @@ from skthermo.exceptions import ModelWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
-from skthermo.studies.detectability._ranking import in_words, rank
-from skthermo.studies.detectability._rates import EvaluatedRecords
+from skthermo.studies.detectability._rates import EvaluatedRecords, in_words, rank
 from skthermo.studies.detectability._replicates import ReplicateRates, Replicates, in_sentences
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
@@ -323,7 +322,7 @@ class DetectabilityStudy(BaseEstimator):
             results = rates.banded(results, confidence)
         findings += many_false_alarms(results)
         self.results_, self.scenarios_, self.confidence_, self.errors_ = results, scenarios, confidence, texts
-        self.candidates_ = left
+        self._candidates = left
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
@@ -640,7 +639,8 @@ class DetectabilityStudy(BaseEstimator):
         records = self._records(source)
         if asked != self.confidence_:
             rows = pd.DataFrame([one.summary(asked) for one in records])
-        return rank(records, rows, calibration, self.errors_, limit, asked, by)
+        families = {key[:2]: family for key, family in families_of(rows, asked).items()}
+        return rank(records, rows, families, calibration, self.errors_, limit, asked, by)
 
     def labelled_scores(
         self, detector: str | None = None, source: str = "simulated", scenarios: Sequence[str] | None = None
