@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
@@ -59,44 +58,6 @@ def test_the_recommended_mode_gains_as_much_in_true_records(table):
             smallest.append(pod_curve(severities, alarms, np.full(10, 365)).a90)
         gains.append(smallest[0] - smallest[1])
     assert best["ci_low"] < np.mean(gains) < best["ci_high"]
-
-
-@pytest.mark.nightly
-def test_the_noisier_the_mode_the_less_it_gains(study):
-    few = clone(study).set_params(n_repeats=2)
-    few.run(WEATHER)
-    gains = [
-        compare_extensions(few, WEATHER, modes=[8], noise=noise, baseline_factors=())["gain"][0]
-        for noise in (0.001, 0.01, 0.2)
-    ]
-    assert gains[0] > gains[1] > gains[2]
-    each = compare_extensions(few, WEATHER, modes=[8, 6], noise=[0.01, 0.2], baseline_factors=())
-    assert each.set_index("candidate").loc["mode 9", "gain"] == pytest.approx(gains[1])
-
-
-@pytest.mark.nightly
-def test_same_bits_whatever_the_jobs(study):
-    few = clone(study).set_params(n_repeats=2)
-    few.run(WEATHER)
-    expected = compare_extensions(few, WEATHER, modes=[8])
-    pd.testing.assert_frame_equal(compare_extensions(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
-
-
-@pytest.mark.nightly
-def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays):
-    by_name, by_position = (
-        make_pipeline(TemperatureCompensator(LinearRegression(), targets=targets), MahalanobisDetector())
-        for targets in (MODES, list(range(3, 9)))
-    )
-    tables = []
-    for chain, detector, weather in ((fem, by_name, WEATHER), (fem_of_arrays, by_position, WEATHER.to_numpy())):
-        scenarios = sweep(chain, (0.05, 0.1, 0.15), ["top"])
-        study = study_of(chain, detector, scenarios, noise=0.01)
-        study.run(weather)
-        tables.append(
-            compare_extensions(study, weather, modes=[8], baseline_factors=())
-        )  # only times tell two years from one
-    pd.testing.assert_frame_equal(*tables)
 
 
 @pytest.mark.nightly

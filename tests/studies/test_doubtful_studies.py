@@ -54,15 +54,6 @@ def test_a_blind_detector_is_said_to_be_blind(fem):
         assert minimum["mdd"].isna().all()
 
 
-def test_one_warning_for_all_families_whose_curves_lie_beside_their_points(fem):
-    both = study(fem, sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"]))
-    results = both.run(WEATHER)
-    results.loc[results["measure"] == "POD", "rate"] = [0.3, 0.35, 0.99] * 2
-    with pytest.warns(UserWarning, match="of 3 .*poor-curve-fit") as caught:
-        both.minimum_detectable_damage(method="curve")
-    assert len(caught) == 1
-
-
 def test_errors_name_the_family_with_damage_and_strengthening(fem):
     mixed = study(fem, [Scenario(f"bottom {severity}", {"bottom": severity}) for severity in (-0.1, 0.2)])
     mixed.run(WEATHER)
@@ -81,12 +72,3 @@ def test_a_sweep_of_damage_and_strengthening_has_a_curve_for_each(fem):
         assert found.index.tolist() == ["bottom strengthened", "bottom"]
         assert -0.4 < found["bottom strengthened"] < 0 < found["bottom"] < 0.4
         assert found["bottom"] == pytest.approx(alone.minimum_detectable_damage(method=method)["mdd"].iloc[0])
-
-
-def test_strengthening_is_compared_by_its_magnitude(fem):
-    stronger = study(fem, sweep(fem, (-0.1, -0.2, -0.3), ["bottom"]))
-    stronger.run(WEATHER)
-    found = stronger.minimum_detectable_damage(method="curve")["mdd"].iloc[0]
-    table = compare_extensions(stronger, WEATHER, modes=[], baseline_factors=(2,))
-    assert -0.3 < found < -0.1
-    assert table["mdd_now"][0] == pytest.approx(-found, abs=0.05)

@@ -101,12 +101,6 @@ def test_a_bound_that_never_reaches_the_level_is_infinite():
     assert curve.a90_95 == np.inf
 
 
-def test_unfavourable_starts_converge():
-    truth = expit(-30 + 100 * SEVERITIES)
-    curve = pod_curve(SEVERITIES, truth, np.ones(5), log=False)
-    assert (curve.intercept, curve.slope) == pytest.approx((-30, 100), rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -164,10 +158,6 @@ def test_a_curve_that_fits_gives_no_warning(n_records):
     assert warned_share(expit(8 + 5 * np.log(SEVERITIES)), n_records) <= 0.01
 
 
-def test_false_alarms_bend_the_curve_too_little_to_matter():
-    assert warned_share(0.02 + 0.98 * expit(-6 + 30 * SEVERITIES), 3000) <= 0.01
-
-
 @pytest.mark.one_case
 @pytest.mark.parametrize("pod", [[0.05, 0.6, 0.65, 0.7, 0.98], [0.3, 0.35, 0.4, 0.97, 0.98]])
 def test_a_curve_beside_its_points_is_said(pod):
@@ -219,14 +209,6 @@ def test_effective_number_is_that_of_the_correlation_of_the_alarms(n_repeats):
     lags = np.arange(1, 60)  # correlation of the signs of a Gaussian process: 2/pi arcsin(rho)
     expected = 1 + 2 * (2 / np.pi * np.arcsin(0.8**lags)).sum()
     assert np.median(ratios) == pytest.approx(expected, rel=0.25)
-
-
-def test_independent_records_nearly_keep_their_number():
-    values, _ = decisions(np.random.RandomState(0), 0.3, 0.0, 20, 365)
-    found = rate_of(values)
-    assert 0.9 * found.n_records < found.n_effective <= found.n_records
-    deviation = np.sqrt(found.rate * (1 - found.rate) / found.n_records)
-    assert found.ci_high - found.ci_low == pytest.approx(2 * 1.96 * deviation, rel=0.15)
 
 
 def test_bounds_are_quantiles_of_the_beta_distribution():

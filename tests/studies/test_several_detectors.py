@@ -12,8 +12,8 @@ from sklearn.exceptions import ConvergenceWarning
 
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector
 from skthermo.exceptions import RecordsWarning
-from skthermo.studies import Scenario, compare_extensions, sweep
-from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of, windowed
+from skthermo.studies import Scenario
+from tests.studies.studies import SIDE_BY_SIDE, WEATHER, compensated, study_of
 
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
 
@@ -88,19 +88,6 @@ def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
         np.testing.assert_array_equal(decisions, study.calibration_[name, source])
 
 
-@pytest.mark.nightly
-def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, study):
-    backwards = dict(reversed(detectors().items()))
-    other = study_of(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2)
-    results = other.run(WEATHER).set_index(["detector", "scenario"])
-    pd.testing.assert_frame_equal(results, study.results_.set_index(["detector", "scenario"]).loc[results.index])
-    for mine, others in ((study.decisions_, other.decisions_), (study.calibration_, other.calibration_)):
-        assert mine.keys() == others.keys()
-        for key, decisions in mine.items():
-            np.testing.assert_array_equal(decisions, others[key])
-    pd.testing.assert_frame_equal(other.ranking(), study.ranking())
-
-
 class CountedForest(IsolationForest):
     """Counts its fits."""
 
@@ -164,23 +151,6 @@ def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
 
 
 @pytest.mark.nightly
-def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
-    sees = {
-        "raw": (MahalanobisDetector(), MODES),
-        "lines": (compensated(), list(SIDE_BY_SIDE)),
-        "week": (windowed(7), list(SIDE_BY_SIDE)),
-    }
-    study = study_of(fem, {name: detector for name, (detector, _) in sees.items()}, SCENARIOS, n_repeats=1)
-    results = study.run(WEATHER, SIDE_BY_SIDE)
-    pd.testing.assert_frame_equal(study.run(WEATHER), results)  # as what the chain has learned
-    for name, (_, columns) in sees.items():
-        assert study.columns_[name] == columns
-    few = study.run(WEATHER, YEAR.frequencies)
-    assert few["error"].str.contains("baseline has none").sum() == 2  # those that compensate
-    assert (few.loc[few["detector"] == "raw", "error"] == "").all()
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("trouble", "message"),
     [
@@ -224,19 +194,6 @@ def test_what_is_asked_of_one_of_several_detectors(study):
     one = study.minimum_detectable_damage(0.3, detector="lines")
     assert one.index.names == ["family", "source"]
     pd.testing.assert_frame_equal(one, smallest.loc["lines"])
-
-
-@pytest.mark.nightly
-def test_compare_extensions_asks_for_a_detector_of_several(fem):
-    scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
-    several = study_of(fem, {"raw": MahalanobisDetector(), "lines": compensated()}, scenarios, noise=0.01)
-    several.run(WEATHER)
-    with pytest.raises(ValueError, match="detector is None"):
-        compare_extensions(several, WEATHER, modes=[6])
-    found = compare_extensions(several, WEATHER, modes=[6], detector="raw")
-    alone = study_of(fem, MahalanobisDetector(), scenarios, noise=0.01)
-    alone.run(WEATHER)
-    pd.testing.assert_frame_equal(found, compare_extensions(alone, WEATHER, modes=[6]))
 
 
 class Doubtful(MahalanobisDetector):
