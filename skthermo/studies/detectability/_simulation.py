@@ -250,7 +250,7 @@ class Simulation:
         These are drawn by the first seed; the second is that of the reference.
         """
         noise, T = self.measurement.drawn(self.fem, self.weather, int(seeds[0]))
-        T = pd.DataFrame(T, getattr(self.T, "index", None), sensors_of(self.fem))
+        T = pd.DataFrame(T, self.T.index if isinstance(self.T, pd.DataFrame) else None, sensors_of(self.fem))
         for scenario in self.scenarios if scenarios is None else scenarios:
             draws = self.clean[scenario.name]
             frequencies = draws[repeat % len(draws)] * (1 + noise)
@@ -268,7 +268,7 @@ class Simulation:
         """Given records of a scenario; those without times of their own have the rows of the weather, if as many."""
         T = self.T if T is None else T
         table = named(self.fem, values, f"the reference of scenario {scenario.name!r}")
-        if not isinstance(values, pd.DataFrame) and hasattr(T, "index") and len(table) == len(T):
+        if not isinstance(values, pd.DataFrame) and isinstance(T, pd.DataFrame) and len(table) == len(T):
             table = table.set_axis(T.index)
         return Records(scenario, REFERENCE, table, T)
 
