@@ -47,7 +47,7 @@ scenarios = sweep(fem, (0.1, 0.15, 0.2, 0.25, 0.3), GROUPS)
 study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=10, random_state=0, uncertainty="noise")
 study.run(year.temperatures, reference=true_records)
 print(study.minimum_detectable_damage())
-PODCurveDisplay.from_predictions(study.pod_curve("bottom", log=False), label="damage of the lower chord")
+PODCurveDisplay.from_predictions(study.pod_curve("bottom"), label="damage of the lower chord")
 
 # %%
 # What has happened?

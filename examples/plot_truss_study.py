@@ -135,7 +135,7 @@ finer = study_of(np.arange(0.02, 0.31, 0.02))
 def draw_curves(axes, n_columns):
     """Curves of each group, with their severities of 90 % in the title, and one legend of all."""
     for ax, group in zip(axes, GROUPS, strict=True):
-        curves = {label: finer.pod_curve(group, source, log=False) for label, source in sources.items()}
+        curves = {label: finer.pod_curve(group, source) for label, source in sources.items()}
         for label, curve in curves.items():
             PODCurveDisplay.from_predictions(curve, label=label, ax=ax, marks=False)
         ax.get_legend().remove()

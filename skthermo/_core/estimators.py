@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from numbers import Integral
-from operator import attrgetter
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, overload
 
@@ -236,11 +235,6 @@ def with_means(estimator: Any, X: Any, y: Any) -> Any:
     if not hasattr(last, "behind_means") or isinstance(estimator, BaseSearchCV):
         return estimator
     return last.behind_means(X, y, estimator.steps[:-1] if isinstance(estimator, Pipeline) else ())
-
-
-def held(path: str) -> Any:
-    """A property that a part of an object holds, such as "_found.table"; the object's class says what it is."""
-    return property(attrgetter(path), doc=f"``{path}``, as the class describes it.")
 
 
 class Stages:

@@ -55,12 +55,10 @@ def map_on_blas_threads(function: Callable[[Item], Result], items: Sequence[Item
             yield from threads(delayed(function)(item) for item in items)
 
 
-def run_jobs(
-    jobs: Iterable[Any], total: int, *, unit: str, count: Callable[[Any], int] = lambda _: 1, **options: Any
-) -> list[Any]:
+def run_jobs(jobs: Iterable[Any], total: int, *, unit: str, **options: Any) -> list[Any]:
     """Results of joblib's jobs, in their order; a bar counts them as they come."""
     with closing(as_they_come(jobs, **options)) as results:
-        return list(with_progress(results, total, None, count=count, unit=unit))
+        return list(with_progress(results, total, None, count=lambda _: 1, unit=unit))
 
 
 def as_they_come(jobs: Iterable[Any], *, n_jobs: int | None = None, **options: Any) -> Generator[Any, None, None]:

@@ -62,24 +62,6 @@ def without_kinds(kinds: Collection[str]) -> Iterator[None]:
     warn_each(one for one in findings if one.kind not in kinds)
 
 
-@contextmanager
-def warnings_once(where: str = "") -> Iterator[list[str]]:
-    """Give one warning of each kind when the context ends, and yield a list of their texts.
-
-    ``where`` is said of repetitions, such as "in the simulations of this study".
-    """
-    texts: list[str] = []
-    with collected() as findings:
-        yield texts
-    by_kind: dict[str, list[SkthermoWarning]] = {}
-    for one in findings:
-        by_kind.setdefault(one.kind, []).append(one)
-    for same in by_kind.values():
-        text = str(same[0].args[0]) + (f" ({where}, more than once)" if where and len(same) > 1 else "")
-        texts.append(str(type(same[0])(text, same[0].kind)))
-        warn_each([type(same[0])(text, same[0].kind)])
-
-
 def warn_user(message: str, category: type[SkthermoWarning], kind: str) -> None:
     """Give one warning; an empty text is none."""
     warn_each([category(message, kind)] if message else [])

@@ -209,8 +209,9 @@ class Choice:
 
     def only(self) -> DetectabilityStudy:
         """The study as if the detector of the report were its only one."""
-        one = copy.copy(self.study)
-        one.findings_ = self.study.findings_.only(self.name)
+        one, results = copy.copy(self.study), self.study.results_
+        one.results_ = results[results["detector"] == self.name].reset_index(drop=True)
+        one.indices_ = {key: index for key, index in self.study.indices_.items() if key[0] == self.name}
         return one
 
     @property

@@ -35,8 +35,7 @@ class BaselineResiduals:
     ``weather``, (n_records, n_inputs), are inputs of the temperature mapper, lags included. ``values``, (n_records,
     n_modes), are measured frequencies over out-of-fold predictions, minus 1; ``own`` the same from predictions of the
     mapper that learned from all records. ``folds`` tells which records were predicted together, and ``rows`` which rows
-    of the training records they are. ``ratios``, (n_records, n_parameters), are the parameters of the records over
-    out-of-fold predictions. ``findings`` say in which weather residuals are not to be trusted.
+    of the training records they are. ``findings`` say in which weather residuals are not to be trusted.
     """
 
     weather: Array
@@ -44,7 +43,6 @@ class BaselineResiduals:
     own: Array
     folds: NDArray[np.intp]
     rows: NDArray[np.intp] | None = None
-    ratios: Array | None = None
     findings: tuple[WeatherWarning, ...] = ()
 
     @cached_property
@@ -98,11 +96,6 @@ class BaselineResiduals:
             return self._completed(values[self._taken(known, random_state)], random_state)
 
         return self._where_known(weather, of_known)
-
-    def draw_records(self, weather: Array, random_state: np.random.RandomState) -> tuple[NDArray[np.intp], Array]:
-        """Positions of the records drawn for rows of known weather, and their residuals."""
-        taken = self._taken(weather, random_state)
-        return taken, self.values[taken]
 
     def _taken(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records whose residuals rows of known weather take, in blocks."""

@@ -14,6 +14,7 @@ from joblib import Memory
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils import Bunch
 
@@ -47,7 +48,17 @@ from skthermo._core.estimators import (
     validate_data,
     with_means,
 )
-from skthermo._core.frames import Table, check_same_rows, column_names, frame_like, like_targets, row_weights
+from skthermo._core.frames import (
+    DAY_NS,
+    Table,
+    check_same_rows,
+    column_names,
+    frame_like,
+    has_stamps,
+    like_targets,
+    row_times,
+    row_weights,
+)
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
@@ -877,9 +888,8 @@ def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | 
 
     Notes
     -----
-    A residual bootstrap: each training record gets the prediction for its own weather, and what a record of similar
-    weather left unexplained out of fold, of the parameters and of the frequencies, in runs as long as these are
-    correlated. Nothing is inverted.
+    A bootstrap of pairs of temperatures and parameters: the mapper and the discrepancy learn the records of weeks that
+    are drawn with replacement. Nothing is inverted.
 
     Examples
     --------
@@ -892,18 +902,34 @@ def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | 
     True
     """
     check_is_fitted(fem)
+    records, random = fem.records_, as_random_state(random_state)
+    filled = frame_like(records.temperatures, fem.sensors_.fill(as_floats(records.temperatures))[0])
+    stamped = has_stamps(records.temperatures)
+    weeks = row_times(filled) // (7 * DAY_NS) if stamped else np.arange(len(filled)) * 52 // len(filled)
+    of_week = [rows[records.trained[rows]] for rows in (np.flatnonzero(weeks == week) for week in np.unique(weeks))]
+    rows = np.concatenate([of_week[week] for week in random.randint(len(of_week), size=len(of_week))])
+    weights = None if records.weights is None else records.weights[rows]
     with collected():
-        records = fem.records_.resampled(fem.recorder_.residuals, fem.discrepancy_, as_random_state(random_state))
-        filled = frame_like(records.temperatures, fem.sensors_.fill(records.temperatures)[0])
-        targets = named(filled, records.targets, fem.parameter_names_)
-        mapper = fit_checked(clone(fem.mapper_), filled, targets, records.weights)
+        seen, inputs = inputs_of_last_step(fem.mapper_, filled), records.inputs[rows]
+        if isinstance(seen, pd.DataFrame):
+            inputs = pd.DataFrame(inputs, columns=seen.columns)
+        targets = pd.DataFrame(records.targets[rows], columns=fem.parameter_names_)
+        mapper = with_last_step(fem.mapper_, fit_checked(clone(last_step(fem.mapper_)), inputs, targets, weights))
         learned = possible(mapper.predict(filled))[0]
-        records = replace(records, learned=learned, modelled=fem.thermal_.frequencies(learned))
-        parts = {"sensors": fem.sensors_, "mapper": mapper}
-        known = records.inputs, records.usable / records.modelled, records.weights
-        discrepancy = Discrepancy.fitted(fem.discrepancy_.regressor, *known, **parts)
+        modelled = fem.thermal_.frequencies(learned)
+        known, parts = records.usable[rows] / modelled[rows], {"sensors": fem.sensors_, "mapper": mapper}
+        discrepancy = Discrepancy.fitted(fem.discrepancy_.regressor, records.inputs[rows], known, weights, **parts)
     thermal = replace(fem.thermal_, mapper=mapper, discrepancy=discrepancy)
+    records = replace(records, learned=learned, modelled=modelled)
     return copy(fem)._hold(RecordSimulator(thermal, records, fem.recorder_.service))
+
+
+def with_last_step(mapper: BaseEstimator, fitted: BaseEstimator) -> BaseEstimator:
+    """A fitted pipeline that ends with another fitted estimator; what is no pipeline is that estimator itself."""
+    if not isinstance(mapper, Pipeline):
+        return fitted
+    name, last = mapper.steps[-1]
+    return Pipeline([*mapper.steps[:-1], (name, with_last_step(last, fitted))])
 
 
 def with_model(fem: DataInformedFEM, model: FEModel) -> DataInformedFEM:

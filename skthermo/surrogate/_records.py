@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
@@ -29,7 +29,7 @@ from skthermo._core.arrays import (
     spread_evenly,
 )
 from skthermo._core.estimators import _safe_indexing, last_step
-from skthermo._core.frames import Table, check_same_rows, column_names, frame_like, row_times
+from skthermo._core.frames import Table, check_same_rows, column_names, row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning
@@ -76,29 +76,6 @@ class TrainingRecords(SavesFrames):
             return np.ones(len(self.inputs), dtype=bool)
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
-    def resampled(
-        self, residuals: BaselineResiduals, discrepancy: Discrepancy, random_state: np.random.RandomState
-    ) -> TrainingRecords:
-        """Records that this structure could have given as well in the same weather, before a mapper learns them.
-
-        Each takes what a record of similar weather left unexplained, of its parameters and of its frequencies, in runs.
-        """
-        known = ~np.isnan(self.inputs).any(axis=1)
-        order = np.argsort(row_times(self.temperatures), kind="stable")
-        order = order[known[order]]
-        taken, values = residuals.draw_records(self.inputs[order], random_state)
-        targets, measured = np.full_like(self.targets, np.nan), np.full(np.shape(self.frequencies), np.nan)
-        targets[order] = self.learned[order] * residuals.ratios[taken]
-        expected = self.modelled[order] * np.exp(discrepancy.at(self.inputs[order]))
-        measured[order] = expected * (1 + values)
-        weights = None
-        if self.weights is not None:
-            weights = np.zeros(len(targets))
-            weights[order] = self.weights[residuals.rows[taken]]
-        return replace(
-            self, frequencies=frame_like(self.frequencies, measured), usable=measured, targets=targets, weights=weights
-        )
-
     def residuals(self, model: ThermalModel) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
@@ -141,8 +118,7 @@ class TrainingRecords(SavesFrames):
         known = ~np.isnan(values).all(axis=1)
         consequence = "Standard deviations, intervals and noise are unreliable there"
         doubts = tuple(unseen_weather(records, fold_of, consequence))
-        ratios = (theta / predicted)[known]
-        return BaselineResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], ratios, doubts)
+        return BaselineResiduals(inputs[known], values[known], own[known], fold_of[known], order[known], doubts)
 
 
 def frequency_table(y: Any) -> tuple[Table, bool]:
@@ -289,11 +265,6 @@ class ServiceRecords:
                 record = (record + 1) % n_records
             taken[row] = record
         return taken
-
-    def resampled(self, random_state: np.random.RandomState) -> ServiceRecords:
-        """Gaps and outliers that the training records could have had as well, in their own weather."""
-        taken = self.draw(self.places, random_state)
-        return replace(self, missing=self.missing[taken], outliers=self.outliers[taken])
 
     def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
         """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed

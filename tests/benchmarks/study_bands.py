@@ -25,6 +25,7 @@ import numpy as np
 import pandas as pd
 from harness import arguments, compensated, shown, split
 from joblib import Parallel, delayed
+from scipy.stats import norm
 from structures import FOOTBRIDGE_GROUPS, footbridge
 from structures import Footbridge as Measured
 
@@ -172,11 +173,9 @@ def detector(name, columns):
 def bands(study):
     """Bands by kind: (detector, state) -> (lowest, highest)."""
     found, of_noise = study.replicates_, {}
-    ends = (1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2
-    for key, rates in found.rates.items():
-        draws = rates[:, -1]  # two in each replicate
-        alone = found.own[key].mean() + np.sqrt(2) * (draws - draws.mean(axis=1, keepdims=True))
-        of_noise[key] = np.quantile(alone, ends, method="weibull")
+    for key in found.rates:
+        margin = norm.ppf((1 + CONFIDENCE) / 2) * study.uncertainty_.at[key, "noise"]
+        of_noise[key] = found.own.at[key, "rate"] + np.array([-margin, margin])
     first = {key: rates[:, :1] for key, rates in found.rates.items()}
     kinds = {"noise, weather": replace(found, parts=found.parts[:1], rates=first), DEFAULT: found}
     of_others = {

@@ -113,11 +113,11 @@ def test_curves_of_strengthenings_and_of_records_without_a_slope():
     display = PODCurveDisplay.from_predictions(pod_curve([-0.1, -0.2, -0.3], [10, 60, 99], [100] * 3))
     assert display.line_.get_xdata()[[0, -1]].tolist() == [-30.0, -10.0]
     assert display.marks_["a90"].get_xdata()[0] == pytest.approx(100 * display.curve.a90)
-    with pytest.warns(UserWarning, match="between 0.1 and 0.2.*separated-severities"):
+    with pytest.warns(UserWarning, match="between 0.1 and 0.2.*no-curve"):
         steep = pod_curve([0.1, 0.2, 0.3], [0, 100, 100], [100] * 3)
     display = PODCurveDisplay.from_predictions(steep)
     assert list(display.marks_) == ["bracket"]
     assert display.marks_["bracket"].get_label() == "$a_{90}$ between 10.0 and 20.0 %"
-    with pytest.warns(UserWarning, match="above 0.2.*separated-severities"):
+    with pytest.warns(UserWarning, match="above 0.2.*no-curve"):
         missed = pod_curve([0.1, 0.2], [0, 0], [100] * 2)
     assert PODCurveDisplay.from_predictions(missed).marks_["bracket"].get_label() == "$a_{90}$ beyond 20.0 %"

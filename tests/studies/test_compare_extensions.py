@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
@@ -62,44 +61,6 @@ def test_the_recommended_mode_gains_as_much_in_true_records(table):
 
 
 @pytest.mark.nightly
-def test_the_noisier_the_mode_the_less_it_gains(study):
-    few = clone(study).set_params(n_repeats=2)
-    few.run(WEATHER)
-    gains = [
-        compare_extensions(few, WEATHER, modes=[8], noise=noise, baseline_factors=())["gain"][0]
-        for noise in (0.001, 0.01, 0.2)
-    ]
-    assert gains[0] > gains[1] > gains[2]
-    each = compare_extensions(few, WEATHER, modes=[8, 6], noise=[0.01, 0.2], baseline_factors=())
-    assert each.set_index("candidate").loc["mode 9", "gain"] == pytest.approx(gains[1])
-
-
-@pytest.mark.nightly
-def test_same_bits_whatever_the_jobs(study):
-    few = clone(study).set_params(n_repeats=2)
-    few.run(WEATHER)
-    expected = compare_extensions(few, WEATHER, modes=[8])
-    pd.testing.assert_frame_equal(compare_extensions(few.set_params(n_jobs=2), WEATHER, modes=[8]), expected)
-
-
-@pytest.mark.nightly
-def test_arrays_and_compensated_detectors_by_name_or_position(fem, fem_of_arrays):
-    by_name, by_position = (
-        make_pipeline(TemperatureCompensator(LinearRegression(), targets=targets), MahalanobisDetector())
-        for targets in (MODES, list(range(3, 9)))
-    )
-    tables = []
-    for chain, detector, weather in ((fem, by_name, WEATHER), (fem_of_arrays, by_position, WEATHER.to_numpy())):
-        scenarios = sweep(chain, (0.05, 0.1, 0.15), ["top"])
-        study = study_of(chain, detector, scenarios, noise=0.01)
-        study.run(weather)
-        tables.append(
-            compare_extensions(study, weather, modes=[8], baseline_factors=())
-        )  # only times tell two years from one
-    pd.testing.assert_frame_equal(*tables)
-
-
-@pytest.mark.nightly
 def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
     known = YEAR.temperatures[["T1", "T2"]]
     inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01)
@@ -116,7 +77,6 @@ def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_no
     assert abs(table["gain"][1]) < 0.01
 
 
-@pytest.mark.filterwarnings("ignore:.*poor-curve-fit")  # the law of this structure is linear in severity
 def test_a_family_of_other_changes_keeps_its_severities(fem):
     scenarios = [
         Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (5.0, 10.0, 20.0, 40.0)

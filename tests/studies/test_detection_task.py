@@ -10,15 +10,15 @@ from sklearn.base import BaseEstimator, OutlierMixin, clone
 from sklearn.ensemble import IsolationForest
 from sklearn.experimental import enable_halving_search_cv  # noqa: F401
 from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import GridSearchCV, HalvingRandomSearchCV, cross_val_score
+from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.detection import MahalanobisDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector
 from skthermo.preprocessing import LagFeatures
-from skthermo.studies import ProgressiveDamage, Scenario, UncertainDamage, detection_task, sweep
+from skthermo.studies import ProgressiveDamage, Scenario, detection_task, sweep
 from tests.studies.studies import windowed
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
@@ -151,14 +151,6 @@ def test_rows_without_stamps_are_consecutive_within_a_state(fem_of_arrays):
             np.testing.assert_array_equal(found[start : start + 120], detector.decision_function(alone))
 
 
-def test_rows_are_evaluated_in_order_of_time(task):
-    detector = task.refit(with_memory("5D"))
-    test = task.cv[0][1]
-    shuffled = np.random.default_rng(0).permutation(test)
-    ordered = task.scoring(detector, task.X.iloc[test], task.y.iloc[test])
-    assert task.scoring(detector, task.X.iloc[shuffled], task.y.iloc[shuffled]) == ordered
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize(("own", "expected"), [(0.005, 0.005), (0.02, 0.02), (0.2, 0.02)])
 def test_random_numbers_find_no_more_than_the_limit(fem, own, expected):
@@ -185,16 +177,6 @@ def test_a_raised_threshold_keeps_the_limit(fem):
         assert (healthy < raised).mean() <= limit < (healthy < raised + 0.11).mean()
     strict = task.scoring.decisions(noted(task, values + 10), task.X[365:])
     assert strict.raised(0.05) == 0  # a threshold that keeps the limit is left alone
-
-
-@pytest.mark.nightly
-def test_more_false_alarms_do_not_pay(task):
-    detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
-    grid = {"mahalanobisdetector__contamination": [0.02, 0.1]}
-    search = GridSearchCV(detector, grid, cv=task.cv, scoring=task.scoring, refit=False).fit(task.X, task.y)
-    assert search.best_params_ == {"mahalanobisdetector__contamination": 0.02}
-    loud = task.confirm(detector.set_params(mahalanobisdetector__contamination=0.1), OTHER, random_state=0)
-    assert not loud["within_limit"].item()
 
 
 def test_scenarios_count_alike_and_what_is_not_evaluated_is_not_found(fem):
@@ -249,20 +231,6 @@ def test_other_detectors_are_evaluated_too(fem, detector):
     pd.testing.assert_frame_equal(only.X, task.X)
 
 
-def test_halving_takes_a_parameter_as_its_resource(fem):
-    task = task_of(fem, columns=MODES)
-    grid = {"max_features": [0.3, 0.6, 1.0], "max_samples": [0.2, 0.5]}
-    options = {"resource": "n_estimators", "max_resources": 40, "min_resources": 10, "factor": 2, "random_state": 0}
-    options |= {"cv": task.cv, "scoring": task.scoring, "refit": False}
-    options["return_train_score"] = False  # the baseline has no damaged records
-    search = HalvingRandomSearchCV(IsolationForest(random_state=0), grid, **options).fit(task.X, task.y)
-    assert search.n_resources_ == [10, 20, 40]
-    assert np.isfinite(search.cv_results_["mean_test_score"]).all()
-    best = task.refit(search)
-    assert best.n_estimators == search.best_params_["n_estimators"]
-    assert best.n_features_in_ == 6
-
-
 @pytest.mark.nightly
 def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     grid = {"window": ["1D", "7D"]}
@@ -315,18 +283,6 @@ def test_confirmation_in_the_same_weather_says_so(fem):
     assert table["optimism"].item() != 0  # also with the seed of the task, the noise is fresh
 
 
-def test_unknown_weather_is_warned_of(fem):
-    with pytest.warns(UserWarning, match="look like kelvin.*outside-training-weather"):
-        task_of(fem, T=WEATHER + 273.15)
-
-
-def test_scenarios_of_uncertain_severity_are_drawn_anew(fem):
-    uncertain = UncertainDamage("uncertain", pd.DataFrame({"bottom": [0.1, 0.2]}))
-    task = task_of(fem, [Scenario("healthy"), uncertain])
-    first, second = (task.X[MODES].iloc[rows_of(task, "uncertain", repeat)].to_numpy() for repeat in (0, 1))
-    assert np.log(first / second).mean() > 0.005
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -364,10 +320,3 @@ def test_a_scorer_refuses_other_rows_and_what_it_cannot_evaluate(fem, task):
         task.refit(GridSearchCV(with_memory(1), {}))
     with pytest.raises(ValueError, match="detectors is empty"):
         task.confirm({}, OTHER)
-
-
-def test_stamps_may_be_of_different_time_zones(fem):
-    baseline = SIDE_BY_SIDE.tz_localize("UTC")
-    task = task_of(fem, T=WEATHER.tz_localize("Europe/Zurich"), baseline=baseline)
-    assert task.X.index.tz == baseline.index.tz
-    assert task.X.index.is_monotonic_increasing

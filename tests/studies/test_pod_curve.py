@@ -82,14 +82,14 @@ def test_order_scale_and_severities_without_records_do_not_matter():
     ],
 )
 def test_separated_severities_give_a_bracket(detected, between):
-    with pytest.warns(UserWarning, match="between .*separated-severities"):
+    with pytest.warns(UserWarning, match="between .*no-curve"):
         curve = pod_curve(SEVERITIES, detected, RECORDS)
     assert np.isnan([curve.slope, curve.a90, curve.a90_95]).all()
     assert curve.bracket == between
 
 
 def test_nothing_detected_has_no_upper_end():
-    with pytest.warns(UserWarning, match="above 0.3.*outliers.*separated-severities"):
+    with pytest.warns(UserWarning, match="above 0.3.*outliers.*no-curve"):
         curve = pod_curve(SEVERITIES, np.zeros(5), RECORDS)
     assert curve.bracket[0] == 0.3
     assert np.isnan(curve.bracket[1])
@@ -99,12 +99,6 @@ def test_a_bound_that_never_reaches_the_level_is_infinite():
     curve = pod_curve([0.1, 0.2], [1, 2], [3, 3])
     assert np.isfinite(curve.a90)
     assert curve.a90_95 == np.inf
-
-
-def test_unfavourable_starts_converge():
-    truth = expit(-30 + 100 * SEVERITIES)
-    curve = pod_curve(SEVERITIES, truth, np.ones(5), log=False)
-    assert (curve.intercept, curve.slope) == pytest.approx((-30, 100), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -128,25 +122,33 @@ def test_impossible_data_are_errors(arguments, message):
         pod_curve(*arguments)
 
 
-@pytest.mark.filterwarnings("ignore:.*poor-curve-fit")
-def test_the_default_bound_is_safe_where_the_law_is_linear_in_the_severity():
-    random, truth = np.random.RandomState(0), (logit(0.9) + 4.8) / 40
-    severities = np.array([0.05, 0.1, 0.15, 0.2, 0.3])
-    draws = random.binomial(200, expit(-4.8 + 40 * severities), (100, 5))
-    bounds = [pod_curve(severities, draw, np.full(5, 200)).a90_95 for draw in draws]
-    assert np.mean(np.array(bounds) >= truth) >= 0.95
+@pytest.mark.filterwarnings("ignore:.*(no-curve|poor-curve-fit)")
+@pytest.mark.parametrize("n_records", [20, 200])
+@pytest.mark.parametrize("is_log", [True, False])
+def test_the_bound_of_the_likelier_law_holds_a90_under_either_law(is_log, n_records):
+    """95 % asked, of 150 draws of five severities; 92 to 98 % where the law has to be chosen."""
+    random, severities = np.random.RandomState(0), np.array([0.05, 0.1, 0.15, 0.2, 0.3])
+    x = np.log(severities) if is_log else severities
+    slope = logit(0.9) / (x[3] - x[2] + (x[2] - x[1]) / 2)
+    pod, truth = expit(logit(0.9) + slope * (x - x[3])), severities[3]
+    draws = random.binomial(n_records, pod, (150, 5))
+    curves = [pod_curve(severities, draw, np.full(5, n_records)) for draw in draws]
+    bounds = np.array([curve.a90_95 for curve in curves if np.isfinite(curve.slope)])
+    assert np.mean(bounds >= truth) >= 0.9
+    assert np.median([curve.a90 for curve in curves]) == pytest.approx(truth, rel=0.05)
+    if n_records == 200:
+        assert np.mean([curve.log == is_log for curve in curves]) > 0.9
 
 
-def warned_share(pod, n_records, n_draws=100, log=True):
+def warned_share(pod, n_records, n_draws=100):
     """Share of binomial data of which the curve is said to miss the points."""
     random, n_warned = np.random.RandomState(0), 0
     for _ in range(n_draws):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            curve = pod_curve(SEVERITIES, random.binomial(n_records, pod), np.full(5, n_records), log=log)
-        texts = [str(warning.message) for warning in caught if "outside the bounds of" in str(warning.message)]
+            curve = pod_curve(SEVERITIES, random.binomial(n_records, pod), np.full(5, n_records))
+        texts = [str(warning.message) for warning in caught if "poor-curve-fit" in str(warning.message)]
         assert len(texts) == (curve.n_missed > 0)
-        assert all(f"outside the bounds of {curve.n_missed} of 5 tested" in text for text in texts)
         n_warned += len(texts)
     return n_warned / n_draws
 
@@ -154,10 +156,6 @@ def warned_share(pod, n_records, n_draws=100, log=True):
 @pytest.mark.parametrize("n_records", [30, 300, 3000])
 def test_a_curve_that_fits_gives_no_warning(n_records):
     assert warned_share(expit(8 + 5 * np.log(SEVERITIES)), n_records) <= 0.01
-
-
-def test_false_alarms_bend_the_curve_too_little_to_matter():
-    assert warned_share(0.02 + 0.98 * expit(-6 + 30 * SEVERITIES), 3000, log=False) <= 0.01
 
 
 @pytest.mark.one_case
@@ -211,14 +209,6 @@ def test_effective_number_is_that_of_the_correlation_of_the_alarms(n_repeats):
     lags = np.arange(1, 60)  # correlation of the signs of a Gaussian process: 2/pi arcsin(rho)
     expected = 1 + 2 * (2 / np.pi * np.arcsin(0.8**lags)).sum()
     assert np.median(ratios) == pytest.approx(expected, rel=0.25)
-
-
-def test_independent_records_nearly_keep_their_number():
-    values, _ = decisions(np.random.RandomState(0), 0.3, 0.0, 20, 365)
-    found = rate_of(values)
-    assert 0.9 * found.n_records < found.n_effective <= found.n_records
-    deviation = np.sqrt(found.rate * (1 - found.rate) / found.n_records)
-    assert found.ci_high - found.ci_low == pytest.approx(2 * 1.96 * deviation, rel=0.15)
 
 
 def test_bounds_are_quantiles_of_the_beta_distribution():

@@ -1,7 +1,6 @@
 """The ranking of several detectors: what is significant, and at equal false alarms."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp
 from sklearn.base import BaseEstimator, OutlierMixin
@@ -147,17 +146,6 @@ def test_equal_detectors_tie(study):
     assert not table["significantly_worse"].any()
 
 
-def test_by_moved_thresholds_a_detector_that_is_loud_by_its_threshold_alone_is_not_behind(study):
-    table = study.ranking(by="pod_at_equal_pfa")
-    assert table.loc["loud", "pod_at_equal_pfa"] == pytest.approx(table.loc["raw", "pod_at_equal_pfa"], abs=0.01)
-    assert table.loc["lines", "pod_deficit"] == 0
-    assert (
-        table.loc["raw", "pod_deficit_ci_low"]
-        < table.loc["raw", "pod_deficit"]
-        < table.loc["raw", "pod_deficit_ci_high"]
-    )
-
-
 def test_bounds_at_equal_false_alarms_hold_the_error_of_the_moved_thresholds(study):
     def found(name, kept):
         calibration = np.sort(study.calibration_[name, SIMULATED][kept].ravel())
@@ -185,28 +173,6 @@ def test_area_under_the_curve(study, table):
         assert table.loc[name, "auc"] == pytest.approx(np.mean(areas))
 
 
-def test_a_higher_confidence_has_wider_bounds_of_the_same_rates(study, table):
-    wide = study.ranking(confidence=0.999).loc[table.index]
-    for name in ("false_alarms", "pod", "pod_deficit", "pod bottom"):
-        pd.testing.assert_series_equal(wide[name], table[name])
-    own = table.index[1:-1]
-    for name in ("pod_deficit_ci_low", "pod_ci_low", "false_alarms_ci_low"):
-        assert (wide.loc[own, name] < table.loc[own, name]).all()
-    pd.testing.assert_frame_equal(study.ranking(confidence=0.95), table)
-
-
-def test_a_limit_that_nobody_keeps_is_said(study):
-    table = study.ranking(0.0001)
-    assert not table["within_limit"].any()
-    assert table["false_alarms"][:-1].is_monotonic_increasing
-    quietest = table.index[0]
-    assert study.summary(0.0001).startswith(
-        f"All false-alarm rates exceed the limit of 0.0%. With the lowest one, {quietest!r} detects "
-    )
-    assert study.ranking(0.3)["within_limit"][:-1].all()
-    assert study.ranking(0.3).index[0] in ("loud", "lines")
-
-
 def test_in_sentences(study, table):
     said = study.summary().splitlines()
     best = table.iloc[0]
@@ -232,19 +198,6 @@ def test_a_detector_whose_decisions_never_vary_is_significantly_worse(fem):
     assert table.loc["deaf", ["significantly_worse", "pod"]].tolist() == [True, 0.0]
     assert table.loc["deaf", "pod_deficit_ci_low"] > 0
     assert "Significantly worse at 95% confidence: 'deaf'" in study.summary()
-
-
-def test_records_that_are_not_evaluated_are_said(fem):
-    class HalfBlind(MahalanobisDetector):
-        def decision_function(self, X):
-            return np.where(np.arange(len(X)) % 2, np.nan, super().decision_function(X))
-
-    some = {"half": HalfBlind(), "raw": MahalanobisDetector()}
-    study = study_of(fem, some, [{}, {"top": 0.2}])
-    study.run(WEATHER)
-    share = study.ranking().loc["half", "not_evaluated"]
-    assert share == pytest.approx(0.5, abs=0.01)
-    assert f"(neither healthy nor damaged): 'half' {share:.1%}." in study.summary()
 
 
 @pytest.mark.one_case

@@ -42,15 +42,6 @@ def test_family_and_severity_come_from_a_single_group():
     )
 
 
-def test_a_scenario_keeps_its_own_mapping():
-    damage = {"top": 0.3}
-    scenario = Scenario("a", damage)
-    damage["top"] = 0.9
-    assert scenario.damage == {"top": 0.3}
-    with pytest.raises(AttributeError):
-        scenario.name = "b"
-
-
 @pytest.mark.parametrize(
     "scenario",
     [

@@ -9,13 +9,11 @@ import pytest
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector
 from skthermo.exceptions import RecordsWarning
-from skthermo.studies import Scenario, compare_extensions, sweep
-from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, YEAR, compensated, study_of, windowed
+from skthermo.studies import Scenario
+from tests.studies.studies import SIDE_BY_SIDE, WEATHER, compensated, study_of
 
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
 
@@ -90,47 +88,6 @@ def test_a_detector_gives_the_same_rates_alone_and_in_company(fem, study, name):
         np.testing.assert_array_equal(decisions, study.calibration_[name, source])
 
 
-@pytest.mark.nightly
-def test_the_order_of_the_detectors_and_the_number_of_jobs_change_nothing(fem, study):
-    backwards = dict(reversed(detectors().items()))
-    other = study_of(fem, backwards, SCENARIOS, n_repeats=3, n_jobs=2)
-    results = other.run(WEATHER).set_index(["detector", "scenario"])
-    pd.testing.assert_frame_equal(results, study.results_.set_index(["detector", "scenario"]).loc[results.index])
-    for mine, others in ((study.decisions_, other.decisions_), (study.calibration_, other.calibration_)):
-        assert mine.keys() == others.keys()
-        for key, decisions in mine.items():
-            np.testing.assert_array_equal(decisions, others[key])
-    pd.testing.assert_frame_equal(other.ranking(), study.ranking())
-
-
-class Counted(LinearRegression):
-    """Counts its fits."""
-
-    n_fits = 0
-
-    def fit(self, X, y, sample_weight=None):
-        type(self).n_fits += 1
-        return super().fit(X, y, sample_weight)
-
-
-def test_a_memory_remembers_regressions_that_detectors_share(fem, tmp_path):
-    def counted(last=None, memory=None):
-        compensator = TemperatureCompensator(Counted(), targets=MODES)
-        return make_pipeline(compensator, last or MahalanobisDetector(), memory=memory)
-
-    def n_fits_of(memory=None, **detectors):
-        before = Counted.n_fits
-        study_of(fem, detectors, SCENARIOS[:1], memory=memory).run(WEATHER)
-        return Counted.n_fits - before
-
-    once = n_fits_of(one=counted())
-    assert once > 1
-    of_pipeline, of_study = str(tmp_path / "pipeline"), str(tmp_path / "study")
-    assert n_fits_of(one=counted(memory=of_pipeline)) == once
-    assert n_fits_of(one=counted(memory=of_pipeline), two=counted(DirectionalDetector(), of_pipeline)) == 0
-    assert n_fits_of(of_study, one=counted(), two=counted(DirectionalDetector())) == once
-
-
 class CountedForest(IsolationForest):
     """Counts its fits."""
 
@@ -194,23 +151,6 @@ def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
 
 
 @pytest.mark.nightly
-def test_one_baseline_of_which_every_detector_sees_its_columns(fem):
-    sees = {
-        "raw": (MahalanobisDetector(), MODES),
-        "lines": (compensated(), list(SIDE_BY_SIDE)),
-        "week": (windowed(7), list(SIDE_BY_SIDE)),
-    }
-    study = study_of(fem, {name: detector for name, (detector, _) in sees.items()}, SCENARIOS, n_repeats=1)
-    results = study.run(WEATHER, SIDE_BY_SIDE)
-    pd.testing.assert_frame_equal(study.run(WEATHER), results)  # as what the chain has learned
-    for name, (_, columns) in sees.items():
-        assert study.columns_[name] == columns
-    few = study.run(WEATHER, YEAR.frequencies)
-    assert few["error"].str.contains("baseline has none").sum() == 2  # those that compensate
-    assert (few.loc[few["detector"] == "raw", "error"] == "").all()
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("trouble", "message"),
     [
@@ -256,19 +196,6 @@ def test_what_is_asked_of_one_of_several_detectors(study):
     pd.testing.assert_frame_equal(one, smallest.loc["lines"])
 
 
-@pytest.mark.nightly
-def test_compare_extensions_asks_for_a_detector_of_several(fem):
-    scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
-    several = study_of(fem, {"raw": MahalanobisDetector(), "lines": compensated()}, scenarios, noise=0.01)
-    several.run(WEATHER)
-    with pytest.raises(ValueError, match="detector is None"):
-        compare_extensions(several, WEATHER, modes=[6])
-    found = compare_extensions(several, WEATHER, modes=[6], detector="raw")
-    alone = study_of(fem, MahalanobisDetector(), scenarios, noise=0.01)
-    alone.run(WEATHER)
-    pd.testing.assert_frame_equal(found, compare_extensions(alone, WEATHER, modes=[6]))
-
-
 class Doubtful(MahalanobisDetector):
     """Has doubts about its baseline and about every record that it evaluates."""
 
@@ -290,9 +217,7 @@ def test_one_warning_of_each_kind_and_those_of_other_packages_pass(fem):
         for category in (RecordsWarning, ConvergenceWarning)
     }
     (evaluated,) = given[RecordsWarning]
-    assert str(evaluated.message) == (
-        "detector 'first': 365 odd records (in the simulations of this study, more than once) [odd]"
-    )
+    assert str(evaluated.message) == "detector 'first': 365 odd records [odd]"
     assert evaluated.filename == __file__
     assert study.warnings_ == [str(evaluated.message)]
     assert {str(one.message) for one in given[ConvergenceWarning]} == {"no convergence in 7 steps"}

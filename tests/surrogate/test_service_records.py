@@ -56,21 +56,6 @@ def flawless():
     return chain(random_state=0).fit(T, F)
 
 
-def test_numbers_of_outliers_of_other_training_records_scatter_as_those_of_another_year_do():
-    outliers = np.full((365, 1), np.nan)
-    outliers[np.random.default_rng(0).choice(365, 20, replace=False)] = 0.05
-    service = records_with(np.zeros((365, 2), dtype=bool), outliers)
-
-    def number_of(records, seed):
-        taken = records.draw(records.places, np.random.RandomState(seed))
-        return np.isfinite(records.outliers[taken]).sum()
-
-    same = [number_of(service, seed) for seed in range(300)]
-    others = [number_of(service.resampled(np.random.RandomState(1000 + seed)), seed) for seed in range(300)]
-    np.testing.assert_allclose([np.mean(same), np.mean(others)], 20, atol=2)
-    assert np.var(others) == pytest.approx(2 * np.var(same), rel=0.35)
-
-
 @pytest.mark.parametrize("knows_weather", [True, False])
 def test_markov_gaps_come_as_often_and_last_as_long(knows_weather):
     missing = np.column_stack([lasting(3000, share, length, seed=1) for share, length in ((0.2, 8), (0.05, 2))])

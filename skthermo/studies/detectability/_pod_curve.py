@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,17 +11,11 @@ from numpy.typing import ArrayLike
 from scipy.special import expit, log_expit, logit
 from scipy.stats import norm
 
-from skthermo._core.arrays import Array, check_flag, check_probability, real_array
-from skthermo._core.warnings import warn_user
+from skthermo._core.arrays import Array, check_flag, check_probability, is_auto, real_array
+from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies.detectability._rates import clopper_pearson
-
-MISFIT_CHANCE = 0.01  # probability with which rates drawn from the curve itself lie outside the bounds at any severity
-MISFIT_MARGIN = 0.03  # distance in POD beyond these bounds from which the curve is said to miss a severity
-MOST_NEWTON_STEPS = 100
-CONVERGED = 1e-10  # Newton's decrement, in units of log likelihood, at which the fit ends
-FLAT = 1e-6  # increase of the logit over the tested severities up to which the curve counts as flat
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,11 +83,11 @@ class PODCurve:
         """
         if np.isnan(self.slope):
             return 0
-        confidence = 1 - MISFIT_CHANCE / len(self.severities)
         counts = zip(self.n_detected, self.n_records, strict=True)
-        lowest, highest = np.array([clopper_pearson(k, n, confidence) for k, n in counts]).T
+        bounds = [clopper_pearson(k, n, 1 - 0.01 / len(self.severities)) for k, n in counts]
+        lowest, highest = np.transpose(bounds)
         pod = self.predict(self.severities)[0]
-        return int(((pod < lowest - MISFIT_MARGIN) | (pod > highest + MISFIT_MARGIN)).sum())
+        return int(((pod < lowest - 0.03) | (pod > highest + 0.03)).sum())
 
     def predict(self, severity: ArrayLike) -> tuple[Any, Any, Any]:
         """POD at some severities, with bounds.
@@ -149,8 +141,7 @@ class PODCurve:
         places = real_array(severity, "severity")
         if not self.replicates:
             return np.full(places.shape, np.nan), np.full(places.shape, np.nan)
-        tails = (1 - self.confidence) / 2, (1 + self.confidence) / 2
-        lowest, highest = np.quantile([one.predict(severity)[0] for one in self.replicates], tails, axis=0)
+        lowest, highest = np.quantile([one.predict(severity)[0] for one in self.replicates], self._tails, axis=0)
         return lowest, highest
 
     @property
@@ -158,10 +149,13 @@ class PODCurve:
         """Band in which a90 of a measured campaign should lie, with the curve's confidence; NaN without replicates."""
         if not self.replicates:
             return float("nan"), float("nan")
-        tail = (1 - self.confidence) / 2
-        found = np.abs([one.a90 for one in self.replicates])
-        sign = np.sign(self.severities[0])
-        return float(sign * np.quantile(found, tail)), float(sign * np.quantile(found, 1 - tail))
+        tails, found = self._tails, np.abs([one.a90 for one in self.replicates])
+        lowest, highest = np.sign(self.severities[0]) * np.quantile(found, tails)
+        return float(lowest), float(highest)
+
+    @property
+    def _tails(self) -> tuple[float, float]:
+        return (1 - self.confidence) / 2, (1 + self.confidence) / 2
 
     def severity_at(self, pod: float, confidence: float | None = None) -> float:
         """Severity at which the curve, or a confidence bound of it, reaches a POD.
@@ -204,7 +198,12 @@ class PODCurve:
 
 
 def pod_curve(
-    severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike, *, log: bool = True, confidence: float = 0.95
+    severities: ArrayLike,
+    n_detected: ArrayLike,
+    n_records: ArrayLike,
+    *,
+    log: bool | Literal["auto"] = "auto",
+    confidence: float = 0.95,
 ) -> PODCurve:
     """Fit the probability of detection over severity, by maximum likelihood.
 
@@ -216,9 +215,9 @@ def pod_curve(
         Records in alarm. Fractions are allowed, so that serially correlated records can count less.
     n_records : array-like of shape (n_severities,)
         Records evaluated; severities without any are ignored.
-    log : bool, default=True
-        Whether the logit of the POD is linear in the logarithm of the severity, as it is with 0 where there is no
-        damage, rather than in the severity.
+    log : bool or "auto", default="auto"
+        Whether the logit of the POD is linear in the logarithm of the severity, so that the POD is 0 where there is no
+        damage, or in the severity itself. "auto" takes the likelier of these two laws.
     confidence : float, default=0.95
         Of the bounds of the curve.
 
@@ -242,7 +241,9 @@ def pod_curve(
     Notes
     -----
     Hit/miss analysis of MIL-HDBK-1823A with the logit link. Records at one severity count as independent, and the curve
-    as logistic: confidence bounds hold neither serial correlation nor another shape of the curve.
+    as logistic: confidence bounds hold neither serial correlation nor another shape of the curve. Both laws have two
+    parameters. With 20 to 1,000 records at each of three to five severities, a90/95 of the likelier law was above the
+    true a90 in 92 to 99 % of the simulated cases, whichever law was true.
 
     References
     ----------
@@ -255,43 +256,51 @@ def pod_curve(
     >>> print(f"{curve.a50:.2f} {curve.a90:.2f} {curve.a90_95:.2f}")
     0.17 0.28 0.36
     """
-    check_flag(log, "log")
-    s, k, n = checked_counts(severities, n_detected, n_records)
-    check_probability(confidence, "confidence")
-    x, bracket = np.log(np.abs(s)) if log else np.abs(s), bracket_of(s, k / n, 0.9)
-    coefficients, covariance = np.full(2, np.nan), np.full((2, 2), np.nan)
-    if not k.any() or not (n - k).any() or x[k < n].max() <= x[k > 0].min():
-        action = "Test severities in between, with some misses and hits"
-        if not k.any():
-            action = "Test larger severities, and look whether outliers of the baseline raise the threshold"
-        lowest, highest = bracket
-        place = f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
-        warn_user(
-            f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}: no curve of finite slope fits, and a90 "
-            f"is {place}. {action}",
-            ResultWarning,
-            "separated-severities",
-        )
-    else:
-        increases = x[k > 0].max() > x[k < n].min()
-        if increases:
-            coefficients, covariance = most_likely(x, k, n)
-        if not increases or coefficients[1] * np.ptp(x) < FLAT:
-            raise ValueError(
-                f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}, which does not increase; expected "
-                "one that increases with the magnitude of the severity"
-            )
-    curve = PODCurve(
-        s, k, n, float(coefficients[0]), float(coefficients[1]), covariance, log, float(confidence), bracket
-    )
-    if curve.n_missed:
-        warn_user(
-            f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities. a50, a90 and a90/95 "
-            f"may be wrong. Try log={not log}, or test more severities near a90 and fit those alone",
-            ResultWarning,
-            "poor-curve-fit",
-        )
+    curve, findings = fitted_curve(severities, n_detected, n_records, log=log, confidence=confidence)
+    warn_each(findings)
     return curve
+
+
+def fitted_curve(
+    severities: ArrayLike,
+    n_detected: ArrayLike,
+    n_records: ArrayLike,
+    *,
+    log: bool | Literal["auto"] = "auto",
+    confidence: float = 0.95,
+) -> tuple[PODCurve, list[ResultWarning]]:
+    """The curve, and what is doubtful about it."""
+    laws = [True, False] if is_auto(log) else [check_flag(log, "log")]
+    s, k, n = checked_counts(severities, n_detected, n_records)
+    options = {"confidence": check_probability(confidence, "confidence"), "bracket": bracket_of(s, k / n, 0.9)}
+    magnitudes, rates = np.abs(s), f"the severities {s.tolist()} have POD {(k / n).round(3).tolist()}"
+    if not k.any() or not (n - k).any() or magnitudes[k < n].max() <= magnitudes[k > 0].min():
+        nothing = {"intercept": np.nan, "slope": np.nan, "covariance": np.full((2, 2), np.nan), "log": laws[0]}
+        curve = PODCurve(s, k, n, **nothing, **options)
+        return curve, [ResultWarning(f"{rates}: no curve of finite slope fits, and {_placed(curve)}", "no-curve")]
+    fits = {}
+    if magnitudes[k > 0].max() > magnitudes[k < n].min():
+        fits = {is_log: most_likely(np.log(magnitudes) if is_log else magnitudes, k, n) for is_log in laws}
+    law = max(fits, key=lambda is_log: round(fits[is_log].log_likelihood, 6), default=None)  # both fit two severities
+    if law is None or fits[law].increase < 1e-6:
+        raise ValueError(f"{rates}, which does not increase; expected one that increases with the severity's magnitude")
+    curve = PODCurve(s, k, n, *fits[law].coefficients.tolist(), fits[law].covariance, law, **options)
+    if not curve.n_missed:
+        return curve, []
+    text = (
+        f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities. a50, a90 and a90/95 may "
+        "be wrong. Test more severities near a90, and fit those alone"
+    )
+    return curve, [ResultWarning(text, "poor-curve-fit")]
+
+
+def _placed(curve: PODCurve) -> str:
+    """Where a90 is without a slope, and what to test."""
+    lowest, highest = curve.bracket
+    place = f"above {lowest:g}" if np.isnan(highest) else f"between {lowest:g} and {highest:g}"
+    if curve.n_detected.any():
+        return f"a90 is {place}. Test severities in between, with some misses and hits"
+    return f"a90 is {place}. Test larger severities, and look whether outliers of the baseline raise the threshold"
 
 
 def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike) -> tuple[Array, Array, Array]:
@@ -320,16 +329,23 @@ def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: Arra
 
 def bracket_of(severities: Array, pod: Array, level: float) -> tuple[float, float]:
     """Magnitudes of the highest severity with a POD below a level, and of the next one."""
-    magnitudes = np.abs(severities)
-    below = np.flatnonzero(pod < level)
-    if not below.size:
-        return 0.0, float(magnitudes[0])
-    above = magnitudes[magnitudes > magnitudes[below[-1]]]
-    return float(magnitudes[below[-1]]), float(above[0]) if above.size else float("nan")
+    order = np.argsort(np.abs(severities), kind="stable")
+    magnitudes, below = np.abs(severities)[order], np.flatnonzero(pod[order] < level)
+    lowest = float(magnitudes[below[-1]]) if below.size else 0.0
+    return lowest, float(magnitudes[magnitudes > lowest].min(initial=np.inf)) if magnitudes[-1] > lowest else np.nan
 
 
-def most_likely(x: Array, k: Array, n: Array) -> tuple[Array, Array]:
-    """Intercept and slope by Newton's method, and their covariance."""
+class LogisticFit(NamedTuple):
+    """Intercept and slope, their covariance, the ln likelihood, and the increase of the logit over the severities."""
+
+    coefficients: Array
+    covariance: Array
+    log_likelihood: float
+    increase: float
+
+
+def most_likely(x: Array, k: Array, n: Array) -> LogisticFit:
+    """The most likely intercept and slope, by Newton's method."""
     centre, width = np.average(x, weights=n), np.ptp(x)
     design = np.column_stack([np.ones_like(x), (x - centre) / width])
 
@@ -337,18 +353,19 @@ def most_likely(x: Array, k: Array, n: Array) -> tuple[Array, Array]:
         return float((k * log_expit(design @ b) + (n - k) * log_expit(-design @ b)).sum())
 
     coefficients = np.zeros(2)
-    for _ in range(MOST_NEWTON_STEPS):
+    for _ in range(100):
         pod = expit(design @ coefficients)
         information = (design.T * (n * pod * (1 - pod))) @ design
         gradient = design.T @ (k - n * pod)
         step, now = np.linalg.solve(information, gradient), log_likelihood(coefficients)
-        if gradient @ step < CONVERGED:
+        if gradient @ step < 1e-10:  # units of ln likelihood
             break
         while log_likelihood(coefficients + step) < now:
             step = step / 2
         coefficients = coefficients + step
-    to_severities = np.array([[1.0, -centre / width], [0.0, 1 / width]])
-    return to_severities @ coefficients, to_severities @ np.linalg.inv(information) @ to_severities.T
+    scaled = np.array([[1.0, -centre / width], [0.0, 1 / width]])
+    covariance = scaled @ np.linalg.inv(information) @ scaled.T
+    return LogisticFit(scaled @ coefficients, covariance, now, float(coefficients[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,51 +388,41 @@ class FamilyRates:
         """Whether no rate is above that bound."""
         return bool((self.rows["rate"] <= self.false_alarms).all())
 
-    def curve(self, log: bool = True) -> PODCurve:
-        """Probability of detection over severity, with records as their effective numbers."""
+    def curve(self, log: bool | Literal["auto"] = "auto") -> tuple[PODCurve, list[ResultWarning]]:
+        """Probability of detection over severity, with records as their effective numbers, and what is doubtful."""
         rows = self.tested
         detected, n_effective = rows["rate"] * rows["n_effective"], rows["n_effective"]
-        with self._named():
-            return pod_curve(rows["severity"], detected, n_effective, log=log, confidence=self.confidence)
-
-    def on_grid(self, level: float) -> tuple[float, float, float]:
-        """Smallest tested severity from which the rate stays at or above a level, and that of its bounds."""
-        with self._named():
-            mdd, lowest, highest = (
-                minimum_detectable_damage(self.tested["severity"], self.tested[rate], level)
-                for rate in ("rate", "ci_high", "ci_low")
-            )
-        return mdd, lowest, highest
-
-    def on_curve(self, level: float) -> tuple[float, float, float]:
-        """Severity at which the curve and its bounds reach a level; without a finite slope, NaN and the bracket."""
-        severities, rates = self.tested["severity"], self.tested["rate"]
-        bracket = float("nan"), *bracket_of(severities.abs().to_numpy(), rates.to_numpy(), level)
-        if len(severities) < 2:
-            return bracket
         try:
-            curve = self.curve()
+            return fitted_curve(rows["severity"], detected, n_effective, log=log, confidence=self.confidence)
+        except ValueError as error:
+            raise ValueError(f"family {self.name!r}: {error}") from error
+
+    def on_grid(self, level: float) -> tuple[float, ...]:
+        """Smallest tested severity from which the rate stays at or above a level, and that of its bounds."""
+        severities, rates = self.tested["severity"], [self.tested[name] for name in ("rate", "ci_high", "ci_low")]
+        try:
+            return tuple(minimum_detectable_damage(severities, one, level) for one in rates)
+        except ValueError as error:
+            raise ValueError(f"family {self.name!r}: {error}") from error
+
+    def on_curve(self, level: float) -> tuple[tuple[float, ...], list[ResultWarning]]:
+        """Severity at which the curve and its bounds reach a level; without a finite slope, NaN and the bracket."""
+        severities, rates = self.tested["severity"].to_numpy(), self.tested["rate"].to_numpy()
+        bracket = float("nan"), *bracket_of(severities, rates, level)
+        if len(severities) < 2:
+            return bracket, []
+        try:
+            curve, findings = self.curve()
         except ValueError as error:
             if severities.min() < 0 < severities.max():
                 raise
-            rare = (
-                ". Alarms are as rare as for the healthy structure. Test larger severities, and look whether outliers "
-            )
-            cause = f"{rare}of the baseline raise the threshold" if self.is_undetected else ""
-            warn_user(f"no curve of source {self.source!r} for {error}{cause}", ResultWarning, "no-curve")
-            return bracket
+            action = ". Test larger severities, and look whether outliers of the baseline raise the threshold"
+            text = f"no curve of source {self.source!r} for {error}{action if self.is_undetected else ''}"
+            return bracket, [ResultWarning(text, "no-curve")]
         if np.isnan(curve.slope):
-            return float("nan"), *bracket_of(curve.severities, curve.n_detected / curve.n_records, level)
+            return bracket, findings
         tail = (1 - self.confidence) / 2
-        return curve.severity_at(level), curve.severity_at(level, tail), curve.severity_at(level, 1 - tail)
-
-    @contextmanager
-    def _named(self) -> Iterator[None]:
-        """Begin the text of errors with the family's name."""
-        try:
-            yield
-        except ValueError as error:
-            raise ValueError(f"family {self.name!r}: {error}") from error
+        return tuple(curve.severity_at(level, one) for one in (None, tail, 1 - tail)), findings
 
 
 def families_of(results: pd.DataFrame, confidence: float) -> dict[tuple[Any, ...], FamilyRates]:

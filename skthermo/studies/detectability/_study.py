@@ -4,51 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial, wraps
-from time import process_time
-from typing import Any, Concatenate, Literal, ParamSpec, TypeAlias, TypeVar
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
-from joblib import Memory
-from numpy.typing import ArrayLike
+from joblib import Memory, delayed
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._core.arrays import as_random_state, check_jobs, check_probability, is_auto, positive_integer
-from skthermo._core.estimators import Stages, held, last_step, seeded
-from skthermo._core.parallel import single_blas_thread
-from skthermo._core.warnings import warn_each, warnings_once
-from skthermo.exceptions import ResultWarning
+from skthermo._core.arrays import Array, as_random_state, check_jobs, check_probability, is_auto, positive_integer
+from skthermo._core.estimators import Stages, last_step, seeded
+from skthermo._core.parallel import run_jobs, single_blas_thread
+from skthermo._core.warnings import collected, warn_each
+from skthermo.exceptions import ModelWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies.detectability._findings import StudyFindings
-from skthermo.studies.detectability._replicates import ReplicateRates, Replicates
+from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
+from skthermo.studies.detectability._rates import EvaluatedRecords, in_words, rank
+from skthermo.studies.detectability._replicates import ReplicateRates, Replicates, in_sentences
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
+    REFERENCE,
+    SIMULATED,
     Candidate,
-    Evaluation,
+    Decided,
     Measurement,
     Simulation,
-    ask_each,
+    by_detector,
     clean_frequencies,
 )
 from skthermo.surrogate import DataInformedFEM
 
-LEAST_REPEATS, MOST_REPEATS = 3, 20
-
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
-P, Answer = ParamSpec("P"), TypeVar("Answer")
-
-
-def _of_findings(method: Callable[Concatenate[StudyFindings, P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
-    """A method of a study that its last run's findings answer, with their docstring and signature."""
-
-    @wraps(method)
-    def answer(study: Any, *args: P.args, **options: P.kwargs) -> Answer:
-        return method(study._found, *args, **options)
-
-    return answer
 
 
 class DetectabilityStudy(BaseEstimator):
@@ -86,15 +74,15 @@ class DetectabilityStudy(BaseEstimator):
         What the prediction intervals include, in which the rate of a measured campaign should lie:
 
         - "noise": another draw of the noise;
-        - "baseline": the training records could have been others (`~skthermo.surrogate.resampled`), so
-          that the structure is another one than the chain, and have had other gaps and outliers; the detectors stay as
-          they are, as they would in service;
+        - "baseline": the training records could have been others (`~skthermo.surrogate.resampled`), so that the
+          structure is another one than the chain; the detectors stay as they are, as they would in service;
         - "weather": other days of the same season, whole weeks in a row, or the other years of T;
         - "model": another FE model of ``models`` in the chain;
         - "auto": "noise", "baseline" and "weather", and "model" if ``models`` are given;
-        - "all": all of these, without "model" if there are no ``models`` and none can be drawn.
+        - "all": all of these.
 
-        In each of ``n_replicates`` replicates, all of it is drawn at once. The noise alone is enough to compare
+        Each of ``n_replicates`` replicates is a campaign for which all of it is drawn at once; the bands are about the
+        study's own rate. The noise alone is enough to compare
         detectors; "model" takes longest, since a chain is refitted for each replicate.
     models : sequence of FE models, optional
         Which the structure may have, with parameters, damage groups and modes like the chain's. By default
@@ -110,14 +98,11 @@ class DetectabilityStudy(BaseEstimator):
         Folder that keeps what detectors have learned, so that other studies in which they learn the same baseline do
         not fit them again.
     verbose : bool or int, default=0
-        Whether `run` prints a line with the time of each of its stages, and after the second repeat how long the others
-        and the replicates will take; from 2, joblib prints how many of them are done.
+        Whether `run` prints a line with the time of each of its stages; from 2, joblib prints how many repeats and
+        replicates are done.
 
     Attributes
     ----------
-    findings_ : StudyFindings
-        All that the last `run` found, which nothing changes afterwards; the attributes below are its, and so are all
-        methods but `run`, which raise a ``NotFittedError`` before.
     results_ : DataFrame
         What `run` returned.
     detectors_ : dict of str to detector
@@ -140,8 +125,8 @@ class DetectabilityStudy(BaseEstimator):
         "weather", "baseline", "model") and to all ("together"), and the share of each in the variance ("model share").
         None where the bands include the noise alone.
     replicates_ : ReplicateRates or None
-        Rates of alarms in every replicate, ``replicates_.rates[detector, scenario]`` of shape (n_replicates, n_parts,
-        n_draws), where each of ``replicates_.parts`` is added to those before it.
+        Rates of alarms in every replicate, ``replicates_.rates[detector, scenario]`` of shape (n_replicates, n_parts),
+        where each of ``replicates_.parts`` is added to those before it.
     scenarios_ : list of scenarios
         With those that were given as mappings.
     errors_ : dict of str to str
@@ -229,29 +214,6 @@ class DetectabilityStudy(BaseEstimator):
         self.memory = memory
         self.verbose = verbose
 
-    results_ = held("_found.table")
-    detectors_ = held("_found.detectors")
-    thresholds_ = held("_found.thresholds")
-    indices_ = held("_found.evaluation.indices")
-    decisions_ = held("_found.evaluation.decisions")
-    calibration_ = held("_found.evaluation.calibration")
-    columns_ = held("_found.columns")
-    uncertainty_ = held("_found.uncertainty")
-    replicates_ = held("_found.replicates")
-    scenarios_ = held("_found.scenarios")
-    errors_ = held("_found.errors")
-    confidence_ = held("_found.confidence")
-    warnings_ = held("_found.warnings")
-
-    pod_curve = _of_findings(StudyFindings.pod_curve)
-    minimum_detectable_damage = _of_findings(StudyFindings.minimum_detectable_damage)
-    is_undetected = _of_findings(StudyFindings.is_undetected)
-    ranking = _of_findings(StudyFindings.ranking)
-    labelled_scores = _of_findings(StudyFindings.labelled_scores)
-    summary = _of_findings(StudyFindings.summary)
-    uncertainty_summary = _of_findings(StudyFindings.uncertainty_summary)
-    detector_name = _of_findings(StudyFindings.detector_name)
-
     def run(
         self,
         T: ArrayLike | Sequence[ArrayLike],
@@ -319,74 +281,486 @@ class DetectabilityStudy(BaseEstimator):
             Detectors are named where there are several.
         """
         check_chain(self.fem)
-        detectors = self._checked_detectors()
-        most_repeats = MOST_REPEATS if is_auto(self.n_repeats) else positive_integer(self.n_repeats, "n_repeats")
+        detectors, scenarios = self._checked_detectors(), self._checked_scenarios(reference)
+        most_repeats = 20 if is_auto(self.n_repeats) else positive_integer(self.n_repeats, "n_repeats")
         tol = check_probability(self.tol, "tol")
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
-        scenarios = self._checked_scenarios(reference)
         seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(most_repeats, 2))
-        function, measured = (reference, {}) if callable(reference) else (None, reference or {})
-        replicates = Replicates.of(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
-        T = replicates.years[0]
-        stages = Stages(self, 5 + bool(replicates.parts))
-        with stages.stage("detectors"), warnings_once("in the fits of the detectors"):
-            learned = partial(Candidate.learned, self.fem, baseline, seeded(self.random_state), self.memory)
-            candidates, errors = ask_each(detectors, lambda name: learned(detectors[name]), {})
-        with warnings_once("in the simulations of this study") as texts, single_blas_thread():
+        replicates = Replicates.asked(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
+        T, stages = replicates.years[0], Stages(self, 4 + bool(replicates.parts))
+        with collected() as findings, single_blas_thread():
+            with stages.stage("detectors"):
+                candidates, errors = self._learned(detectors, baseline, findings)
             with stages.stage("frequencies"):
-                warn_each(self.fem.thermal_.doubts(self.fem.weather(T)))
+                findings += self.fem.thermal_.doubts(self.fem.weather(T))
                 clean = clean_frequencies(self.fem, scenarios, T, most_repeats)
             measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
-            simulation = Simulation(self.fem, candidates, scenarios, T, clean, measurement, function)
+            function, given = (reference, {}) if callable(reference) else (None, reference or {})
+            simulation = Simulation(self.fem, scenarios, T, clean, measurement, function)
             with stages.stage("first repeat"):
-                first = simulation.evaluated([(0, seeds[0])], errors, measured)
-        evaluation = self._with_repeats(simulation, first, replicates, seeds, stages, (tol, confidence))
-        rates = None
+                first = simulation.repeat(candidates, 0, seeds[0], given)
+                findings += first.findings
+            with stages.stage("other repeats"):
+                decided = self._repeats(simulation, candidates, first, seeds, bool(replicates.parts), tol, confidence)
+        errors |= decided.errors
+        rows, records = {}, {name: evaluated(decided, name, scenarios) for name in candidates if name not in errors}
+        for name, some in records.items():
+            try:
+                rows[name] = [one.summary(confidence) for one in some]
+            except ValueError as error:
+                errors[name] = error
+        left = still_evaluating({name: candidates[name] for name in rows}, errors)
+        texts = {name: f"{type(error).__name__}: {error}" for name, error in errors.items()}
+        lines = [row for name in detectors for row in rows.get(name, [{"detector": name, "error": texts.get(name)}])]
+        results, rates = pd.DataFrame(lines, columns=list(next(iter(rows.values()))[0])), None
         if replicates.parts:
             with stages.stage(f"{len(replicates.seeds)} replicates"):
-                left = simulation.without(evaluation.errors)
-                rates = ReplicateRates.of(left, evaluation, replicates, self.n_jobs, max(self.verbose - 1, 0))
-        found = StudyFindings.of(evaluation, candidates, scenarios, list(detectors), rates, confidence, texts)
-        doubt = found.many_false_alarms()
-        doubts = [ResultWarning(doubt, "many-false-alarms")] if doubt else []
-        self.findings_ = replace(found, warnings=[*texts, *map(str, doubts)])
-        warn_each(doubts)
-        return self.findings_.table
+                found, failed = replicates.rates(simulation, left, self.n_jobs, max(self.verbose - 1, 0))
+            findings += failures(failed, len(replicates.seeds))
+            rates = ReplicateRates.joined(found, results, replicates)
+            results = rates.banded(results, confidence)
+        findings += many_false_alarms(results)
+        self.results_, self.scenarios_, self.confidence_, self.errors_ = results, scenarios, confidence, texts
+        self._candidates = left
+        self.detectors_ = {name: one.detector for name, one in left.items()}
+        self.thresholds_ = {name: one.threshold for name, one in left.items()}
+        self.columns_ = {name: one.columns for name, one in left.items()}
+        self.decisions_, self.calibration_, self.indices_ = (
+            {key: one for key, one in part.items() if key[0] in left}
+            for part in (decided.decisions, decided.calibration, decided.indices)
+        )
+        self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()
+        self.warnings_ = list({one.kind: str(one) for one in reversed(findings)}.values())[::-1]
+        warn_each(findings)
+        return results
 
-    def _with_repeats(
+    def _learned(
+        self, detectors: Mapping[str, Any], baseline: Any, findings: list[SkthermoWarning]
+    ) -> tuple[dict[str, Candidate], dict[str, Exception]]:
+        """Fitted detectors, and the errors of the others."""
+        candidates, errors, random_state = {}, {}, seeded(self.random_state)
+        for name, detector in detectors.items():
+            with collected() as doubts:
+                try:
+                    candidates[name] = Candidate.learned(self.fem, baseline, random_state, self.memory, detector)
+                except Exception as error:
+                    errors[name] = error
+            findings += by_detector(doubts, name, detectors)
+        return still_evaluating(candidates, errors), errors
+
+    def _repeats(
         self,
         simulation: Simulation,
-        first: Evaluation,
-        replicates: Replicates,
+        candidates: Mapping[str, Candidate],
+        first: Decided,
         seeds: Any,
-        stages: Stages,
-        bounds: tuple[float, float],
-    ) -> Evaluation:
-        """The evaluation of the first repeat with all others: as many as asked for or, for "auto", as bounds need."""
-        left, progress = simulation.without(first.errors), max(self.verbose - 1, 0)
-        with stages.stage("second repeat"):
-            began = process_time()
-            evaluation = first.with_repeats(left.repeats(range(1, min(len(seeds), 2)), seeds, None))
-            seconds = process_time() - began
-        if self.verbose and len(seeds) > 1:
-            text = replicates.predicted_time(seconds, len(seeds) - 2, left.share_in_replicates)
-            print(f"[{type(self).__name__}] {text}")
-        with stages.stage("other repeats"):
-            grows = is_auto(self.n_repeats) and bool(replicates.parts)  # bands of the noise alone are of the repeats
-            n_repeats = LEAST_REPEATS if grows else len(seeds)
-            evaluation = evaluation.with_repeats(left.repeats(range(2, n_repeats), seeds, self.n_jobs, progress))
-            if grows:
-                wanted = min(evaluation.n_repeats_for(*bounds, simulation.scenarios), len(seeds))
-                more = range(n_repeats, max(wanted, n_repeats))
-                evaluation = evaluation.with_repeats(left.repeats(more, seeds, self.n_jobs, progress))
-        return evaluation
+        has_replicates: bool,
+        tol: float,
+        confidence: float,
+    ) -> Decided:
+        """All repeats: as many as asked for or, for "auto", as the bounds need; of the noise alone, whose bands are
+        those of the repeats, the most."""
+        left = still_evaluating({k: v for k, v in candidates.items() if k not in first.errors}, first.errors)
+        found, grows = [first], is_auto(self.n_repeats) and has_replicates
+
+        def add(n_repeats: int) -> Decided:
+            numbers = range(len(found), n_repeats)
+            jobs = (delayed(simulation.repeat)(left, number, seeds[number]) for number in numbers)
+            options = {"n_jobs": self.n_jobs, "verbose": max(self.verbose - 1, 0)}
+            found.extend(run_jobs(jobs, len(numbers), unit="repeats", **options))
+            return Decided.together(found)
+
+        decided = add(3 if grows else len(seeds))
+        if not grows:
+            return decided
+        rows = [
+            one.summary(confidence)
+            for name in left
+            if name not in decided.errors
+            for one in evaluated(decided, name, simulation.scenarios)
+            if one.source == SIMULATED and np.isfinite(one.decisions).any()
+        ]
+        widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
+        return add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
+
+    def detector_name(self, detector: str | None = None) -> str:
+        """Name of the only detector, or a name that is known.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Needed where there are several.
+
+        Returns
+        -------
+        str
+            Of a detector that has results.
+
+        Raises
+        ------
+        ValueError
+            If there are several detectors and none is named, or the one that is named has no results.
+        """
+        known = self._results.loc[self._results["error"] == "", "detector"].unique().tolist()
+        if detector is None and self._results["detector"].nunique() == 1:
+            return known[0]
+        if not isinstance(detector, str) or detector not in known:
+            raise ValueError(f"detector is {detector!r:.100}; expected the name of one of {known}")
+        return detector
+
+    def pod_curve(
+        self,
+        family: str,
+        source: str = "simulated",
+        *,
+        log: bool | Literal["auto"] = "auto",
+        detector: str | None = None,
+    ) -> PODCurve:
+        """Probability of detection over severity for one family of scenarios.
+
+        Parameters
+        ----------
+        family : str
+            Of the scenarios.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        log : bool or "auto", default="auto"
+            Whether the logit is linear in the logarithm of the severity, or in the severity; "auto" takes the likelier
+            law of the two.
+        detector : str, optional
+            Name of the detector, where there are several.
+
+        Returns
+        -------
+        PODCurve
+            Records count as their effective numbers, so that serial correlation is in its bounds. Its
+            ``prediction_interval`` and ``a90_prediction_interval`` hold all that ``uncertainty`` names.
+
+        Raises
+        ------
+        ValueError
+            If there is no such family, the curve cannot be fitted, or there are several detectors and none is named.
+
+        Warns
+        -----
+        UserWarning
+            If the curve has no finite slope, or lies outside the bounds of some tested severities.
+        """
+        found = self._family(family, source, detector)
+        curve, findings = found.curve(log)
+        warn_each(findings)
+        return (
+            curve
+            if self.replicates_ is None
+            else replace(curve, replicates=tuple(self.replicates_.curves(found, curve.log)))
+        )
+
+    def minimum_detectable_damage(
+        self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
+    ) -> pd.DataFrame:
+        """Smallest severity that is detected reliably, for every family and source.
+
+        Parameters
+        ----------
+        level : float, default=0.9
+            Probability of detection that counts as reliable.
+        method : {"grid", "curve"}, default="grid"
+            Of the tested severities the smallest from which the rate stays at or above the level (bounds: the same for
+            the upper and the lower bounds of the rates); or where the fitted curve and its two-sided bounds reach it.
+        detector : str, optional
+            Name of one of several detectors; by default all.
+
+        Returns
+        -------
+        DataFrame
+            Indexed by family and source, and first by detector where there are several, with ``mdd``, ``ci_low`` and
+            ``ci_high``: NaN or infinite where the level is not reached. Where a curve has no finite slope, the POD does
+            not increase, or a family has one severity only, ``mdd`` is NaN and the bounds are the two tested severities
+            between which it lies. Detectors that failed are left out. With replicates, also ``pi_low`` and
+            ``pi_high``, between which that of a measured campaign should lie: quantiles over the replicates, infinite
+            if the level may not be reached.
+
+        Raises
+        ------
+        ValueError
+            If there is no family, the level is not between 0 and 1, a family has both damage and strengthening, or
+            there is no such detector.
+
+        Warns
+        -----
+        UserWarning
+            If a curve has no finite slope or lies outside the bounds of some tested severities, or there is none
+            because the POD does not increase.
+        """
+        check_probability(level, "level")
+        if method not in ("grid", "curve"):
+            raise ValueError(f"method is {method!r}; expected 'grid' or 'curve'")
+        families = {k: one for k, one in families_of(self._results, self.confidence_).items() if len(one.tested)}
+        if detector is not None or self._results["detector"].nunique() == 1:
+            name = self.detector_name(detector)
+            families = {key[1:]: one for key, one in families.items() if key[0] == name}
+        if not families:
+            raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
+        found, findings = {}, []
+        for key, family in families.items():
+            if method == "grid":
+                found[key] = family.on_grid(level)
+            else:
+                found[key], doubts = family.on_curve(level)
+                findings += doubts
+        warn_each(findings)
+        names = ["detector", "family", "source"][-len(next(iter(found))) :]
+        index = pd.MultiIndex.from_tuples(list(found), names=names)
+        table = pd.DataFrame(list(found.values()), index=index, columns=["mdd", "ci_low", "ci_high"])
+        if self.replicates_ is None:
+            return table
+        bands = [self.replicates_.smallest(one, level, method, self.confidence_) for one in families.values()]
+        return table.assign(**dict(zip(["pi_low", "pi_high"], np.transpose(bands), strict=True)))
+
+    def is_undetected(self, family: str, source: str = "simulated", detector: str | None = None) -> bool:
+        """Whether no severity of a family raises clearly more alarms than the healthy structure does.
+
+        Parameters
+        ----------
+        family : str
+            Of the scenarios.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        detector : str, optional
+            Name of the detector, where there are several.
+
+        Returns
+        -------
+        bool
+            True if no rate is above the highest upper bound of the rates of false alarms.
+
+        Raises
+        ------
+        ValueError
+            If there is no such family or source, or there are several detectors and none is named.
+        """
+        return self._family(family, source, detector).is_undetected
+
+    def ranking(
+        self,
+        max_false_alarms: float = 0.02,
+        source: str = "simulated",
+        confidence: float | None = None,
+        *,
+        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
+    ) -> pd.DataFrame:
+        """Detectors in the order of what they find, with what is not significant.
+
+        First come those that keep the limit of false alarms, by their probability of detection (POD), then the others,
+        those with the fewest false alarms first.
+
+        Parameters
+        ----------
+        max_false_alarms : float, default=0.02
+            Limit of the share of healthy records in alarm.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        confidence : float, optional
+            Of the bounds, two-sided; by default that of the study.
+        by : {"pod", "pod_at_equal_pfa"}, default="pod"
+            What is compared: detectors as they are, or with thresholds moved to equal false alarms.
+
+        Returns
+        -------
+        DataFrame
+            One row for each detector, indexed by ``detector``, best first, those that failed last:
+
+            - ``false_alarms``, ``false_alarms_ci_low``, ``false_alarms_ci_high``: rate and bounds, means over the
+              healthy scenarios;
+            - ``within_limit``: False only where the lower bound is above the limit;
+            - ``pod``, ``pod_ci_low``, ``pod_ci_high``: the same of the damaged scenarios;
+            - ``pod_at_equal_pfa``: POD with the threshold moved so that the share of ``calibration_`` in alarm is the
+              limit (less where indices are tied); NaN for measured records, which have no calibration;
+            - ``pod_deficit``, ``pod_deficit_ci_low``, ``pod_deficit_ci_high``: POD of the first row less that of this
+              one, by the measure of the order; the bounds hold for all rows together, and need two repeats;
+            - ``significantly_worse``: whether the lower bound is above 0;
+            - ``auc``: area under the ROC curve, the mean over the damaged scenarios; 0.5 is chance;
+            - ``time_to_detection``: mean over the damaged scenarios; NaN where one of them raises no alarm;
+            - ``not_evaluated``: share of the records that the detector cannot evaluate, which count nowhere else;
+            - for each family ``pod FAMILY``, ``pod FAMILY ci_low``, ``pod FAMILY ci_high`` and ``mdd FAMILY``, the
+              minimum detectable damage at a POD of 0.9 (NaN: not reached, or the severities have no order);
+            - ``error``: "", or the error of a detector that failed.
+
+        Raises
+        ------
+        ValueError
+            If no scenario of this source is healthy, or none is damaged, or ``by="pod_at_equal_pfa"`` and there are no
+            healthy records to move thresholds by.
+
+        Notes
+        -----
+        Differences are paired, as all detectors evaluate the same records. Their bounds include noise alone
+        (:ref:`how-detectors-are-ranked`). Limits of a ranking: :doc:`/guide/rank_detectors`.
+
+        Examples
+        --------
+        >>> from sklearn.ensemble import IsolationForest
+        >>> from skthermo.datasets import make_truss, make_truss_campaign
+        >>> from skthermo.detection import MahalanobisDetector, OutlierDetector
+        >>> from skthermo.studies import DetectabilityStudy
+        >>> from skthermo.surrogate import DataInformedFEM
+        >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
+        >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+        >>> detectors = {"forest": OutlierDetector(IsolationForest()), "Mahalanobis": MahalanobisDetector()}
+        >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
+        >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
+        >>> results = study.run(weather)
+        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
+                     false_alarms   pod  pod_at_equal_pfa  significantly_worse
+        detector
+        Mahalanobis          0.02  0.22              0.22                False
+        forest               0.01  0.19              0.16                 True
+        >>> print(study.summary())
+        'Mahalanobis' detects 22.4% of the damaged records at a false-alarm rate of 1.9%.
+        Significantly worse at 95% confidence: 'forest' (18.7% at 1.2%).
+        These comparisons include noise only: another year, baseline or FE model may change the order.
+        """
+        results, limit = self._results, check_probability(max_false_alarms, "max_false_alarms")
+        asked = self.confidence_ if confidence is None else check_probability(confidence, "confidence")
+        if by not in ("pod", "pod_at_equal_pfa"):
+            raise ValueError(f"by is {by!r:.100}; expected 'pod' or 'pod_at_equal_pfa'")
+        self._check_source(source)
+        rows = results[results["source"] == source]
+        for measure, kind in (("PFA", "healthy"), ("POD", "damaged")):
+            if not (rows["measure"] == measure).any():
+                raise ValueError(
+                    f"source {source!r} has the scenarios {rows['scenario'].unique().tolist()}, none of them {kind}; "
+                    "expected healthy and damaged ones"
+                )
+        calibration = {name: decisions for (name, of), decisions in self.calibration_.items() if of == source}
+        if by == "pod_at_equal_pfa" and not calibration:
+            raise ValueError(f"source {source!r} has no healthy records to move thresholds by; expected by='pod'")
+        records = self._records(source)
+        if asked != self.confidence_:
+            rows = pd.DataFrame([one.summary(asked) for one in records])
+        families = {key[:2]: family for key, family in families_of(rows, asked).items()}
+        return rank(records, rows, families, calibration, self.errors_, limit, asked, by)
+
+    def labelled_scores(
+        self, detector: str | None = None, source: str = "simulated", scenarios: Sequence[str] | None = None
+    ) -> tuple[NDArray[np.bool_], Array]:
+        """Which records are damaged, and how suspicious a detector finds them, as scikit-learn's curves take them.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Name of the detector, where there are several.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        scenarios : sequence of str, optional
+            Damaged states whose records are put together, from the onset of damage on; by default all.
+
+        Returns
+        -------
+        is_damaged : ndarray of shape (n_records,)
+            Records of all repeats; those that are not evaluated are left out.
+        scores : ndarray of shape (n_records,)
+            Minus the decision function: positive is an alarm.
+
+        Raises
+        ------
+        ValueError
+            If the detector is not known, or it has evaluated no healthy or no damaged records of these scenarios.
+
+        Examples
+        --------
+        Found damage over false alarms, for all thresholds, is ``RocCurveDisplay.from_predictions(
+        *study.labelled_scores("raw"), name="raw")`` of scikit-learn.
+        """
+        name = self.detector_name(detector)
+        parts: dict[bool, list[Array]] = {False: [], True: []}
+        for one in self._records(source):
+            is_healthy = one.scenario.is_healthy
+            if one.detector == name and (is_healthy or scenarios is None or one.scenario.name in scenarios):
+                kept = one.from_onset()[0]
+                parts[not is_healthy].append(-kept[~np.isnan(kept)])
+        healthy, damaged = (np.concatenate([*some, []]) for some in parts.values())
+        if not len(healthy) or not len(damaged):
+            raise ValueError(
+                f"detector {name!r} has evaluated {len(healthy)} healthy and {len(damaged)} damaged records of source "
+                f"{source!r} and scenarios {scenarios}; expected some of both"
+            )
+        return np.repeat([False, True], [len(healthy), len(damaged)]), np.r_[healthy, damaged]
+
+    def summary(self, max_false_alarms: float = 0.02, source: str = "simulated") -> str:
+        """Which detector detects most, and which are not significantly worse, in sentences.
+
+        Parameters
+        ----------
+        max_false_alarms : float, default=0.02
+            Limit of the share of healthy records in alarm.
+        source : str, default="simulated"
+            "simulated" or "reference".
+
+        Returns
+        -------
+        str
+            What `ranking` says, a line for each group of detectors, and what the bands of the first one include.
+
+        Raises
+        ------
+        ValueError
+            As `ranking`.
+        """
+        ranking = self.ranking(max_false_alarms, source)
+        lines = [in_words(ranking, max_false_alarms, self.confidence_)]
+        if self.replicates_ is not None and source == SIMULATED:
+            lines.append(self.uncertainty_summary(ranking.index[0]))
+        return "\n".join(lines)
+
+    def uncertainty_summary(self, detector: str | None = None) -> str:
+        """Which uncertainties the prediction intervals include, and which dominates the widest one, in sentences.
+
+        Parameters
+        ----------
+        detector : str, optional
+            Name of the detector, where there are several.
+
+        Returns
+        -------
+        str
+            A line on what the intervals include, and one on the scenario with the widest.
+
+        Raises
+        ------
+        ValueError
+            If there are several detectors and none is named, or the one that is named has no results.
+        """
+        name = self.detector_name(detector)
+        return in_sentences(self._results, self.uncertainty_, name, self.confidence_)
+
+    def _check_source(self, source: Any) -> None:
+        known = self._results["source"].dropna().unique().tolist()
+        if source not in known:
+            raise ValueError(f"source is {source!r:.100}; expected one of {known}")
+
+    def _records(self, source: str) -> list[EvaluatedRecords]:
+        """What the detectors evaluated of one source."""
+        decided = Decided(self.decisions_, {}, indices=self.indices_)
+        return [
+            one for name in self.detectors_ for one in evaluated(decided, name, self.scenarios_) if one.source == source
+        ]
+
+    def _family(self, family: str, source: str, detector: str | None) -> FamilyRates:
+        name = self.detector_name(detector)
+        found = {key: one for key, one in families_of(self._results, self.confidence_).items() if key[0] == name}
+        is_known = isinstance(family, str) and isinstance(source, str)
+        if not is_known or (name, family, source) not in found:
+            known = [f"{f!r} ({s})" for _, f, s in found]
+            raise ValueError(f"family {family!r}, source {source!r} is not in the results; expected one of {known}")
+        return found[name, family, source]
 
     @property
-    def _found(self) -> StudyFindings:
-        if not hasattr(self, "findings_"):
+    def _results(self) -> pd.DataFrame:
+        if not hasattr(self, "results_"):
             raise NotFittedError("the study has no results yet; expected a call of run before")
-        return self.findings_
+        return self.results_
 
     def _checked_detectors(self) -> dict[str, Any]:
         """Detectors by name; an error for what is none."""
@@ -427,3 +801,45 @@ def check_detector(detector: BaseEstimator, what: str) -> None:
     if isinstance(detector, type) or lacking:
         without = f", without {lacking}" if lacking else ", a class"
         raise ValueError(f"{what} is {detector!r:.200}{without}; expected an outlier detector")
+
+
+def still_evaluating(left: dict[str, Candidate], errors: Mapping[str, Exception]) -> dict[str, Candidate]:
+    """Detectors that have not failed; the first error if all have."""
+    if not left:
+        raise next(iter(errors.values()))
+    return left
+
+
+def evaluated(decided: Decided, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
+    """What a detector has evaluated, in the order of the scenarios."""
+    return [
+        EvaluatedRecords(detector, scenario, source, decided.indices[key], decided.decisions[key])
+        for scenario in scenarios
+        for source in (SIMULATED, REFERENCE)
+        if (key := (detector, scenario.name, source)) in decided.decisions
+    ]
+
+
+def failures(failed: Sequence[str], n_replicates: int) -> list[ModelWarning]:
+    """Replicates that have failed are a finding, and an error where they are most."""
+    if 2 * len(failed) > n_replicates:
+        raise ValueError(
+            f"{len(failed)} of {n_replicates} replicates failed, the first with {failed[0]}; expected chains that can "
+            "be refitted, or uncertainty='noise'"
+        )
+    text = f"{len(failed)} of {n_replicates} replicates failed, the first with {failed[:1]}. Bands are of the others"
+    return [ModelWarning(text, "failed-replicates")] if failed else []
+
+
+def many_false_alarms(results: pd.DataFrame) -> list[ResultWarning]:
+    """A detector that takes most simulated records of the healthy structure for damaged is a finding."""
+    many = results[(results["measure"] == "PFA") & (results["source"] == SIMULATED) & (results["ci_low"] > 0.5)]
+    if not len(many):
+        return []
+    by = f" (detectors {many['detector'].unique().tolist()})" if results["detector"].nunique() > 1 else ""
+    text = (
+        f"{many['rate'].iloc[0]:.0%} of the simulated records of scenario {many['scenario'].iloc[0]!r}, where nothing "
+        f"is changed, raise an alarm{by}. No rate of the study is meaningful. Give a baseline in Hz of the structure "
+        "that the chain has learned, and weather in degrees Celsius"
+    )
+    return [ResultWarning(text, "many-false-alarms")]

@@ -26,23 +26,23 @@ from skthermo._core.arrays import (
 from skthermo._core.estimators import BaseSearchCV, _num_samples, last_step
 from skthermo._core.frames import Table, has_stamps, row_times, time_of
 from skthermo._core.parallel import single_blas_thread
-from skthermo._core.warnings import warn_each, warn_user, warnings_once, without_kinds
-from skthermo.exceptions import ResultWarning, WeatherWarning
+from skthermo._core.warnings import collected, warn_each
+from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.preprocessing import set_aside
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._rates import Rate, rate_of
 from skthermo.studies.detectability._simulation import (
     LARGEST_SEED,
     Measurement,
-    SeenColumns,
     Simulation,
     clean_frequencies,
     has_targets,
+    named,
+    sensors_of,
+    side_by_side,
 )
 from skthermo.studies.detectability._study import check_detector
 from skthermo.surrogate import DataInformedFEM
-
-FIRST_ROWS = "not-predicted", "no-earlier-records"  # kinds of warnings that the first rows of each state would give
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +131,11 @@ class TaskScorer:
             raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
         order = np.argsort(rows, kind="stable")
         state, values = self.state[rows[order]], []
-        with warnings_once("in other states of the task"), without_kinds(FIRST_ROWS):
+        with collected() as findings:
             for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
                 values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
+        of_first_rows = "not-predicted", "no-earlier-records"
+        warn_each(one for one in findings if one.kind not in of_first_rows)
         repeat, scenario = np.divmod(state, self.n_scenarios)
         return Decisions(np.concatenate(values), labels[order], scenario, repeat)
 
@@ -249,13 +251,12 @@ class DetectionTask(Bunch):
             if not hasattr(detector, "best_params_"):
                 raise ValueError(f"{detector!r:.200} has no best_params_; expected a search that is fitted")
             if hasattr(detector, "best_estimator_"):
-                warn_user(
+                text = (
                     "the search has fitted best_estimator_ to all records of the task, damaged ones among them. It "
                     "takes such damage for healthy: do not use it. Give the search refit=False, and learn the "
-                    "baseline by task.refit(search)",
-                    ResultWarning,
-                    "search-refits",
+                    "baseline by task.refit(search)"
                 )
+                warn_each([ResultWarning(text, "search-refits")])
             detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
         check_detector(detector, "the detector")
         return clone(detector).fit(self.baseline)
@@ -315,20 +316,17 @@ class DetectionTask(Bunch):
             raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
         seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
         limit = self.scoring.max_false_alarms
-        fresh = _task(self.fem, T, self.scenarios, self.baseline, self.measurement, limit, 1, seeds)
+        fresh, findings = _task(self.fem, T, self.scenarios, self.baseline, self.measurement, limit, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
-            warn_user(
-                "the weather is that of the task, and only the noise is new. The optimism is that of the noise alone. "
-                "Give the weather of another year",
-                WeatherWarning,
-                "same-weather",
-            )
+            text = "the weather is that of the task: the optimism is that of the noise alone. Give that of another year"
+            findings.append(WeatherWarning(text, "same-weather"))
         rows = []
         for name, detector in named.items():
             fitted = self.refit(detector)
             tuned = np.mean([self.scoring(fitted, self.X.iloc[test], self.y.iloc[test]) for _, test in self.cv])
             row = {"detector": name or type(last_step(fitted)).__name__, "tuned": float(tuned)}
             rows.append(row | fresh._rates(fitted, confidence))
+        warn_each(findings)
         table = pd.DataFrame(rows).set_index("detector")
         table.insert(4, "optimism", table["tuned"] - table["fresh"])
         return table
@@ -462,10 +460,12 @@ def detection_task(
         raise ValueError(f"n_splits is {n_splits} for {len(seeds)} repeats; expected at most as many splits as repeats")
     limit = check_size(max_false_alarms, "max_false_alarms", 0.0, 1.0, "a share between 0 and 1, such as 0.02")
     check_chain(fem)
-    table = _baseline(fem, baseline)
+    table, findings = _baseline(fem, baseline)
     table = table[_columns(table, columns, fem.mode_names_)]
     measurement = Measurement.asked(fem, noise, gaps, outliers)
-    return _task(fem, T, read_scenarios(scenarios, fem.model), table, measurement, limit, n_splits, seeds)
+    task, doubts = _task(fem, T, read_scenarios(scenarios, fem.model), table, measurement, limit, n_splits, seeds)
+    warn_each([*findings, *doubts])
+    return task
 
 
 def _task(
@@ -477,21 +477,18 @@ def _task(
     limit: float,
     n_splits: int,
     seeds: Sequence[int],
-) -> DetectionTask:
-    """A task with the noise of some seeds."""
-    names = list(SeenColumns.all_of(fem).names)
-    positions = [names.index(name) for name in baseline.columns]
+) -> tuple[DetectionTask, list[SkthermoWarning]]:
+    """A task with the noise of some seeds, and what is doubtful about its weather."""
     labels = _labels(scenarios, T)
     n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
     index = _moved(T, baseline, n_repeats * n_scenarios)
-    with warnings_once("in the simulations of this task"), single_blas_thread():
-        warn_each(fem.thermal_.doubts(fem.weather(T)))
-        clean = clean_frequencies(fem, scenarios, T, len(seeds))
-        simulation = Simulation(fem, {}, scenarios, T, clean, measurement, None)
+    with collected() as findings, single_blas_thread():
+        findings += fem.thermal_.doubts(fem.weather(T))
+        simulation = Simulation(fem, scenarios, T, clean_frequencies(fem, scenarios, T, n_repeats), measurement)
         tables = [
-            np.hstack([as_floats(one.T), one.values])[:, positions]
+            one.table[list(baseline)].to_numpy()
             for repeat, seed in enumerate(seeds)
-            for one in simulation.records(scenarios, repeat, [seed])
+            for one in simulation.records(repeat, [seed])
         ]
     X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)]).rename_axis(baseline.index.name)
     y = pd.Series(np.r_[np.ones(n_baseline, dtype=int), np.tile(labels.ravel(), n_repeats)], X.index, name="y")
@@ -501,11 +498,11 @@ def _task(
     states = {"scenario": scenario, "repeat": np.r_[np.full(n_baseline, -1), state // n_scenarios]}
     groups = np.array_split(np.arange(n_repeats), n_splits)
     tests = [n_baseline + np.flatnonzero(np.isin(state // n_scenarios, group)) for group in groups]
-    return DetectionTask(
+    task = DetectionTask(
         X=X,
         y=y,
         cv=[(np.arange(n_baseline), test) for test in tests],
-        scoring=TaskScorer(y.iloc[n_baseline:], state, n_scenarios, names[: fem.n_features_in_], limit),
+        scoring=TaskScorer(y.iloc[n_baseline:], state, n_scenarios, sensors_of(fem), limit),
         baseline=baseline,
         states=pd.DataFrame(states, X.index),
         fem=fem,
@@ -514,26 +511,23 @@ def _task(
         measurement=measurement,
         seeds=seeds,
     )
+    return task, findings
 
 
-def _baseline(fem: DataInformedFEM, baseline: Table | None) -> pd.DataFrame:
-    """Measured records as a frame, by default those of the chain; rows without stamps are numbered."""
-    T, F = fem.records_.temperatures, fem.records_.frequencies
-    every = SeenColumns.all_of(fem)
-    names, n_sensors = every.names, every.n_sensors
+def _baseline(fem: DataInformedFEM, baseline: Table | None) -> tuple[pd.DataFrame, list[SkthermoWarning]]:
+    """Measured records as a frame, by default those of the chain, and findings; rows without stamps are numbered."""
     if baseline is None:
-        stamped = T if has_stamps(T) else F
-        index = stamped.index if has_stamps(stamped) else None
-        return pd.DataFrame(np.hstack([as_floats(T), as_floats(F)]), index, names)
-    known = every.positions_of(baseline, "the baseline")
-    index = baseline.index if has_stamps(baseline) else None
-    records = pd.DataFrame(as_columns(baseline), index, [names[i] for i in known])
-    is_sensor = np.asarray(known) < n_sensors
-    T, F = (records.loc[:, chosen] if chosen.any() else None for chosen in (is_sensor, ~is_sensor))
-    found = set_aside(T, F, model=fem.model if len(names) == records.shape[1] else None, needs_all=True)
-    warn_each(found.others.warnings())
-    tables = [table for table in (found.temperatures, found.frequencies) if table is not None]
-    return pd.concat(tables, axis=1)[list(records)]
+        T, F = fem.records_.temperatures, fem.records_.frequencies
+        table = side_by_side(fem, T if has_stamps(T) else as_floats(T), F)
+        return table if has_stamps(table) else table.reset_index(drop=True), []
+    table = named(fem, baseline, "the baseline")
+    table = pd.DataFrame(as_columns(table), table.index if has_stamps(table) else None, table.columns)
+    is_sensor = table.columns.isin(sensors_of(fem))
+    T, F = (table.loc[:, chosen] if chosen.any() else None for chosen in (is_sensor, ~is_sensor))
+    is_whole = table.shape[1] == len(sensors_of(fem)) + len(fem.mode_names_)
+    found = set_aside(T, F, model=fem.model if is_whole else None, needs_all=True)
+    tables = [one for one in (found.temperatures, found.frequencies) if one is not None]
+    return pd.concat(tables, axis=1)[list(table)], found.others.warnings()
 
 
 def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:
