@@ -408,7 +408,7 @@ def make_kw51_campaign(
     >>> campaign.frequencies.shape, campaign.state.unique().tolist()
     ((3000, 6), ['before'])
     >>> campaign.clean_frequencies.iloc[0].round(2).tolist()
-    [0.51, 1.21, 1.89, 2.51, 2.58, 2.92]
+    [0.51, 1.21, 1.89, 2.51, 2.57, 2.91]
     """
     n_hours = positive_integer(n_hours, "n_hours")
     deviations = check_noise(noise, 6)

@@ -280,7 +280,7 @@ def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
         parts = [f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {', '.join(filter(None, parts))}{note}"
-    yield f"events: {len(events)}, {events['end'].isna().sum()} of them open"
+    yield f"events: {len(events)}, {events['end'].isna().sum()} of them open" if len(events) else "events: none"
     if len(aside):
         n_values = counted(int(aside["n_rows"].sum()), "value")
         yield f"baseline: {n_values} set aside: {'; '.join(aside['detail'].head(3))}"

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
-from skthermo._core.arrays import Array, means_of_known
+from skthermo._core.arrays import Array, means_of_known, median
 from skthermo._core.frames import correlation_times
 from skthermo.exceptions import WeatherWarning
 from skthermo.preprocessing import HampelFilter
@@ -79,10 +79,11 @@ class BaselineResiduals:
     def draw(self, weather: Array, random_state: np.random.RandomState) -> Array:
         """Residuals for rows of weather in order of time, (n_samples, n_modes), with the gaps of whole records.
 
-        A block bootstrap by weather: each block of rows takes records that follow each other, one of the 15 blocks
-        whose mean weather is most similar. Rows of unknown weather are NaN.
+        A smoothed block bootstrap by weather: each block of rows takes records that follow each other, one of the 15
+        blocks whose mean weather is most similar. A second draw is added with a small weight, because a detector has
+        learned the residuals of the records themselves. Rows of unknown weather are NaN.
         """
-        return self._where_known(weather, lambda known: self.values[self._taken(known, random_state)])
+        return self._where_known(weather, partial(self._smoothed, self.drawn, random_state, False))
 
     def draw_complete(self, weather: Array, random_state: np.random.RandomState, without_outliers: bool) -> Array:
         """The same, with missing modes, and outliers if asked, drawn anew given the modes that are there.
@@ -90,12 +91,18 @@ class BaselineResiduals:
         They follow the normal distribution of residuals without outliers. Without gaps and outliers, `draw` gives the
         same.
         """
-        values = self.usual if without_outliers else self.values
+        values = self.usual if without_outliers else self.drawn
+        return self._where_known(weather, partial(self._smoothed, values, random_state, True))
 
-        def of_known(known: Array) -> Array:
-            return self._completed(values[self._taken(known, random_state)], random_state)
-
-        return self._where_known(weather, of_known)
+    def _smoothed(self, values: Array, random_state: np.random.RandomState, is_complete: bool, weather: Array) -> Array:
+        """Values as drawn, and others of the usual ones, added with the bandwidth of Silverman's rule."""
+        taken, other = self._taken(weather, random_state), self._taken(weather, random_state)
+        n_modes, n_independent = self.n_modes, len(values) / self.correlation_time
+        angle = np.arctan((4 / ((n_modes + 2) * n_independent)) ** (1 / (n_modes + 4)))
+        mean = np.nan_to_num(self._local_mean(self.usual, weather, 100, MOST_PLACES))
+        first = self._completed(values[taken], random_state) if is_complete else values[taken]
+        second = self._completed(self.usual[other], random_state)
+        return mean + np.cos(angle) * (first - mean) + np.sin(angle) * (second - mean)
 
     def _taken(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of the records whose residuals rows of known weather take, in blocks."""
@@ -126,8 +133,20 @@ class BaselineResiduals:
 
     @cached_property
     def usual(self) -> Array:
-        """The residuals, NaN where one is an outlier: far from its neighbours in time."""
-        return HampelFilter().fit(self.values).transform(self.values)
+        """The drawn residuals, NaN where one is an outlier: far from its neighbours in time."""
+        return HampelFilter().fit(self.drawn).transform(self.drawn)
+
+    @cached_property
+    def drawn(self) -> Array:
+        """Residuals for drawing noise: the mean of the residuals out of fold and of the mapper of all records.
+
+        The former hold the errors of mappers of fewer records besides the errors of the mapper that simulates. The
+        latter are too small, and do not count where the mapper has learned noise: where they change from record to
+        record by less than three quarters of the former.
+        """
+        own, out_of_fold = np.abs(np.diff(self.own, axis=0)), np.abs(np.diff(self.values, axis=0))
+        is_overfitted = np.nansum(median(own)) < 0.75 * np.nansum(median(out_of_fold))
+        return self.values if is_overfitted else (self.values + self.own) / 2
 
     @cached_property
     def level_errors(self) -> Array:

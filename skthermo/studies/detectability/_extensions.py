@@ -114,7 +114,7 @@ def compare_extensions(
     if not isinstance(study, DetectabilityStudy):
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy that has been run")
     name, fem = study.detector_name(detector), study.fem
-    present = study._candidates[name]
+    present = study.candidates_[name]
     present = replace(present, detector=clone(present.detector))
     factors = np.ravel(real_array(baseline_factors, "baseline_factors")).tolist()
     if np.ndim(baseline_factors) != 1 or not all(1 < factor < np.inf for factor in factors):

@@ -254,7 +254,7 @@ def pod_curve(
     >>> from skthermo.studies import pod_curve
     >>> curve = pod_curve([0.1, 0.2, 0.3, 0.4], [3, 12, 19, 20], [20, 20, 20, 20])
     >>> print(f"{curve.a50:.2f} {curve.a90:.2f} {curve.a90_95:.2f}")
-    0.17 0.28 0.36
+    0.18 0.27 0.33
     """
     curve, findings = fitted_curve(severities, n_detected, n_records, log=log, confidence=confidence)
     warn_each(findings)

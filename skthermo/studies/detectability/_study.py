@@ -118,6 +118,8 @@ class DetectabilityStudy(BaseEstimator):
     calibration_ : dict of (str, str) to ndarray of shape (n_repeats, n_records)
         Such decisions on healthy records with noise of other seeds, by detector and source, if a scenario is healthy.
         `ranking` moves thresholds by them; nothing else is evaluated by them. Measured records have none.
+    candidates_ : dict of str to object
+        Each fitted detector with its columns and the number of records that it has learned.
     columns_ : dict of str to list
         Names of the columns that each detector sees.
     uncertainty_ : DataFrame or None
@@ -322,7 +324,7 @@ class DetectabilityStudy(BaseEstimator):
             results = rates.banded(results, confidence)
         findings += many_false_alarms(results)
         self.results_, self.scenarios_, self.confidence_, self.errors_ = results, scenarios, confidence, texts
-        self._candidates = left
+        self.candidates_ = left
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
@@ -611,14 +613,14 @@ class DetectabilityStudy(BaseEstimator):
         >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
         >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
         >>> results = study.run(weather)
-        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
+        >>> study.ranking(0.03)[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
                      false_alarms   pod  pod_at_equal_pfa  significantly_worse
         detector
-        Mahalanobis          0.02  0.22              0.22                False
-        forest               0.01  0.19              0.16                 True
-        >>> print(study.summary())
-        'Mahalanobis' detects 22.4% of the damaged records at a false-alarm rate of 1.9%.
-        Significantly worse at 95% confidence: 'forest' (18.7% at 1.2%).
+        Mahalanobis          0.03  0.23              0.25                False
+        forest               0.02  0.17              0.20                 True
+        >>> print(study.summary(0.03))
+        'Mahalanobis' detects 22.7% of the damaged records at a false-alarm rate of 2.7%.
+        Significantly worse at 95% confidence: 'forest' (17.5% at 2.2%).
         These comparisons include noise only: another year, baseline or FE model may change the order.
         """
         results, limit = self._results, check_probability(max_false_alarms, "max_false_alarms")
