@@ -92,7 +92,7 @@ def kinds_of_warnings(tree):
     """Kinds that the source gives to warnings; None where it does not show the text."""
     for call in ast.walk(tree):
         match call:
-            case ast.Call(func=ast.Name(id=name), args=[_, *_, kind]) if re.fullmatch(r"warn_user|\w+Warning", name):
+            case ast.Call(func=ast.Name(id=name), args=[_, *_, kind]) if re.fullmatch(r"\w+Warning", name):
                 yield kind.value if isinstance(kind, ast.Constant) else None
 
 

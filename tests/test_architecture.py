@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import skthermo
-from skthermo import exceptions
 from skthermo.plotting import DamageIndexDisplay
 
 PACKAGE = Path(skthermo.__file__).parent
@@ -206,12 +205,3 @@ def test_a_missing_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
     with pytest.raises(ImportError, match=r"skthermo\[plot\]|plot"):
         DamageIndexDisplay.from_predictions([1.0, 3.0], 2.0)
-
-
-def test_every_warning_names_its_class():
-    for path in FILES:
-        for node in nodes(path):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", None) == "warn_user":
-                given = [getattr(argument, "id", None) for argument in node.args]
-                assert len(given) == 3, f"{path}:{node.lineno}: expected warn_user(text, class, kind)"
-                assert given[1] in {*exceptions.__all__, "category"}, f"{path}:{node.lineno}: {given[1]} is no class"

@@ -41,7 +41,6 @@ from skthermo._core.arrays import (
     refuse_huge,
     refuse_no_table,
 )
-from skthermo._core.warnings import warn_user
 from skthermo.exceptions import WeatherWarning
 
 if TYPE_CHECKING:  # scikit-learn has no types: without these, a decorated fit and every fit_transform would be Any

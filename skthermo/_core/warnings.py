@@ -3,7 +3,7 @@
 import sys
 import threading
 import warnings
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 from skthermo.exceptions import SkthermoWarning
@@ -45,23 +45,3 @@ def collected(*, drop_others: bool = False) -> Iterator[list[SkthermoWarning]]:
             findings.append(one.message)
         elif not drop_others:
             warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
-
-
-@contextmanager
-def without_warnings() -> Iterator[None]:
-    """No warning of the parts within: their caller warns of the same, or has done so."""
-    with collected(drop_others=True):
-        yield
-
-
-@contextmanager
-def without_kinds(kinds: Collection[str]) -> Iterator[None]:
-    """Warnings of the parts within, but for the kinds that their caller gives itself."""
-    with collected() as findings:
-        yield
-    warn_each(one for one in findings if one.kind not in kinds)
-
-
-def warn_user(message: str, category: type[SkthermoWarning], kind: str) -> None:
-    """Give one warning; an empty text is none."""
-    warn_each([category(message, kind)] if message else [])

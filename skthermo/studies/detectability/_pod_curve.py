@@ -243,7 +243,7 @@ def pod_curve(
     Hit/miss analysis of MIL-HDBK-1823A with the logit link. Records at one severity count as independent, and the curve
     as logistic: confidence bounds hold neither serial correlation nor another shape of the curve. Both laws have two
     parameters. With 20 to 1,000 records at each of three to five severities, a90/95 of the likelier law was above the
-    true a90 in 92 to 99 % of the simulated cases, whichever law was true.
+    true a90 in 91 to 100 % of the simulated cases, whichever law was true.
 
     References
     ----------

@@ -162,7 +162,6 @@ class TaskScorer:
             )
 
 
-YEAR = 365.2425  # days
 SHORTEST_GAP = 30.0  # days between two states, where whole years do not fit into the stamps that pandas knows
 
 
@@ -548,7 +547,7 @@ def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:
     day, gap = pd.Timedelta(days=1), pd.Timedelta(days=SHORTEST_GAP)
     wait, period = (baseline.index.max() + gap - stamps.min()) / day, (stamps.max() - stamps.min() + gap) / day
     room = (pd.Timestamp.max.tz_localize(stamps.tz) - stamps.max()) / day - 1
-    for length in (YEAR, 1.0):
+    for length in (365.2425, 1.0):  # whole years or, where they do not fit, days
         days = np.round(length * (max(np.ceil(wait / length), 0) + np.ceil(period / length) * np.arange(n_states)))
         if days[-1] < room:
             moved = stamps[:0].append([stamps + one * day for one in days])
