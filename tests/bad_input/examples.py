@@ -1574,10 +1574,6 @@ LEGAL |= {
     "baseline_factors": {("empty", "studies.compare_extensions"): "no longer baselines are asked for"},
     "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},
     "tolerance": {("zero", "preprocessing.LagFeatures"): "only records at the very time"},
-    "X": {
-        ("kelvin", "surrogate.DataInformedFEM.extrapolation_distance"): "the answer says how far outside",
-        ("-999", "surrogate.DataInformedFEM.extrapolation_distance"): "the answer says how far outside",
-    },
     "F": {("NaN throughout", "updating.ModelUpdater.fit"): "shapes alone may be measured"},
     "damage_index": {
         ("infinite inside", "*"): "an infinite index is an alarm",
@@ -1591,25 +1587,6 @@ LEGAL |= {
     "reference": {("zero inside", "preprocessing.BiasAligner"): "the frequencies become shifts"},
 }
 
-CARRIED = {  # arguments whose names of columns are carried through, and match nothing
-    "frequencies": ("fem.add_noise", "fem.match_modes"),
-    "S": ("updating.select_parameters",),
-    "temperature": ("datasets.steel_modulus",),
-    "measured": ("plotting.PredictionDisplay.from_predictions",),
-}
-EMPTY = {
-    "frequencies": "fem.add_noise",
-    "phi_a": "fem.mac",
-    "phi_b": "fem.mac",
-    "temperature": "datasets.steel_modulus",
-}
-VECTORS = {
-    "y": ("surrogate.TemperatureMapper", "surrogate.InverseSurrogate.fit"),
-    "residuals": ("preprocessing.residual_trend",),
-    "measured": ("plotting.PredictionDisplay.from_predictions",),
-    "temperature": ("datasets.steel_modulus",),
-    "frequencies": ("preprocessing.check_records",),
-}
 CELSIUS = ("kelvin", "Fahrenheit", "tenths of a degree", "one sensor in kelvin", "-999", "9999", "a slipped point")
 
 
@@ -1618,12 +1595,30 @@ def legal(argument, callables, causes, reason):
     LEGAL.setdefault(argument, {}).update({(cause, name): reason for name in callables for cause in causes})
 
 
-for argument, callables in CARRIED.items():
-    legal(argument, callables, ("levels of names", "tuples as names", "a number among names"), "names are not matched")
-for argument, name in EMPTY.items():
-    legal(argument, [name], ["no columns"], "the answer is empty")
-for argument, callables in VECTORS.items():
-    legal(argument, callables, ["a series"], "a series is a vector, or a table of one column")
+LEVELS = ("levels of names", "tuples as names", "a number among names")
+CARRIED, EMPTY, VECTORS = (
+    "names are not matched",
+    "the answer is empty",
+    "a series is a vector, or a table of one column",
+)
+for argument, name, causes, reason in (
+    ("frequencies", "fem.add_noise", LEVELS, CARRIED),
+    ("frequencies", "fem.match_modes", LEVELS, CARRIED),
+    ("S", "updating.select_parameters", LEVELS, CARRIED),
+    ("temperature", "datasets.steel_modulus", LEVELS, CARRIED),
+    ("measured", "plotting.PredictionDisplay.from_predictions", LEVELS, CARRIED),
+    ("frequencies", "fem.add_noise", ["no columns"], EMPTY),
+    ("phi_a", "fem.mac", ["no columns"], EMPTY),
+    ("phi_b", "fem.mac", ["no columns"], EMPTY),
+    ("temperature", "datasets.steel_modulus", ["no columns"], EMPTY),
+    ("y", "surrogate.TemperatureMapper", ["a series"], VECTORS),
+    ("y", "surrogate.InverseSurrogate.fit", ["a series"], VECTORS),
+    ("residuals", "preprocessing.residual_trend", ["a series"], VECTORS),
+    ("measured", "plotting.PredictionDisplay.from_predictions", ["a series"], VECTORS),
+    ("temperature", "datasets.steel_modulus", ["a series"], VECTORS),
+    ("frequencies", "preprocessing.check_records", ["a series"], VECTORS),
+):
+    legal(argument, [name], causes, reason)
 UNITS = ("rad/s", "kHz", "periods")
 WEATHER = ["surrogate.DataInformedFEM.weather"]
 legal("X", ["surrogate.DataInformedFEM.extrapolation_distance"], CELSIUS, "the answer says how far outside")
