@@ -80,15 +80,10 @@ USUAL |= {
     "dofs": (DOFS, integers(23)),
     "noise": (0.01, NOISE),
     "n_jobs": (1, jobs()),
-    "track": (False, flag()),
-    "lumped": (False, flag()),
     "contamination": (0.05, number(0, -0.1, 0.6, 2)),
     "source": ("simulated", texts() | bad("no")),
     "family": ("top", texts() | bad("no")),
-    "log": (False, flag()),
     "confidence": (0.9, number(0, 1, 90, -0.1)),
-    "threshold": ("conformal", choice()),
-    "return_std": (False, flag()),
     "repeat": (0, number(0.5, -1)),
     "tol": (0.01, number(0, -1, 1.0)),
     "verbose": (False, flag("one", "zero")),
@@ -138,15 +133,12 @@ def matrices(theta):
     return theta[0] * STIFF, EYE
 
 
-def structure(**given):
-    """A model of a structure with one changed member."""
+def solved(model):
+    """Frequencies of a model at its nominal parameters."""
+    return model.frequencies(np.ones((1, len(model.parameter_names))))
 
-    def call(**values):
-        return (
-            fem.Structure(**given(**values)).assemble(list(given(**values)["groups"]), n_modes=1).frequencies([[1.0]])
-        )
 
-    return call
+ADDED = {name: (np.eye(23), matrix(np.eye(23))) for name in ("stiffness", "mass")}
 
 
 # fem
@@ -160,31 +152,13 @@ AFFINE = {
     "parameter_names": (["k"], names(["k"])),
     "groups": (
         {"all": ["k"]},
-        {
-            "a list": ["k"],
-            "unknown": {"all": ["x"]},
-            "empty": {"all": []},
-            "true": True,
-            "a number": 3,
-            "text": "k",
-            "None inside": {"all": None},
-            "too high": {"all": [4]},
-            "true inside": {"all": [True]},
-        },
+        bad(["k"], {"all": ["x"]}, {"all": []}, True, 3, "k", {"all": None}, {"all": [4]}, {"all": [True]}),
     ),
     "track": (False, flag()),
     "dofs": (
         [(1, "x"), (2, "x")],
-        {
-            "too few": [(1, "x")],
-            "repeated": [(1, "x"), (1, "x")],
-            "names": ["x", "y"],
-            "triples": [(1, "x", 0), (2, "x", 0)],
-            "true inside": [(True, "x"), (2, "x")],
-            "lists inside": [([1], "x"), ([2], "x")],
-            "text": "ab",
-            "a number": 2,
-        },
+        bad([(1, "x")], [(1, "x")] * 2, ["x", "y"], [(1, "x", 0), (2, "x", 0)], [(True, "x"), (2, "x")], "ab", 2)
+        | {"lists inside": [([1], "x"), ([2], "x")]},
     ),
 }
 use("fem.AffineModel", lambda **a: AffineModel(**a).frequencies([[1.0]]), **AFFINE)
@@ -202,56 +176,31 @@ for owner in (TRUSS, REDUCED):
         follow=(False, flag()),
     )
     use(f"fem.{kind}.matrices", lambda owner=owner, **a: [m.toarray() for m in owner.matrices(**a)], theta=(ROW, one))
-    use(
-        f"fem.{kind}.rescaled",
-        lambda owner=owner, **a: owner.rescaled(**a).frequencies(np.ones((1, 4))),
-        theta=(ROW, one),
-    )
-    use(
-        f"fem.{kind}.damaged",
-        lambda owner=owner, **a: owner.damaged(**a).frequencies(np.ones((1, 4))),
-        damage=({"top": 0.1}, DAMAGE),
-    )
-    use(
-        f"fem.{kind}.with_modes",
-        lambda owner=owner, **a: owner.with_modes(**a).frequencies(np.ones((1, 4))),
-        modes=([0, 1], integers(23)),
-    )
+    for name, argument, good, wrong in (
+        ("rescaled", "theta", ROW, one),
+        ("damaged", "damage", {"top": 0.1}, DAMAGE),
+        ("with_modes", "modes", [0, 1], integers(23)),
+    ):
+        use(f"fem.{kind}.{name}", lambda o=owner, n=name, **a: solved(getattr(o, n)(**a)), **{argument: (good, wrong)})
     use(
         f"fem.{kind}.with_parameters",
-        lambda owner=owner, **a: owner.with_parameters(**a).frequencies(np.ones((1, 2))),
+        lambda owner=owner, **a: solved(owner.with_parameters(**a)),
         names=(["top", "bottom"], names(["top", "bottom"])),
     )
-    use(
-        f"fem.{kind}.with_added",
-        lambda owner=owner, **a: owner.with_added(**a).frequencies(np.ones((1, 4))),
-        stiffness=(np.eye(23), matrix(np.eye(23))),
-        mass=(np.eye(23), matrix(np.eye(23))),
-    )
+    use(f"fem.{kind}.with_added", lambda owner=owner, **a: solved(owner.with_added(**a)), **ADDED)
     use(
         f"fem.{kind}.with_damage_parameters",
         lambda owner=owner, **a: owner.with_damage_parameters(**a).parameter_names,
         groups=(["top"], names(["top"])),
         severities=(
             (-0.1, 0.5),
-            {
-                "percent": (-10, 50),
-                "one": 0.5,
-                "text": ("a", "b"),
-                "true": (True, False),
-                "NaN": (NAN, 0.5),
-                "reversed": (0.5, -0.1),
-                "None": None,
-                "three": (0, 0.1, 0.2),
-                "whole": (0.0, 1.0),
-                "1e308": (0, HUGE),
-                "a class": tuple,
-            },
+            bad((-10, 50), 0.5, ("a", "b"), (True, False), (NAN, 0.5), (0.5, -0.1), None, tuple)
+            | bad((0, 0.1, 0.2), (0.0, 1.0), (0, HUGE)),
         ),
     )
     use(
         f"fem.{kind}.reduced",
-        lambda owner=owner, **a: owner.reduced(**a).frequencies(np.ones((1, 4))),
+        lambda owner=owner, **a: solved(owner.reduced(**a)),
         usual="tol random_state",
         bounds=(0.1, BOUNDED),
     )
@@ -260,25 +209,12 @@ for owner in (TRUSS, REDUCED):
         owner,
         shapes=(
             TRUSS.modes(np.ones((1, 4)))[1],
-            {
-                "None": None,
-                "text": "x",
-                "two axes": np.ones((23, 2)),
-                "other rows": np.ones((1, 5, 2)),
-                "texts": np.full((1, 23, 2), "1"),
-                "booleans": np.ones((1, 23, 2), dtype=bool),
-                "NaN": np.full((1, 23, 2), NAN),
-                "times": np.full((1, 23, 2), STAMP),
-            },
+            bad(None, "x", np.ones((23, 2)), np.ones((1, 5, 2)))
+            | {f"all {one}": np.full((1, 23, 2), one) for one in ("1", True, NAN, STAMP)},
         ),
     )
-use(
-    "fem.ReducedModel",
-    lambda **a: fem.ReducedModel(**a).frequencies(np.ones((1, 4))),
-    usual="tol random_state",
-    full=(TRUSS, models()),
-    bounds=(0.1, BOUNDED),
-)
+FULL = {"full": (TRUSS, models()), "bounds": (0.1, BOUNDED)}
+use("fem.ReducedModel", lambda **a: solved(fem.ReducedModel(**a)), usual="tol random_state", **FULL)
 LOCAL = TRUSS.local_modes(ROW)
 method("fem.LocalModes.shapes", LOCAL, usual="dofs")
 method("fem.LocalModes.derivatives", LOCAL, usual="dofs", columns=([0, 1], integers(6)))
@@ -310,21 +246,16 @@ def member(cls, **extra):
 BEAM = {"E": 210e9, "G": 80e9, "A": 0.01, "I_yy": 1e-5, "I_zz": 1e-5, "J": 1e-5, "density": 7850.0}
 NODE = bad("nowhere", None, True, 0.5, ["left"], NAN, str, b"left")
 MAY_BE_0 = number(-1.0)
-VECTOR = {
-    "text": "up",
-    "two": (0.0, 1.0),
-    "NaN": (NAN, 0.0, 1.0),
-    "texts": ("0", "0", "1"),
-    "booleans": (True, False, True),
-    "true": True,
-    "infinite": (INF, 0, 0),
-    "1e308": (HUGE, 0, 0),
-    "a number": 1.0,
-    "times": (STAMP,) * 3,
-    "complex": (1j, 0, 0),
-    "a class": tuple,
-    "bytes": b"001",
-}
+VECTOR = {"two": (0.0, 1.0), "times": (STAMP,) * 3} | bad(
+    *((first, 0, 0) for first in (NAN, INF, HUGE, 1j)),
+    ("0", "0", "1"),
+    (True, False, True),
+    "up",
+    True,
+    1.0,
+    tuple,
+    b"001",
+)
 RELEASES = bad(["rw"], 3, True, None, [NAN], b"ry", [1], str)
 use(
     "fem.Bar",
@@ -354,20 +285,7 @@ use(
     "fem.Membrane",
     member(Membrane),
     usual="lumped",
-    corners=(
-        tuple("abcd"),
-        {
-            "three": tuple("abc"),
-            "unknown": tuple("abcx"),
-            "repeated": tuple("abca"),
-            "None": None,
-            "a number": 3,
-            "true": True,
-            "crossed": tuple("acbd"),
-            "several": [["a", "b"]] * 4,
-            "a class": tuple,
-        },
-    ),
+    corners=(tuple("abcd"), bad(*map(tuple, ("abc", "abcx", "abca", "acbd")), None, 3, True, [["a", "b"]] * 4, tuple)),
     E=(2e9, PHYSICAL),
     t=(0.1, PHYSICAL),
     nu=(0.3, number(-2, 0.6, 30)),
@@ -378,10 +296,7 @@ use(
     "fem.Spring",
     member(Spring),
     node=("apex", NODE),
-    direction=(
-        "y",
-        bad("w", "xy", None, 1, True, b"y", str, NAN, ["y"]),
-    ),
+    direction=("y", bad("w", "xy", None, 1, True, b"y", str, NAN, ["y"])),
     k=(1e6, PHYSICAL),
 )
 use(
@@ -394,60 +309,23 @@ use(
     ),
     members=(
         BARS,
-        {
-            "None": None,
-            "a list": list(BARS.values()),
-            "text": "bars",
-            "true": True,
-            "empty": {},
-            "a class": BARS | {"tie": Bar},
-            "text inside": BARS | {"tie": "bar"},
-            "None inside": BARS | {"tie": None},
-            "a number inside": BARS | {"tie": 3},
-            "disconnected": {"tie": BARS["tie"]},
-        },
+        bad(None, list(BARS.values()), "bars", True, {}, {"tie": BARS["tie"]})
+        | {f"{cause} inside": BARS | {"tie": v} for cause, v in bad(Bar, "bar", None, 3).items()},
     ),
     supports=(
         SUPPORTS,
-        {
-            "None": None,
-            "a list": ["left"],
-            "text": "left",
-            "true": True,
-            "unknown node": {"pier": "xy"},
-            "unknown direction": {"left": "xw", "right": "y"},
-            "a number": {"left": 1},
-            "None inside": {"left": None},
-            "bytes": {"left": b"xy"},
-            "true inside": {"left": True},
-            "numbers": {"left": [0, 1]},
-            "a mechanism": {"left": "x"},
-            "repeated": {"left": "xx", "right": "y"},
-        },
+        bad(None, ["left"], "left", True, {"pier": "xy"}, {"left": "xw", "right": "y"}, {"left": "xx", "right": "y"})
+        | {f"{cause} inside": {"left": v} for cause, v in bad(1, None, b"xy", True, [0, 1], "x").items()},
     ),
     groups=(
         GROUPS,
-        {
-            "a list": ["tie"],
-            "text": "tie",
-            "true": True,
-            "a number": 3,
-            "unknown": {"rafters": ["post"]},
-            "empty": {"rafters": []},
-            "None inside": {"rafters": None},
-            "numbers": {"rafters": [3]},
-            "text inside": {"rafters": "rafter"},
-            "repeated": {"rafters": ["rafter 1", "rafter 1"]},
-        },
+        bad(["tie"], "tie", True, 3)
+        | {f"{c} inside": {"rafters": v} for c, v in bad(["post"], [], None, [3], "rafter", ["rafter 1"] * 2).items()},
     ),
 )
-TARGETS = names(["rafters"], "a number") | {
-    "a number": 3,
-    "a property": {"p": ("nu", "rafters")},
-    "four": {"p": ("E", "rafters", "mass", 1)},
-    "number inside": {"p": 1},
-    "None inside": {"p": None},
-    "true inside": {"p": True},
+TARGETS = names(["rafters"]) | {
+    f"{cause} inside": {"p": value}
+    for cause, value in bad(("nu", "rafters"), ("E", "rafters", "mass", 1), 1, None, True).items()
 }
 ALONE = {name: [name] for name in BARS}
 EXPORTED = fem.Structure(NODES, BARS, SUPPORTS, ALONE).assemble(list(BARS), n_modes=1)
@@ -483,64 +361,36 @@ use(
     **PROGRAM,
     n_modes=(1, count(2)),
     vectorized=(False, flag()),
-    cache=(
-        None,
-        bad(True, 3, b"c", __file__, Path, NAN),
-    ),
+    cache=(None, bad(True, 3, b"c", __file__, Path, NAN)),
     groups=({"g": ["k"]}, bad("k", ["k"], 3, True, {"g": []}, {"g": ["E"]}, {"g": 1}, {"g": None}, {"g": ["k", "k"]})),
 )
+SOFT = pd.DataFrame({"k": [1.0, 1.1]})
 PROGRAMMED = fem.CallableModel(lambda theta: [theta[0] ** 0.5], ["k"], 1)
 method("fem.CallableModel.damaged", PROGRAMMED, damage=({"k": 0.1}, by_key({"k": 0.1}, wrong=(20, 1.0, -15))))
 method(
     "fem.CallableModel.frequencies",
     PROGRAMMED,
-    theta=(
-        pd.DataFrame({"k": [1.0, 1.1]}),
-        table(
-            pd.DataFrame({"k": [1.0, 1.1]}),
-            nan=False,
-            positive=True,
-            rows=False,
-            but=("no rows", "columns in another order"),
-        ),
-    ),
+    theta=(SOFT, table(SOFT, nan=False, positive=True, rows=False, but=("no rows", "columns in another order"))),
 )
 use(
     "fem.add_noise",
     usual="noise random_state",
     frequencies=(F, table(F, fixed=False, rows=False, but=("no rows", "repeated names", "repeated columns"))),
 )
-for name in ("evaluate", "linearise"):
-    more = (
-        {"progress": (False, flag("None"))}
-        if name == "evaluate"
-        else {"relative": (False, flag()), "step": (1e-3, number(0, -1, 1.0, 10))}
-    )
-    use(
-        f"fem.{name}",
-        usual="model n_jobs",
-        theta=(THETA, table(THETA, positive=True, rows=False, but=("no rows",))),
-        **more,
-    )
-for name in ("evaluate_modes", "linearise_modes"):
-    more = {"step": (1e-3, number(0, -1, 1.0, 10))} if name == "linearise_modes" else {}
-    use(
-        f"fem.{name}",
-        usual="model dofs n_jobs",
-        theta=(THETA, table(THETA, positive=True, rows=False, but=("no rows",))),
-        **more,
-    )
-use(
-    "fem.mac",
-    phi_a=(
-        SHAPES,
-        table(SHAPES, nan=False, rows=True, fixed=False, but=("1e308 inside", "complex numbers", "no rows")),
-    ),
-    phi_b=(
-        SHAPES,
-        table(SHAPES, nan=False, rows=True, fixed=False, but=("1e308 inside", "complex numbers", "no rows")),
-    ),
+STEP = (1e-3, number(0, -1, 1.0, 10))
+for name, usual, more in (
+    ("evaluate", "", {"progress": (False, flag("None"))}),
+    ("linearise", "relative", {"step": STEP}),
+    ("evaluate_modes", "dofs", {}),
+    ("linearise_modes", "dofs", {"step": STEP}),
+):
+    rows = table(THETA, positive=True, rows=False, but=("no rows",))
+    use(f"fem.{name}", usual=f"model n_jobs {usual}", theta=(THETA, rows), **more)
+COMPARED = (
+    SHAPES,
+    table(SHAPES, nan=False, rows=True, fixed=False, but=("1e308 inside", "complex numbers", "no rows")),
 )
+use("fem.mac", phi_a=COMPARED, phi_b=COMPARED)
 use(
     "fem.match_modes",
     usual="model dofs",
@@ -573,24 +423,14 @@ use(
     method=("lhs", choice()),
     progress=(False, flag("None")),
 )
+STACK = SHAPES.T[np.newaxis]
 use(
     "fem.shape_components",
     shapes=(
-        SHAPES.T[np.newaxis],
-        {
-            "None": None,
-            "text": "x",
-            "two axes": SHAPES,
-            "texts": SHAPES.T[np.newaxis].astype(str),
-            "booleans": SHAPES.T[np.newaxis] > 0,
-            "infinite": SHAPES.T[np.newaxis] * INF,
-            "other sensors": SHAPES.T[np.newaxis, :, :2],
-            "times": np.full((1, 6, 3), STAMP),
-            "sparse": scipy.sparse.csr_array(SHAPES),
-            "1e308": np.full((1, 6, 3), HUGE),
-            "a class": float,
-            "true": True,
-        },
+        STACK,
+        bad(None, "x", True, float, SHAPES, STACK[:, :, :2])
+        | bad(*(np.full((1, 6, 3), one) for one in ("1", True, INF, STAMP, HUGE)))
+        | {"sparse": scipy.sparse.csr_array(SHAPES)},
     ),
     reference=(SHAPES, table(SHAPES, nan=False, rows=True, fixed=True)),
 )
@@ -693,16 +533,8 @@ GAPPY = F.mask(np.arange(len(F))[:, np.newaxis] % 7 == np.arange(6))
 fitted(
     KNNGapImputer,
     (GAPPY, table(GAPPY, fixed=False, rows=False, fitting=True, but=("constant",))),
-    n_neighbors=(3, count()),
-    weights=("uniform", choice()),
-    metric=("nan_euclidean", choice()),
-    copy=(True, flag()),
-    add_indicator=(False, flag()),
-    keep_empty_features=(False, flag()),
-    missing_values=(
-        NAN,
-        bad("missing", [NAN], float, STAMP, True, b"x"),
-    ),
+    usual="n_neighbors weights metric copy add_indicator keep_empty_features",
+    missing_values=(NAN, bad("missing", [NAN], float, STAMP, True, b"x")),
 )
 method(
     "preprocessing.KNNGapImputer.transform",
@@ -720,10 +552,7 @@ fitted(
             "stamps twice": pd.concat([HOURLY, HOURLY]),
         },
     ),
-    lags=(
-        2,
-        count() | bad(["1"], [0, True], [-1], [1, 1], [0, NAN], [STAMP], [0.5, 1.5]),
-    ),
+    lags=(2, count() | bad(["1"], [0, True], [-1], [1, 1], [0, NAN], [STAMP], [0.5, 1.5])),
     freq=("1h", durations()),
     tolerance=("3h", durations()),
     padding=("nan", choice()),
@@ -751,15 +580,9 @@ POLED |= {
         "text": "x",
     }.items()
 }
-REFERRED = {
-    "None": None,
-    "text": "model",
-    "true": True,
-    "a number": 3,
-    "one part": (REFERENCE[0],),
-    "a class": tuple,
-    "empty": (),
-} | {f"frequencies: {c}": (v, REFERENCE[1]) for c, v in vector(REFERENCE[0], size=2).items()}
+REFERRED = bad(None, "model", True, 3, (REFERENCE[0],), tuple, ()) | {
+    f"frequencies: {c}": (v, REFERENCE[1]) for c, v in vector(REFERENCE[0], size=2).items()
+}
 REFERRED |= {
     f"shapes: {c}": (REFERENCE[0], v)
     for c, v in table(REFERENCE[1], nan=False, but=("None", "no rows", "a row too few", "complex numbers")).items()
@@ -807,17 +630,11 @@ use(
     lambda **a: surrogate.DataInformedFEM(TRUSS, **PARTS, random_state=0).fit(**a).predict(T),
     X=(T, WEATHER),
     y=(F, MEASURED),
-    shapes=(
-        None,
-        bad("x", 3, True, SHAPES, np.full((120, 6, 3), STAMP), np.ones((120, 6, 3))),
-    ),
+    shapes=(None, bad("x", 3, True, SHAPES, np.full((120, 6, 3), STAMP), np.ones((120, 6, 3)))),
 )
 for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "weather"):
-    more = {
-        "predict": {"return_std": (False, flag())},
-        "predict_interval": {"confidence": (0.9, number(0, 1, 90, -0.1))},
-    }.get(name, {})
-    method(f"surrogate.DataInformedFEM.{name}", CHAIN, X=(T, PREDICTING), **more)
+    usual = {"predict": "return_std", "predict_interval": "confidence"}.get(name, "")
+    method(f"surrogate.DataInformedFEM.{name}", CHAIN, usual=usual, X=(T, PREDICTING))
 method(
     "surrogate.DataInformedFEM.score", CHAIN, X=(T, weather(T, rows=True)), y=(F, table(F, rows=True, positive=True))
 )
@@ -838,8 +655,7 @@ CHANGES = {
         },
     ),
     "parameters": ({"top": 1.02}, PARAMETERS),
-    "stiffness": (np.eye(23), matrix(np.eye(23))),
-    "mass": (np.eye(23), matrix(np.eye(23))),
+    **ADDED,
 }
 SHARE_OF_VALUES = number(-0.1, 1.0, 90, but=("None", "several", "empty"))
 FAULTS = {
@@ -852,12 +668,7 @@ INVERTING = {
     "bounds": (0.2, BOUNDED),
     "n_samples": (50, count(1)),
     "noise": (0.01, NOISE),
-    "memory": (
-        None,
-        bad(True, 3, b"m", __file__, Path, NAN, ["m"]),
-    ),
-    "n_jobs": (1, jobs()),
-    "random_state": (0, seed()),
+    "memory": (None, bad(True, 3, b"m", __file__, Path, NAN, ["m"])),
 }
 INVERTED = frequencies(F, rows=False, but=("unknown names", "columns in another order"))
 use(
@@ -865,7 +676,7 @@ use(
     lambda **a: (
         surrogate.InverseSurrogate(**{k: v for k, v in a.items() if k not in "Xy"}).fit(a["X"], a["y"]).transform(F)
     ),
-    usual="model",
+    usual="model n_jobs random_state",
     **INVERTING,
     X=(F, INVERTED),
     y=(None, {}),
@@ -874,13 +685,11 @@ POSTERIOR = surrogate.PosteriorInverse(TRUSS, noise=0.01).fit(F)
 use(
     "surrogate.PosteriorInverse",
     lambda X, **a: surrogate.PosteriorInverse(**a).fit_transform(X),
-    usual="model",
+    usual="model n_jobs noise",
     prior=(0.2, PRIOR),
-    noise=(0.01, NOISE),
     dofs=(None, integers(23)),
     reduce=(False, number(0, 1.0, -1) | bad(1)),
     memory=INVERTING["memory"],
-    n_jobs=(1, jobs()),
     X=(F, INVERTED),
 )
 SHAPED = np.hstack([NOMINAL, evaluate_modes(TRUSS, np.ones((1, 4)), DOFS)[1].swapaxes(1, 2).reshape(1, -1)])
@@ -893,18 +702,18 @@ EXAMPLES.append(
         {"shape_noise": by_name(0.01, MODES, wrong=(1.0, 5))},
     )
 )
-for name in ("transform", "invert"):
-    more = {"return_std": (False, flag())} if name == "transform" else {}
-    method(f"surrogate.PosteriorInverse.{name}", POSTERIOR, X=(F, table(F, rows=False, positive=True)), **more)
+INVERTIBLE = (F, table(F, rows=False, positive=True))
+method("surrogate.PosteriorInverse.transform", POSTERIOR, usual="return_std", X=INVERTIBLE)
+method("surrogate.PosteriorInverse.invert", POSTERIOR, X=INVERTIBLE)
 use(
     "surrogate.InverseSurrogate.fit",
     lambda **a: surrogate.InverseSurrogate(None, Ridge()).fit(**a).transform(F),
     X=(F, table(F, rows=True, fixed=False, fitting=True)),
     y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True, fixed=False, but=("a number",))),
 )
-for name in ("transform", "predict"):
-    more = {"return_std": (False, flag())} if name == "predict" else {}
-    method(f"surrogate.InverseSurrogate.{name}", SURROGATE, X=(F, table(F, rows=False, positive=True)), **more)
+INVERTIBLE = (F, table(F, rows=False, positive=True))
+method("surrogate.InverseSurrogate.transform", SURROGATE, X=INVERTIBLE)
+method("surrogate.InverseSurrogate.predict", SURROGATE, usual="return_std", X=INVERTIBLE)
 method(
     "surrogate.InverseSurrogate.inverse_transform",
     SURROGATE,
@@ -944,17 +753,18 @@ use("surrogate.paper_network", lambda **a: surrogate.paper_network(**a).hidden_l
 # updating
 UPDATED = frequencies(F, rows=False, fitting=True, but=("constant", "unknown names", "columns in another order"))
 UPDATER = {
-    "model": (TRUSS, models()),
     "bounds": (0.2, BOUNDED),
     "shape_weight": (1.0, by_name(1.0, MODES, but=("zero inside",))),
     "n_starts": (1, count()),
-    "method": ("least_squares", choice()),
     "prior": (0.2, PRIOR),
     "max_iter": (50, count()),
-    "n_jobs": (1, jobs()),
-    "random_state": (0, seed()),
 }
-use("updating.ModelUpdater", lambda **a: updating.ModelUpdater(**a).fit(F, shapes=SHAPES, dofs=DOFS).theta_, **UPDATER)
+use(
+    "updating.ModelUpdater",
+    lambda **a: updating.ModelUpdater(**a).fit(F, shapes=SHAPES, dofs=DOFS).theta_,
+    usual="model method n_jobs random_state",
+    **UPDATER,
+)
 use(
     "updating.ModelUpdater.fit",
     lambda **a: updating.ModelUpdater(TRUSS, shape_weight=1.0, bounds=0.2).fit(**a).theta_,
@@ -1013,10 +823,7 @@ fitted(
     estimator=(IsolationForest(n_estimators=5, random_state=0), estimators()),
 )
 for name in ("damage_index", "decision_function", "predict", "score_samples"):
-    for owner in (
-        DETECTOR,
-        OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F),
-    ):
+    for owner in (DETECTOR, OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F)):
         method(f"detection.{type(owner).__name__}.{name}", owner, X=(F, table(F, rows=False)))
 SIDE_BY_SIDE = table(
     BOTH,
@@ -1052,28 +859,11 @@ method("detection.TemperatureCompensator.extrapolation_distance", COMPENSATOR, X
 
 # metrics
 PREDICTED = F * 1.01
-for name in ("mape", "error_table", "complete_r2"):
-    positive = name != "complete_r2"
-    more = (
-        {
-            "scenarios": (
-                ["a", "b"] * 60,
-                {
-                    "too few": ["a"],
-                    "text": "all",
-                    "a number": 3,
-                    "true": True,
-                    "None inside": [None] * 120,
-                    "NaN inside": [NAN] * 120,
-                    "a class": str,
-                },
-            )
-        }
-        if name == "error_table"
-        else {}
-    )
+OF_SCENARIOS = {"scenarios": (["a", "b"] * 60, bad(["a"], "all", 3, True, [None] * 120, [NAN] * 120, str))}
+for name, more in (("mape", {}), ("error_table", OF_SCENARIOS), ("errors.complete_r2", {})):
+    positive = name != "errors.complete_r2"
     use(
-        f"metrics.errors.{name}" if name == "complete_r2" else f"metrics.{name}",
+        f"metrics.{name}",
         y_true=(F, table(F, rows=True, positive=positive)),
         y_pred=(PREDICTED, table(PREDICTED, rows=True, positive=False)),
         **more,
@@ -1119,16 +909,14 @@ use(
 )
 use(
     "datasets.make_truss_campaign",
-    usual="noise random_state",
-    n_years=(1, count()),
+    usual="noise random_state n_years samples_per_day",
     samples_per_year=(12, count()),
-    samples_per_day=(1, count()),
     damage=({"top": 0.1}, DAMAGE),
 )
 GROUP = "girders"
 use(
     "datasets.make_kw51_campaign",
-    usual="noise random_state",
+    usual="noise random_state shapes",
     n_hours=(48, count()),
     gaps=(False, flag()),
     retrofit=(False, flag()),
@@ -1138,7 +926,6 @@ use(
         "2018-10-02",
         moments("half", "too late", "negative") | bad("2030-01-01", "2000-01-01", 5),
     ),
-    shapes=(False, flag()),
 )
 use(
     "datasets.steel_modulus",
@@ -1148,15 +935,7 @@ use(
             T,
             rows=False,
             fixed=False,
-            but=(
-                "three axes",
-                "a number",
-                "no rows",
-                "repeated columns",
-                "repeated names",
-                "negative inside",
-                "zero inside",
-            ),
+            but=("three axes", "a number", "no rows", "repeated columns", "repeated names"),
         )
         | bad(T + 273.15),
     ),
@@ -1221,18 +1000,10 @@ use(
     ),
     scenarios=(
         SCENARIOS,
-        {
-            "None": None,
-            "text": "healthy",
-            "a number": 3,
-            "true": True,
-            "empty": [],
-            "repeated": [SCENARIOS[0]] * 2,
-            "texts": ["a"],
-            "a class": [studies.Scenario],
-            "unknown group": [studies.Scenario("a", {"deck": 0.1})],
-            "unknown parameter": [studies.Scenario("a", parameters={"deck": 1.1})],
-            "other matrix": [studies.Scenario("a", mass=np.eye(2))],
+        bad(None, "healthy", 3, True, [], [SCENARIOS[0]] * 2, ["a"], [studies.Scenario])
+        | {
+            f"unknown {name}": [studies.Scenario("a", **{name: value})]
+            for name, value in (("damage", {"deck": 0.1}), ("parameters", {"deck": 1.1}), ("mass", np.eye(2)))
         },
     ),
     n_repeats=(1, count()),
@@ -1289,16 +1060,8 @@ use(
     added_mass=({"ballast": np.ones(23)}, bad("x", 5.0, {"ballast": np.ones(4)})),
     shapes=(
         (SHAPES, SHAPES * 1.01),
-        {
-            "text": "x",
-            "one": SHAPES,
-            "true": True,
-            "texts": (SHAPES.astype(str), SHAPES),
-            "booleans": (SHAPES > 0, SHAPES),
-            "other sensors": (SHAPES[:2], SHAPES),
-            "None inside": (None, SHAPES),
-            "infinite": (SHAPES * INF, SHAPES),
-        },
+        bad("x", SHAPES, True)
+        | {c: (v, SHAPES) for c, v in bad(SHAPES.astype(str), SHAPES > 0, SHAPES[:2], None, SHAPES * INF).items()},
     ),
     shape_noise=(0.01, by_name(0.01, MODES, wrong=(5,))),
     models=(None, instead([], [1.0], TRUSS)),
@@ -1306,10 +1069,7 @@ use(
 use(
     "studies.DamagePrior",
     lambda **a: studies.DamagePrior(**a),
-    numbers=(
-        (0.5, 0.5),
-        bad("x", (0.2,) * 5, (1.5, -0.5), (1.0,), (0.5, 0.4)),
-    ),
+    numbers=((0.5, 0.5), bad("x", (0.2,) * 5, (1.5, -0.5), (1.0,), (0.5, 0.4))),
     severity=(0.2, number(0, 2, -0.1)),
     law=("uniform", choice()),
     something_else=(0.1, number(1.5, -0.1)),
@@ -1407,10 +1167,10 @@ use(
     n_splits=(2, count(1)),
 )
 use("fem.add_noise", frequencies=(F, {}), noise=(0.01, {}), correlation=(0.5, number(-1.0, 1.0)))
-for name in ("make_truss_campaign", "make_kw51_campaign"):
-    size = (
-        {"samples_per_year": (12, {})} if name == "make_truss_campaign" else {"n_hours": (48, {}), "gaps": (False, {})}
-    )
+for name, size in (
+    ("make_truss_campaign", {"samples_per_year": (12, {})}),
+    ("make_kw51_campaign", {"n_hours": (48, {}), "gaps": (False, {})}),
+):
     use(f"datasets.{name}", **size, correlation=(0.5, number(-1.0, 1.0)), random_state=(0, {}))
 use("datasets.make_fleet", lambda **a: list(datasets.make_fleet(**a)), usual="random_state", n_bridges=(3, count()))
 fitted(preprocessing.SensorMeans, (T, {}), roles=(None, bad(3, "air", True)))
@@ -1800,7 +1560,7 @@ LEGAL |= {
     "n_deviations": {("1e308", "preprocessing.HampelFilter"): "removes nothing"},
     "sample_weight": {(cause, "*"): "a mask says which rows count" for cause in ("true", "booleans", "true inside")},
     "reduce": {("true", "*"): "True takes the default tolerance"},
-    "shapes": {("NaN", f"fem.{kind}.nominal_mac"): "NaN stays NaN" for kind in ("AffineModel", "ReducedModel")},
+    "shapes": {("all nan", f"fem.{kind}.nominal_mac"): "NaN stays NaN" for kind in ("AffineModel", "ReducedModel")},
     "columns": {
         ("too high", "fem.LocalModes.derivatives"): "more modes are kept than are given",
         ("repeated", "fem.LocalModes.derivatives"): "a column may be asked for twice",
@@ -1814,10 +1574,6 @@ LEGAL |= {
     "baseline_factors": {("empty", "studies.compare_extensions"): "no longer baselines are asked for"},
     "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},
     "tolerance": {("zero", "preprocessing.LagFeatures"): "only records at the very time"},
-    "X": {
-        ("kelvin", "surrogate.DataInformedFEM.extrapolation_distance"): "the answer says how far outside",
-        ("-999", "surrogate.DataInformedFEM.extrapolation_distance"): "the answer says how far outside",
-    },
     "F": {("NaN throughout", "updating.ModelUpdater.fit"): "shapes alone may be measured"},
     "damage_index": {
         ("infinite inside", "*"): "an infinite index is an alarm",
@@ -1831,25 +1587,6 @@ LEGAL |= {
     "reference": {("zero inside", "preprocessing.BiasAligner"): "the frequencies become shifts"},
 }
 
-CARRIED = {  # arguments whose names of columns are carried through, and match nothing
-    "frequencies": ("fem.add_noise", "fem.match_modes"),
-    "S": ("updating.select_parameters",),
-    "temperature": ("datasets.steel_modulus",),
-    "measured": ("plotting.PredictionDisplay.from_predictions",),
-}
-EMPTY = {
-    "frequencies": "fem.add_noise",
-    "phi_a": "fem.mac",
-    "phi_b": "fem.mac",
-    "temperature": "datasets.steel_modulus",
-}
-VECTORS = {
-    "y": ("surrogate.TemperatureMapper", "surrogate.InverseSurrogate.fit"),
-    "residuals": ("preprocessing.residual_trend",),
-    "measured": ("plotting.PredictionDisplay.from_predictions",),
-    "temperature": ("datasets.steel_modulus",),
-    "frequencies": ("preprocessing.check_records",),
-}
 CELSIUS = ("kelvin", "Fahrenheit", "tenths of a degree", "one sensor in kelvin", "-999", "9999", "a slipped point")
 
 
@@ -1858,12 +1595,30 @@ def legal(argument, callables, causes, reason):
     LEGAL.setdefault(argument, {}).update({(cause, name): reason for name in callables for cause in causes})
 
 
-for argument, callables in CARRIED.items():
-    legal(argument, callables, ("levels of names", "tuples as names", "a number among names"), "names are not matched")
-for argument, name in EMPTY.items():
-    legal(argument, [name], ["no columns"], "the answer is empty")
-for argument, callables in VECTORS.items():
-    legal(argument, callables, ["a series"], "a series is a vector, or a table of one column")
+LEVELS = ("levels of names", "tuples as names", "a number among names")
+CARRIED, EMPTY, VECTORS = (
+    "names are not matched",
+    "the answer is empty",
+    "a series is a vector, or a table of one column",
+)
+for argument, name, causes, reason in (
+    ("frequencies", "fem.add_noise", LEVELS, CARRIED),
+    ("frequencies", "fem.match_modes", LEVELS, CARRIED),
+    ("S", "updating.select_parameters", LEVELS, CARRIED),
+    ("temperature", "datasets.steel_modulus", LEVELS, CARRIED),
+    ("measured", "plotting.PredictionDisplay.from_predictions", LEVELS, CARRIED),
+    ("frequencies", "fem.add_noise", ["no columns"], EMPTY),
+    ("phi_a", "fem.mac", ["no columns"], EMPTY),
+    ("phi_b", "fem.mac", ["no columns"], EMPTY),
+    ("temperature", "datasets.steel_modulus", ["no columns"], EMPTY),
+    ("y", "surrogate.TemperatureMapper", ["a series"], VECTORS),
+    ("y", "surrogate.InverseSurrogate.fit", ["a series"], VECTORS),
+    ("residuals", "preprocessing.residual_trend", ["a series"], VECTORS),
+    ("measured", "plotting.PredictionDisplay.from_predictions", ["a series"], VECTORS),
+    ("temperature", "datasets.steel_modulus", ["a series"], VECTORS),
+    ("frequencies", "preprocessing.check_records", ["a series"], VECTORS),
+):
+    legal(argument, [name], causes, reason)
 UNITS = ("rad/s", "kHz", "periods")
 WEATHER = ["surrogate.DataInformedFEM.weather"]
 legal("X", ["surrogate.DataInformedFEM.extrapolation_distance"], CELSIUS, "the answer says how far outside")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import skthermo
+from tests.bad_input.values import choice, count, flag
 
 ROOMS = (
     "fem",
@@ -56,12 +57,20 @@ class Example:
 EXAMPLES: list[Example] = []
 
 
+def usual_of(of, argument):
+    """The pair of `USUAL`, or a default of the signature with what is bad for its type."""
+    if argument in USUAL:
+        return USUAL[argument]
+    default = inspect.signature(of).parameters[argument].default
+    return default, {bool: flag, str: choice, int: count}[type(default)]()
+
+
 def use(name, call=None, /, usual="", **arguments):
-    """Register an example: for every argument a good value and its bad ones, by default those of `USUAL`."""
-    arguments = {argument: USUAL[argument] for argument in usual.split()} | arguments
+    """Register an example: for every argument a good value and its bad ones, for ``usual`` ones those of `usual_of`."""
     of = skthermo
     for part in name.split("."):
         of = importlib.import_module(f"skthermo.{part}") if of is skthermo else getattr(of, part)
+    arguments = {argument: usual_of(of, argument) for argument in usual.split()} | arguments
     good = {argument: pair[0] for argument, pair in arguments.items()}
     bad = {argument: pair[1] for argument, pair in arguments.items()}
     EXAMPLES.append(Example(name, of, of if call is None else call, good, bad))

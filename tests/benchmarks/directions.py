@@ -18,12 +18,8 @@ import sys
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, joined, last_step, modes_of, recipes, shown, z24_records
-from sklearn.compose import ColumnTransformer
+from harness import arguments, compensated, joined, last_step, modes_of, raw, recipes, shown, z24_records
 from sklearn.ensemble import IsolationForest
-from sklearn.impute import SimpleImputer
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 from structures import Footbridge
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign, make_z24
@@ -31,15 +27,6 @@ from skthermo.detection import DirectionalDetector, MahalanobisDetector
 
 MODEL, FALLS, OMNIBUS, NEIGHBOURS = "directions of the FE model", "falls, no model", "Mahalanobis", "20 neighbours, raw"
 RATE = 0.02
-
-
-def raw(targets, estimator):
-    """An outlier detector of raw frequencies, of which missing ones count as the mean."""
-    return make_pipeline(
-        ColumnTransformer([("frequencies", StandardScaler(), targets)]),
-        SimpleImputer(strategy="constant", fill_value=0.0),
-        estimator,
-    )
 
 
 def detectors(model, targets):

@@ -14,11 +14,7 @@ earlier version has pipelines behind `TemperatureCompensator` in their place), a
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, joined, modes_of, recipes, shown, z24_records
-from sklearn.compose import ColumnTransformer
-from sklearn.impute import SimpleImputer
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
+from harness import arguments, compensated, joined, modes_of, raw, recipes, shown, z24_records
 from structures import SOIL_GROUPS, Footbridge, slow_soil
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
@@ -35,11 +31,7 @@ def detectors(model, targets, window):
     }
     if window is None:
         neighbours = OutlierDetector(recipes("detector").NeighbourDistance())
-        found["20 neighbours, raw"] = make_pipeline(
-            ColumnTransformer([("frequencies", StandardScaler(), targets)]),
-            SimpleImputer(strategy="constant", fill_value=0.0),
-            neighbours,
-        )
+        found["20 neighbours, raw"] = raw(targets, neighbours)
     return found
 
 

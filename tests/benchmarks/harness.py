@@ -18,8 +18,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
+from sklearn.compose import ColumnTransformer
+from sklearn.impute import SimpleImputer
 from sklearn.pipeline import make_pipeline
-from versions import CACHE, OtherVersion, has_failed, side_by_side
+from sklearn.preprocessing import StandardScaler
+from versions import OtherVersion, has_failed, side_by_side
 
 from skthermo import detection
 from skthermo.datasets import load_z24
@@ -70,7 +73,7 @@ def arguments(text, /, *, takes_turns=False, **options):
     if found.out is not None:
         atexit.register(lambda: found.out.write_text(json.dumps(TABLES)))
     if found.against is not None and not takes_turns:
-        run_other(OtherVersion.built(found.against, found.against_folder))
+        run_other(OtherVersion.built(found.against))
         atexit.register(show_rest)
     warnings.simplefilter("ignore")  # of weather, gaps and models that are meant to be so
     return found
@@ -81,7 +84,6 @@ def shared():
     parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     parser.add_argument("--out", type=Path, help="a file for the tables that are printed, as JSON")
     parser.add_argument("--against", metavar="COMMIT", help="run also with the package at this commit, as 43ba4fa4")
-    parser.add_argument("--against-folder", type=Path, default=CACHE, help="of such packages, kept for the next time")
     return parser
 
 
@@ -200,6 +202,15 @@ def split(records):
 def modes_of(records):
     """Names of the frequencies among the columns."""
     return [name for name in records if str(name).startswith("f")]
+
+
+def raw(targets, estimator):
+    """An outlier detector of raw frequencies, of which missing ones count as the mean."""
+    return make_pipeline(
+        ColumnTransformer([("frequencies", StandardScaler(), targets)]),
+        SimpleImputer(strategy="constant", fill_value=0.0),
+        estimator,
+    )
 
 
 def compensated(targets, last=None, regressor=None, **options):

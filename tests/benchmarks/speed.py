@@ -403,7 +403,7 @@ def main():
     os.environ.update(OMP_NUM_THREADS="1", MPLBACKEND="Agg")
     slower, versions = [], {"now": run_present}
     if options.against:
-        versions = {"before": OtherVersion.built(options.against, options.against_folder).run} | versions
+        versions = {"before": OtherVersion.built(options.against).run} | versions
     for title, works in GROUPS.items():
         rows = {}
         for name in [one for one in works if one in options.rows and (DATA or not one.startswith("frame"))]:

@@ -25,13 +25,13 @@ class OtherVersion:
     source: Path
 
     @classmethod
-    def built(cls, commit, folder=None):
-        """The environment in a folder, by default the user's cache; made once for each commit and Python.
+    def built(cls, commit):
+        """The environment in the user's cache; made once for each commit and Python.
 
         Dependencies are those of the Python that runs, so that only skthermo differs.
         """
         full = git("rev-parse", "--verify", f"{commit}^{{commit}}").decode().strip()
-        made = Path(folder or CACHE).resolve() / f"{full[:12]}-{zlib.crc32(sys.prefix.encode()):08x}"
+        made = CACHE.resolve() / f"{full[:12]}-{zlib.crc32(sys.prefix.encode()):08x}"
         if not made.exists():
             made.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=made.parent) as scratch:
