@@ -249,7 +249,9 @@ def level_changes(records: pd.DataFrame, targets: list[Any], since: pd.Timestamp
     F = records[targets]
     is_positive = F.min() > 0
     scale = F.std().where(~is_positive, 0.01) * 100  # others vary by about 0.01 then, as logarithms do
-    y = np.log(F.where(is_positive, 1.0)).where(is_positive, (F - F.mean()) / scale)
+    y = pd.DataFrame(
+        {name: np.log(F[name]) if is_positive[name] else (F[name] - F[name].mean()) / scale[name] for name in F}
+    )
     daily_T, daily_y = daily_means(records.drop(columns=targets), y)
     T, y, days = daily_T.to_numpy(), daily_y.to_numpy(), daily_y.index
     X = DailyWeather.fitted(T, half_lives=(5.0,)).of_days(T)[0] if T.shape[1] else np.ones((len(y), 1))
@@ -330,7 +332,12 @@ def residuals_of(
     if len(baseline.columns) == len(targets):
         level, is_relative = baseline[targets].mean(), baseline[targets].min() > 0
         old, own = (
-            np.log((one / level).where(is_relative, 1.0)).where(is_relative, one - level)
+            pd.DataFrame(
+                {
+                    name: np.log(one[name] / level[name]) if is_relative[name] else one[name] - level[name]
+                    for name in one
+                }
+            )
             for one in (baseline[targets], new[targets])
         )
         return old, own, is_relative.to_numpy()

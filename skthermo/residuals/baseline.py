@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+import scipy  # which loads scipy.signal once it is used
+import scipy.fft
+import scipy.sparse
 from numpy.typing import NDArray
 from sklearn.pipeline import Pipeline
 
@@ -16,9 +19,9 @@ from skthermo.exceptions import WeatherWarning
 from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.weather import (
+    NearestPlaces,
     TrainingRange,
     mean_of_nearest,
-    nearest,
     one_in_each_part,
     weather_coordinates,
 )
@@ -79,9 +82,11 @@ class BaselineResiduals:
     def draw(self, weather: Array, random_state: np.random.RandomState) -> Array:
         """Residuals for rows of weather in order of time, (n_samples, n_modes), with the gaps of whole records.
 
-        A smoothed block bootstrap by weather: each block of rows takes records that follow each other, one of the 15
-        blocks whose mean weather is most similar. A second draw is added with a small weight, because a detector has
-        learned the residuals of the records themselves. Rows of unknown weather are NaN.
+        A smoothed stationary bootstrap: each row takes the record after the one before it took or, where such a run
+        ends by chance, one of the 25 records with the most similar weather. In weather that scatters more or less than
+        that of its records, a run is scaled, or ends where that is a factor of 2. A second draw of its own
+        is added with a small weight, so that the largest residual of the training records is not the largest of all.
+        Rows of unknown weather are NaN.
         """
         return self._where_known(weather, partial(self._smoothed, self.drawn, random_state, False))
 
@@ -96,31 +101,15 @@ class BaselineResiduals:
 
     def _smoothed(self, values: Array, random_state: np.random.RandomState, is_complete: bool, weather: Array) -> Array:
         """Values as drawn, and others of the usual ones, added with the bandwidth of Silverman's rule."""
-        taken, other = self._taken(weather, random_state), self._taken(weather, random_state)
+        similar = self._similar(weather)
+        taken, other = self._taken(similar, random_state), self._taken(similar, random_state)
         n_modes, n_independent = self.n_modes, len(values) / self.correlation_time
-        angle = np.arctan((4 / ((n_modes + 2) * n_independent)) ** (1 / (n_modes + 4)))
-        mean = np.nan_to_num(self._local_mean(self.usual, weather, 100, MOST_PLACES))
+        bandwidth = (4 / ((n_modes + 2) * n_independent)) ** (1 / (n_modes + 4))
+        angle, mean = np.arctan(bandwidth), similar @ self._levels[0]
         first = self._completed(values[taken], random_state) if is_complete else values[taken]
         second = self._completed(self.usual[other], random_state)
-        return mean + np.cos(angle) * (first - mean) + np.sin(angle) * (second - mean)
-
-    def _taken(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
-        """Positions of the records whose residuals rows of known weather take, in blocks."""
-        n_rows, n_records, length = len(weather), len(self.places), self._block_length
-        starts = one_in_each_part(n_records - length + 1, MOST_PLACES)
-        sums = np.cumsum(np.vstack([np.zeros(self.places.shape[1]), self.places]), axis=0)
-        of_blocks = (sums[starts + length] - sums[starts]) / length
-        firsts = np.arange(0, n_rows, length)
-        sizes = np.diff(np.append(firsts, n_rows))
-        wanted = np.add.reduceat(self.coordinates.transform(weather), firsts) / sizes[:, np.newaxis]
-        near = nearest(of_blocks, wanted, 15)[1]
-        chosen = starts[near[np.arange(len(near)), random_state.randint(near.shape[1], size=len(near))]]
-        return (chosen[:, np.newaxis] + np.arange(length)).ravel()[:n_rows]
-
-    @cached_property
-    def _block_length(self) -> int:
-        """One where residuals are independent, else some correlation times, at most a twentieth of the records."""
-        return int(np.clip(np.ceil(1 + 6 * (self.correlation_time - 1)), 1, max(len(self.places) // 20, 1)))
+        first, second = self._carried(first, taken, similar) - mean, self._carried(second, other, similar) - mean
+        return mean + np.cos(angle) * first + np.sin(angle) * second
 
     def _completed(self, values: Array, random_state: np.random.RandomState) -> Array:
         gaps = np.isnan(values)
@@ -168,6 +157,65 @@ class BaselineResiduals:
         """Normal distribution of the residuals without outliers."""
         found = Gaussian.fitted(self.usual)
         return Gaussian(found.mean, found.covariance + JITTER * np.diag(np.diag(found.covariance)))
+
+    def _similar(self, weather: Array) -> scipy.sparse.csr_array:
+        """Equal weights of the records with the most similar weather, (n_rows, n_records)."""
+        some = one_in_each_part(len(self.places), MOST_PLACES)
+        near = self._drawn_from.nearest(self.coordinates.transform(weather))[1]
+        ends = np.arange(0, near.size + 1, near.shape[1])
+        weights = np.full(near.size, 1 / near.shape[1])
+        return scipy.sparse.csr_array((weights, some[near].ravel(), ends), (len(near), len(self.places)))
+
+    @cached_property
+    def _drawn_from(self) -> NearestPlaces:
+        return NearestPlaces(self.places[one_in_each_part(len(self.places), MOST_PLACES)], 25)
+
+    def _taken(self, similar: scipy.sparse.csr_array, random_state: np.random.RandomState) -> NDArray[np.intp]:
+        """Positions of records in runs for rows with some similar records.
+
+        The mean length of a run is 1 and six times the correlation time less 1.
+        """
+        n_rows, n_records = similar.shape
+        ends = np.flatnonzero(random_state.uniform(size=n_rows) < 1 / (1 + 6 * (self.correlation_time - 1)))
+        which = random_state.randint(similar.indptr[1], size=n_rows)
+        taken = similar.indices.reshape(n_rows, -1)[np.arange(n_rows), which].astype(np.intp)
+        if len(ends) == n_rows:
+            return taken
+        logs, here = np.log(self._levels[1]), np.log(np.sqrt(similar @ self._levels[1] ** 2))
+        starts = np.union1d([0], ends)
+        stops = np.append(starts[1:], n_rows)
+        while len(starts):  # runs, each of which may end early, where another one begins
+            lengths = stops - starts
+            first, run = np.cumsum(lengths) - lengths, np.repeat(np.arange(len(starts)), lengths)
+            step = np.arange(len(run)) - first[run]
+            rows, records = starts[run] + step, taken[starts][run] + step
+            is_other = records >= n_records
+            some = ~is_other & (step > 0)
+            changes = np.abs(here[rows[some]] - logs[records[some]])
+            is_other[some] = (changes > np.log(2.0)).any(axis=1)
+            reached = np.minimum.reduceat(np.where(is_other, step, lengths[run]), first)
+            kept = step < reached[run]
+            taken[rows[kept]] = records[kept]
+            goes_on = reached < lengths
+            starts, stops = (starts + reached)[goes_on], stops[goes_on]
+        return taken
+
+    def _carried(self, values: Array, taken: NDArray[np.intp], similar: scipy.sparse.csr_array) -> Array:
+        """Values of the records that rows took, with the mean and the deviation of the weather of the rows."""
+        mean, deviation = self._levels
+        scale = np.sqrt(similar @ deviation**2) / deviation[taken]
+        return np.asarray(similar @ mean + (values - mean[taken]) * scale)
+
+    @cached_property
+    def _levels(self) -> tuple[Array, Array]:
+        """Mean and standard deviation of residuals in the weather of each record, outliers left out.
+
+        The 100 records with the most similar weather give them.
+        """
+        mean = np.nan_to_num(self._local_mean(self.usual, self.weather, 100, MOST_PLACES))
+        square = np.nan_to_num(self._local_mean(self.usual**2, self.weather, 100, MOST_PLACES))
+        size = np.sqrt(np.maximum(np.nanmax(square, axis=0, initial=0), np.finfo(float).tiny))
+        return mean, np.maximum(np.sqrt(np.maximum(square - mean**2, 0.0)), JITTER * size)
 
     @cached_property
     def correlation_time(self) -> float:

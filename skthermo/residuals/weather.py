@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -178,6 +179,29 @@ def weather_coordinates(weather: Array, explained: float = 0.99) -> Pipeline:
     """Principal components of the standardised weather, in which similar records are near each other."""
     with np.errstate(divide="ignore", invalid="ignore"):  # of weather that is always the same
         return make_pipeline(StandardScaler(), PCA(explained)).fit(weather)
+
+
+class NearestPlaces:
+    """Places among which the nearest to each wanted one are searched for."""
+
+    def __init__(self, places: Array, number: int) -> None:
+        self.places, self.number = places, min(number, len(places))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"places": self.places, "number": self.number}
+
+    @cached_property
+    def _tree(self) -> NearestNeighbors:
+        return NearestNeighbors(n_neighbors=self.number).fit(self.places)
+
+    def nearest(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
+        """Mean distance (n_wanted,) to the places nearest to each wanted one, and their positions, nearest first,
+        (n_wanted, number)."""
+        distances, near = np.empty(len(wanted)), np.empty((len(wanted), self.number), dtype=np.int32)
+        for part in parts(len(wanted), self.number):
+            lengths, near[part] = self._tree.kneighbors(wanted[part])
+            distances[part] = lengths.mean(axis=1)
+        return distances, near
 
 
 def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:

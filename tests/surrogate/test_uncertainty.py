@@ -1,6 +1,7 @@
 """Laws of what the chain says about its own errors: spread, intervals, realistic noise."""
 
 import pickle
+from contextlib import nullcontext
 from functools import cache
 
 import numpy as np
@@ -9,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.base import clone
-from sklearn.linear_model import LinearRegression
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
-from skthermo.residuals.baseline import BaselineResiduals, order_statistic
+from skthermo.residuals.baseline import BaselineResiduals, compared, order_statistic
 from skthermo.surrogate import TemperatureMapper
 from tests.surrogate.chains import F, T, as_measured, inverse, trained
 from tests.surrogate.chains import chain as any_chain
@@ -114,33 +116,44 @@ def test_quantiles_measure_each_period_by_the_others():
 # Realistic noise
 
 
-def test_noise_has_the_gaps_of_whole_records():
+def drawn_records(found, weather, seed=0):
+    """Which record the noise of each row begins with; its gaps are those of that record."""
+    taken = found._taken(found._similar(weather), np.random.RandomState(seed))
+    values = found.draw(weather, np.random.RandomState(seed))
+    np.testing.assert_array_equal(np.isnan(values), np.isnan(found.values[taken]))
+    return taken
+
+
+def test_noise_is_whole_records_gaps_included():
     rng = np.random.default_rng(0)
     values = rng.normal(size=(400, 3))
     values[:, 1:][rng.random((400, 2)) < 0.3] = np.nan
     found = residuals(rng.uniform(-10, 30, (400, 2)), values)
     weather = rng.uniform(-10, 30, (500, 2))
-    drawn, again, other = (found.draw(weather, np.random.RandomState(seed)) for seed in (0, 0, 1))
-    np.testing.assert_array_equal(drawn, again)
-    assert (drawn != other).mean() > 0.5
-    assert {tuple(row) for row in np.isnan(drawn)} == {tuple(row) for row in np.isnan(values)}
-    assert np.isnan(drawn).mean() == pytest.approx(np.isnan(values).mean(), abs=0.05)
+    taken = drawn_records(found, weather)
+    np.testing.assert_array_equal(taken, drawn_records(found, weather))
+    assert (taken != drawn_records(found, weather, seed=1)).mean() > 0.5
+    assert len(set(taken)) > 150
 
 
 def test_noise_comes_from_similar_weather():
     rng = np.random.default_rng(0)
     weather, wanted = rng.uniform(-10, 30, 600), rng.uniform(-10, 30, 300)
-    drawn = residuals(weather, weather).draw(wanted[:, np.newaxis], np.random.RandomState(0))[:, 0]
-    distance = np.abs(drawn - wanted)
+    taken = drawn_records(residuals(weather, rng.normal(size=600)), wanted[:, np.newaxis])
+    distance = np.abs(weather[taken] - wanted)
     assert distance.mean() < 0.1 * np.abs(rng.permutation(weather)[:300] - wanted).mean()
     assert distance.max() < 4  # a tenth of the weather
 
 
 def test_noise_keeps_the_serial_correlation_of_the_records():
     weather = 10 + 15 * np.sin(np.arange(1500) * 2 * np.pi / 500)
-    for rho in (0.8, 0.0):
-        drawn = residuals(weather, autoregressive(1500, rho)).draw(weather[:, np.newaxis], np.random.RandomState(0))
-        assert np.corrcoef(drawn[1:, 0], drawn[:-1, 0])[0, 1] == pytest.approx(rho, abs=0.15)
+    later = weather[:, np.newaxis]
+    for rho, lowest, highest in ((0.8, 0.7, 1.0), (0.0, 0.0, 0.15)):
+        found = residuals(weather, autoregressive(1500, rho))
+        taken = drawn_records(found, later)
+        assert lowest <= (np.diff(taken) == 1).mean() <= highest
+        drawn = found.draw(later, np.random.RandomState(0))[:, 0]
+        assert np.corrcoef(drawn[1:], drawn[:-1])[0, 1] == pytest.approx(rho, abs=0.15)
 
 
 def test_means_of_a_week_scatter_as_those_of_the_records_whatever_the_weather_does():
@@ -155,19 +168,21 @@ def test_means_of_a_week_scatter_as_those_of_the_records_whatever_the_weather_do
     assert drawn == pytest.approx(weeks(found.values), rel=0.1)
 
 
-def test_noise_scatters_as_the_weather_of_the_rows_makes_it():
-    weather, later = (10 + 15 * autoregressive(3000, 0.95, seed)[:, np.newaxis] for seed in (1, 2))
-    deviation = 1 + (weather < 0)  # twice as large in frost
+def test_runs_of_noise_are_scaled_to_the_weather_of_the_rows():
+    rng = np.random.default_rng(0)
+    weather, later = rng.uniform(-10, 30, (3000, 1)), rng.uniform(-10, 30, (3000, 1))
+    deviation = 1 + (weather < 0)  # twice as large in frost, whatever the record before
     found = residuals(weather, deviation * autoregressive(3000, 0.5)[:, np.newaxis])
     drawn = found.draw(later, np.random.RandomState(0))
-    assert drawn[later < -5].std() == pytest.approx(2.0, rel=0.15)
-    assert drawn[later > 5].std() == pytest.approx(1.0, rel=0.15)
+    assert drawn[later < -2].std() == pytest.approx(2.0, rel=0.15)
+    assert drawn[later > 2].std() == pytest.approx(1.0, rel=0.1)
 
 
 def test_noise_is_not_bounded_by_the_largest_residual_and_keeps_its_covariance():
     rng = np.random.default_rng(0)
     found = residuals(rng.uniform(-10, 30, (200, 2)), rng.multivariate_normal([0, 0], [[1, 0.8], [0.8, 1]], 200))
-    drawn = found.draw(rng.uniform(-10, 30, (20_000, 2)), np.random.RandomState(0))
+    later = rng.uniform(-10, 30, (20_000, 2))
+    drawn = found.draw(later, np.random.RandomState(0))
     assert np.abs(drawn).max() > np.abs(found.values).max()
     np.testing.assert_allclose(np.cov(drawn.T), np.cov(found.values.T), rtol=0.1)
 
@@ -231,12 +246,49 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
         assert block == (max(pd.Timedelta("7D"), np.ceil(rows) * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
 
 
+def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
+    lasting = F * (1 + 0.01 * autoregressive(365, 0.9)[:, np.newaxis])
+    blocks = [
+        np.diff(np.flatnonzero(np.diff(one.recorder_.residuals.folds))) for one in (fitted(), chain().fit(T, lasting))
+    ]
+    assert set(blocks[0]) == {7}
+    assert min(blocks[1]) > 20
+
+
 def test_folds_in_unseen_weather_are_named(monkeypatch):
     short = chain().fit(T[:150], F[:150])
     monkeypatch.setattr(BlockedKFold, "fold_of", lambda self, X: np.arange(len(X)) // 30)  # contiguous ones
     for _ in range(2):  # each time, also where residuals are known
         with pytest.warns(UserWarning, match="lack: 'T1', 'T2'.*weather-of-one-fold"):
             short.predict(T[:150], return_std=True)
+
+
+@pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore:.*unsorted-stamps")
+@pytest.mark.parametrize("mapper", [PLAIN, make_pipeline(LagFeatures(2), PLAIN)])
+def test_residuals_do_not_depend_on_the_order_of_rows(mapper):
+    order = np.random.default_rng(0).permutation(len(T))
+    sorted_rows, shuffled = (chain(mapper=mapper).fit(T.iloc[rows], F.iloc[rows]) for rows in (slice(None), order))
+    np.testing.assert_allclose(shuffled.recorder_.residuals.values, sorted_rows.recorder_.residuals.values, atol=1e-6)
+    np.testing.assert_allclose(shuffled.recorder_.residuals.weather, sorted_rows.recorder_.residuals.weather)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "mapper",
+    [
+        make_pipeline(LagFeatures(2, padding="nan"), PLAIN),
+        GridSearchCV(TemperatureMapper(Ridge()), {"regressor__alpha": [0.1, 1.0]}, cv=2),
+        LinearRegression(),
+    ],
+)
+def test_any_mapper_has_residuals(mapper):
+    fem = chain(mapper=mapper).fit(T, F)
+    lagged = 1 if hasattr(mapper, "steps") else 0
+    assert fem.recorder_.residuals.values.shape == (365 - lagged, 6)
+    with pytest.warns(UserWarning, match="not-predicted") if lagged else nullcontext():
+        std = fem.predict(T, return_std=True)[1]
+    np.testing.assert_array_equal(std.isna().all(axis=1), np.arange(365) < lagged)
 
 
 @pytest.mark.filterwarnings("ignore:.*few-teaching-records")
@@ -388,3 +440,48 @@ def test_a_day_whose_lags_reach_back_too_far_is_counted():
 
 
 # Many records
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 60))
+def test_of_many_records_the_most_complete_one_of_each_part_counts_for_all_modes(seed, n_records, most):
+    random = np.random.default_rng(seed)
+    values = np.where(random.random((n_records, 3)) < 0.3, np.nan, random.normal(size=(n_records, 3)))
+    there, counts = ~np.isnan(values), compared(values, most)
+    assert not (counts & ~there).any()
+    n_there = there.sum(axis=1)
+    rows, chosen = np.flatnonzero(n_there), np.flatnonzero(counts.any(axis=1))
+    assert np.array_equal(counts[chosen], there[chosen])
+    assert len(chosen) == min(most, len(rows))
+    if len(rows) > most:
+        parts = [rows[np.arange(len(rows)) * most // len(rows) == part] for part in range(most)]
+        assert all(one in part and n_there[one] == n_there[part].max() for one, part in zip(chosen, parts, strict=True))
+
+
+def test_few_of_many_records_tell_as_much(monkeypatch):
+    """Neighbours among a part of the records, which bounds their number, give the same means but for chance."""
+    rng = np.random.default_rng(0)
+    weather, wanted = rng.uniform(-10, 30, (6000, 2)), rng.uniform(-8, 28, (200, 2))
+    values = 0.01 * np.column_stack([weather[:, 0] / 10, rng.standard_normal(6000)])
+    found = residuals(weather, values)
+    expected, spread = found.expected(wanted), found.spread(wanted)
+    monkeypatch.setattr("skthermo.residuals.baseline.MOST_PLACES", 2000)
+    monkeypatch.setattr("skthermo.residuals.baseline.MOST_SIMILAR", 200)
+    few = residuals(weather, values)
+    np.testing.assert_allclose(few.expected(wanted), expected, atol=0.003)
+    np.testing.assert_allclose(few.spread(wanted), spread, atol=0.004)
+
+
+@pytest.mark.parametrize("numbers", [1, 700])
+def test_results_do_not_depend_on_how_many_rows_are_held_in_memory(monkeypatch, numbers):
+    rng = np.random.default_rng(0)
+    weather, wanted = rng.uniform(-10, 30, (300, 2)), rng.uniform(-10, 30, (50, 2))
+    values = np.where(rng.random((300, 3)) < 0.2, np.nan, rng.standard_normal((300, 3)))
+    found = residuals(weather, values)
+
+    def results():
+        drawn = found.draw(wanted, np.random.RandomState(0))
+        return np.hstack([found.expected(wanted), found.spread(wanted), drawn])
+
+    whole = results()
+    monkeypatch.setattr("skthermo.residuals.weather.NUMBERS_AT_ONCE", numbers)
+    np.testing.assert_allclose(results(), whole, rtol=1e-12)

@@ -613,14 +613,14 @@ class DetectabilityStudy(BaseEstimator):
         >>> options = {"n_repeats": 5, "uncertainty": "noise", "random_state": 0}
         >>> study = DetectabilityStudy(fem, detectors, [{}, {"bottom": 0.1}], **options)
         >>> results = study.run(weather)
-        >>> study.ranking(0.03)[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
+        >>> study.ranking()[["false_alarms", "pod", "pod_at_equal_pfa", "significantly_worse"]].round(2)
                      false_alarms   pod  pod_at_equal_pfa  significantly_worse
         detector
-        Mahalanobis          0.03  0.23              0.25                False
-        forest               0.02  0.17              0.20                 True
-        >>> print(study.summary(0.03))
-        'Mahalanobis' detects 22.7% of the damaged records at a false-alarm rate of 2.7%.
-        Significantly worse at 95% confidence: 'forest' (17.5% at 2.2%).
+        Mahalanobis          0.02  0.22              0.22                False
+        forest               0.01  0.19              0.16                 True
+        >>> print(study.summary())
+        'Mahalanobis' detects 22.4% of the damaged records at a false-alarm rate of 1.9%.
+        Significantly worse at 95% confidence: 'forest' (18.7% at 1.2%).
         These comparisons include noise only: another year, baseline or FE model may change the order.
         """
         results, limit = self._results, check_probability(max_false_alarms, "max_false_alarms")

@@ -9,19 +9,19 @@ fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.
 later = make_truss_campaign(damage={"bottom": 0.5}, random_state=1)
 T = later.temperatures
 damaged = fem.simulate(T, damage={"bottom": 0.5})
-draws = [fem.simulate(T, damage={"bottom": 0.5}, noise="fitted", random_state=seed) for seed in range(5)]
+noisy = fem.simulate(T, damage={"bottom": 0.5}, noise="fitted", random_state=0)
 known = fem.simulate(T, noise=0.01, random_state=0)
 RESULTS = {
     "damaged": damaged.mean(),
     "mape": mape(later.clean_frequencies, damaged),
-    "scatter": sum((one / damaged).std() for one in draws) / len(draws),
+    "scatter": (noisy / damaged).std(),
     "scatter asked for": (known / fem.simulate(T)).std(),
     "healthy": bool((fem.simulate(T) - fem.predict(T)).abs().max().max() < 1e-9),
-    "again": bool(draws[0].equals(fem.simulate(T, damage={"bottom": 0.5}, noise="fitted", random_state=0))),
+    "again": bool(noisy.equals(fem.simulate(T, damage={"bottom": 0.5}, noise="fitted", random_state=0))),
 }
 TOLERANCES = {
     "*": {"rtol": 0.003},
     "mape": {"atol": 0.1},
-    "scatter": {"rtol": 0.06},
+    "scatter": {"rtol": 0.12},
     "scatter asked for": {"rtol": 0.1},
 }
