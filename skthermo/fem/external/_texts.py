@@ -290,9 +290,9 @@ def read_dmig(content: bytes) -> dict[str, Labelled | None]:
                 if component not in (1, 2, 6, 9) or kind not in (1, 2, 3, 4):
                     stated = f"form {component} and type {kind}"
                     raise ValueError(f"line {number}: matrix {title!r} has {stated}; expected 6 and 2, or such")
-        for node, component, value, _ in groups[is_head:] if column[0] else ():
-            if node.strip() or component.strip() or value.strip():
-                row = whole_word(node, number, "a node", 1), whole_word(component, number, "a component")
+        for point, direction, value, _ in groups[is_head:] if column[0] else ():
+            if point.strip() or direction.strip() or value.strip():
+                row = whole_word(point, number, "a node", 1), whole_word(direction, number, "a component")
                 cards.labels.extend((*row, *column))
                 cards.values.append(real(value, number))
     if not found:

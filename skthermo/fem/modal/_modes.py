@@ -200,8 +200,8 @@ class LocalModes:
         amplitudes = along / np.where(apart, gaps, np.inf)[:, :, np.newaxis]
         amplitudes[own] = -d_masses / 2
         matrix, known = mass.assemble(self._theta)[0], (amplitudes**2).sum(axis=0).ravel()
-        columns, shifts = forces.reshape(len(forces), -1), np.repeat(eigenvalues, forces.shape[2])
-        remainder = solve_beside_modes(self._solve, matrix, self._shapes, columns, shifts, known).reshape(forces.shape)
+        loads, shifts = forces.reshape(len(forces), -1), np.repeat(eigenvalues, forces.shape[2])
+        remainder = solve_beside_modes(self._solve, matrix, self._shapes, loads, shifts, known).reshape(forces.shape)
         d_shapes = np.tensordot(self._shapes, amplitudes, axes=1) + remainder
         return d_frequencies, self._at_dofs(dofs, d_shapes)
 
