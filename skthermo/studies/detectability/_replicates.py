@@ -15,6 +15,7 @@ from scipy.stats import t
 from skthermo._core.arrays import Array, as_floats, positive_integer
 from skthermo._core.frames import DAY, DAY_NS, Table, column_names, frame_like, has_stamps, row_times
 from skthermo._core.parallel import run_jobs, single_blas_thread
+from skthermo._core.text import listed
 from skthermo._core.warnings import collected
 from skthermo.fem import FEModel
 from skthermo.metrics import minimum_detectable_damage
@@ -311,7 +312,3 @@ def in_sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: st
             f"of a measured campaign in alarm." + (f" Its variance comes {causes}." if causes else "")
         )
     return "\n".join(lines)
-
-
-def listed(texts: Sequence[str]) -> str:
-    return f"{', '.join(texts[:-1])} and {texts[-1]}" if len(texts) > 1 else "".join(texts)
