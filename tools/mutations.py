@@ -124,11 +124,11 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
     ],
-    ("surrogate/inverse/_posterior.py", "surrogate/test_posterior_inverse.py"): [
+    ("surrogate/_posterior.py", "surrogate/test_posterior_inverse.py"): [
         ("weight of rows with gaps", "((at_best / std) ** 2)", "(at_best / std)"),
         ("the common factor", "return self.common**2 + np.diag(self.own**2)", "return np.diag(self.own**2)"),
     ],
-    ("surrogate/chain/_records.py", "surrogate/test_sample_weight.py"): [
+    ("surrogate/_records.py", "surrogate/test_sample_weight.py"): [
         ("residuals of records of weight 0", "measured).all(axis=1) & self.counted", "measured).all(axis=1)"),
     ],
     ("_core/frames.py", "surrogate/test_sample_weight.py"): [
@@ -159,7 +159,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("spread beyond the range", " * (1 + beyond)[:, np.newaxis]", ""),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
     ],
-    ("surrogate/chain/_records.py", "surrogate/test_uncertainty.py"): [
+    ("surrogate/_records.py", "surrogate/test_uncertainty.py"): [
         (
             "periods of time",
             'kind="stable")\n        order = order[known[order]]\n        inputs',
@@ -243,15 +243,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
-    ("studies/detectability/_replicates.py", "studies/test_replicates.py"): [
-        ("weather of any season", "SEASON = 15", "SEASON = 90"),
-        ("noise in the variance between replicates", " - within / values.shape[1]", ""),
-        ("a band of the mean of all replicates", "variance * (1 + 1 / number)", "variance / number"),
-    ],
-    ("studies/detectability/_simulation.py", "studies/test_several_detectors.py"): [
-        ("temperatures for detectors without targets", "compensates | (known >= n_sensors)", "known >= 0"),
-    ],
-    ("studies/detectability/_ranking.py", "studies/test_ranking.py"): [
+    ("studies/detectability/_rates.py", "studies/test_ranking.py"): [
         ("Bonferroni in the ranking", "/ 2 / max(n_comparisons, 1)", "/ 2"),
         (
             "a threshold moved on all repeats",
@@ -271,8 +263,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
     ],
-    ("surrogate/chain/_service.py", "surrogate/test_service_records.py"): [
-        ("gaps that end by chance", "if passes[row] and self._joint_of[record]:", "if passes[row]:"),
+    ("surrogate/_records.py", "surrogate/test_service_records.py"): [
+        ("gaps that end by chance", "if passes[row] and joint_of[record]:", "if passes[row]:"),
     ],
     ("studies/detectability/_rates.py", "studies/test_pod_curve.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
