@@ -10,16 +10,29 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from scipy import stats
+from scipy.special import softmax
+from sklearn.decomposition import PCA
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from skthermo._core.arrays import Array, as_floats, check_probability, is_real, means_of_known, refuse_no_table
+from skthermo._core.arrays import Array, as_floats, check_probability, is_real, refuse_no_table
 from skthermo._core.estimators import check_is_fitted
-from skthermo._core.frames import DAY, YEAR, days_later, frame_like, has_stamps, midnights, midnights_between
+from skthermo._core.frames import (
+    DAY,
+    YEAR,
+    check_duration,
+    frame_like,
+    has_stamps,
+    midnight,
+    midnights,
+    midnights_between,
+)
 from skthermo._core.saved_frames import SavesFrames
-from skthermo._core.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
+from skthermo._core.text import SPACE, Sentences, listed, percent, probability_text, share_text
 from skthermo._core.warnings import warn_each
 from skthermo.fem.damage import ALL_GROUPS, read_groups
 from skthermo.preprocessing import set_aside
-from skthermo.residuals.gaussian import Gaussian
+from skthermo.residuals.sensors import SensorRegression
 
 
 def read_slopes(fem: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> tuple[list[str], Array]:
@@ -32,125 +45,100 @@ def read_slopes(fem: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | 
     return list(members), np.column_stack(slopes)
 
 
-def daily_means(T: pd.DataFrame, y: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Means of two tables over each calendar day from the first record to the last, NaN without any."""
-    days, calendar = midnights(y.index), midnights_between(y.index.min(), y.index.max())
-    return T.groupby(days).mean().reindex(calendar), y.groupby(days).mean().reindex(calendar)
+def daily_means(table: pd.DataFrame) -> pd.DataFrame:
+    """Means over each calendar day from the first record to the last, NaN without any."""
+    calendar = midnights_between(table.index.min(), table.index.max())
+    return table.groupby(midnights(table.index)).mean().reindex(calendar)
+
+
+def weather_columns(T: Array, half_lives: Sequence[float] = (5.0, 30.0)) -> Array:
+    """Columns of a regression on daily mean temperatures: a cubic of up to three of their principal components.
+
+    Exponential means of the first one stand for what follows the weather slowly.
+    """
+    if not T.shape[1]:
+        return np.ones((len(T), 1))
+    filled = SensorRegression.fitted(T).fill(T)[0]
+    known = ~np.isnan(filled).any(axis=1)
+    axes = make_pipeline(StandardScaler(), PCA(0.98, svd_solver="full", whiten=True))
+    parts = axes.fit_transform(filled[known])[:, :3]
+    columns = np.full((len(T), PolynomialFeatures(2).fit(parts).n_output_features_ + parts.shape[1]), np.nan)
+    columns[known] = np.hstack([PolynomialFeatures(2).fit_transform(parts), parts**3])
+    first = pd.Series(columns[:, 1])
+    return np.column_stack([columns, *(first.ewm(halflife=days).mean() for days in half_lives)])
+
+
+def lasting_covariance(rest: Array, n_columns: int, lags: int = 10, n_waves: int = 12) -> tuple[Array, float]:
+    """Covariance of a day's residuals times the days for which they last, and as how many independent days all count.
+
+    ``rest`` has a row a day, NaN where a mode is missing, from a regression on so many columns. What is left of them
+    by the day before is summed with its products up to some lags apart (Newey and West). What lasts for months, such
+    as moisture, shows in the slowest waves over all days, a few of which the regression has taken: where these are
+    larger, they count.
+    """
+    n_days, rest = (~np.isnan(rest)).sum(axis=0), np.nan_to_num(rest)
+    kept = float(np.clip((rest[1:] * rest[:-1]).sum() / max((rest[:-1] ** 2).sum(), 1e-300), 0.0, 0.97))
+    added = rest[1:] - kept * rest[:-1]
+    total = added.T @ added
+    for lag in range(1, min(lags, len(added) // 5) + 1):
+        product = added[lag:].T @ added[:-lag]
+        total += (1 - lag / (lags + 1)) * (product + product.T)
+    total /= (1 - kept) ** 2
+    if n_waves:
+        share = (np.arange(len(rest)) + 0.5) / len(rest)
+        waves = np.sqrt(2) * np.cos(np.pi * np.outer(np.arange(1, n_waves + 1), share))
+        slow = ((waves @ rest) ** 2).sum(axis=0) / (n_waves - 4)
+        larger = np.sqrt(np.fmax(slow / np.maximum(np.diag(total), 1e-300), 1.0))
+        total *= np.outer(larger, larger)
+    left = max(n_days.max() - n_columns, 1)
+    total *= n_days.max() / left / np.sqrt(np.outer(n_days, n_days)).clip(1)
+    return total + 1e-16 * np.eye(len(total)), max(left * (1 - kept) / (1 + kept), 3.0)
 
 
 @dataclass(frozen=True)
-class DailyWeather:
-    """Columns of a regression on daily mean temperatures: a cubic of their principal components, and exponential
-    means of the first one, which stand for what follows the weather slowly.
+class DailyRegression:
+    """Ln f of each mode on the weather of the day and, last, on columns of time, with noise that lasts.
 
-    ``usual`` is the distribution of daily means, by which a missing thermometer is filled from the others.
+    ``change`` are the coefficients of time, (n_modes, n_times), and ``covariance`` is theirs, mode by mode; ``rest``
+    are residuals by day, and ``freedom`` is that of their noise.
     """
 
-    usual: Gaussian
-    axes: Array
-    half_lives: tuple[float, ...]
+    change: Array
+    covariance: Array
+    rest: Array
+    freedom: float
 
     @classmethod
     def fitted(
-        cls, T: Array, most: int = 3, share: float = 0.02, half_lives: tuple[float, ...] = (5.0, 30.0)
-    ) -> DailyWeather:
-        """Axes with more than a share of the largest one's variance, ``most`` of them or fewer."""
-        usual = Gaussian.fitted(T[~np.isnan(T).all(axis=1)])
-        scale = np.sqrt(np.maximum(np.diag(usual.covariance), 1e-6))
-        sizes, axes = np.linalg.eigh(usual.covariance / np.outer(scale, scale))
-        kept = np.flatnonzero(sizes > share * sizes[-1])[-most:][::-1]
-        own = np.diag(1e-9 * scale**2)  # so that a thermometer may repeat another one
-        usual = replace(usual, covariance=usual.covariance + own)
-        return cls(usual, axes[:, kept] / scale[:, np.newaxis] / np.sqrt(sizes[kept]), half_lives)
+        cls, X: Array, times: Array, y: Array, *, deviations: float | Sequence[float] = 0.3, **noise_options: int
+    ) -> DailyRegression:
+        """Each mode by the days that have it; the coefficients of time have such deviations beforehand."""
+        columns, y = np.hstack([X, times]), y - np.nanmean(y, axis=0)
+        known = ~np.isnan(y) & ~np.isnan(X).any(axis=1, keepdims=True)
+        columns, n_times = np.nan_to_num(columns), times.shape[1]
+        products = np.array([columns[rows].T @ columns[rows] for rows in known.T])
+        moments = np.where(known, y, 0.0).T @ columns
+        prior = np.r_[np.full(X.shape[1], 0.3), np.broadcast_to(deviations, n_times)] ** -2.0
+        noise = np.diag(np.nanvar(y, axis=0))
+        for _ in range(2):  # the prior hardly matters to the residuals, by which the noise is known
+            inverse = np.linalg.inv(products + np.diag(noise)[:, np.newaxis, np.newaxis] * np.diag(prior))
+            coefficients = np.einsum("mpq,mq->mp", inverse, moments)
+            rest = np.where(known, y - columns @ coefficients.T, np.nan)
+            noise, freedom = lasting_covariance(rest, columns.shape[1], **noise_options)
+        roots = np.linalg.cholesky((inverse + inverse.swapaxes(1, 2)) / 2)[:, -n_times:]
+        covariance = np.einsum("mn,mip,njp->minj", noise, roots, roots, optimize=True)
+        covariance = covariance.reshape(2 * [n_times * y.shape[1]])
+        covariance += 1e-9 * np.diag(np.diag(covariance))  # of modes that are copies of each other
+        return cls(coefficients[:, -n_times:], covariance, rest, freedom)
 
-    def of_days(self, T: Array, start: Array | None = None) -> tuple[Array, Array]:
-        """Columns of successive days, and the exponential means on the last one, which stay where a day is unknown."""
-        coordinates = (self.usual.completed(T)[0] - self.usual.mean) @ self.axes
-        share, first = 1 - 0.5 ** (1 / np.array(self.half_lives)), coordinates[:, 0]
-        known = first[~np.isnan(first)][:10]
-        last = np.full(len(share), known.mean() if len(known) else 0.0) if start is None else start
-        earlier = np.empty((len(T), len(share)))
-        for day, value in enumerate(first):
-            last = last if np.isnan(value) else last + share * (value - last)
-            earlier[day] = last
-        one, other = np.triu_indices(coordinates.shape[1])
-        products, constant = coordinates[:, one] * coordinates[:, other], 1 + 0 * coordinates[:, :1]
-        return np.hstack([constant, coordinates, products, coordinates**3, earlier]), last
-
-
-def whitened(X: Array, y: Array, correlation: float, n_before: int = 0) -> tuple[Array, Array]:
-    """Rows of one mode less their prediction from the day before; those after gaps are scaled to equal variances.
-
-    Without the first days, ``n_before``, which only predict.
-    """
-    days = np.flatnonzero(~np.isnan(y) & ~np.isnan(X).any(axis=1))
-    kept = np.r_[0.0, correlation ** np.diff(days).astype(float)][: len(days)]
-    scale = np.sqrt((1 - correlation**2) / (1 - kept**2))
-    table = np.column_stack([X, y])[days]
-    before = np.vstack([0 * table[:1], table[:-1]])
-    rows = (scale[:, np.newaxis] * (table - kept[:, np.newaxis] * before))[days >= n_before]
-    return rows[:, :-1], rows[:, -1]
-
-
-def lasting_covariance(rows: Array, lags: int) -> Array:
-    """Sum of products of rows, and of those up to so many lags apart with weights that fall to zero (Newey, West)."""
-    total = rows.T @ rows
-    for lag in range(1, lags + 1):
-        product = rows[lag:].T @ rows[:-lag]
-        total += (1 - lag / (lags + 1)) * (product + product.T)
-    return total
-
-
-def slow_squares(rows: Array, n_waves: int = 12, n_fitted: int = 4) -> Array:
-    """Squares that each column would sum up to if it were as large at all frequencies as at the lowest.
-
-    From its products with some waves over all rows, as many as half of their number; a regression on the season and on
-    time has taken a few of these.
-    """
-    share = (np.arange(len(rows)) + 0.5) / len(rows)
-    waves = np.sqrt(2) * np.cos(np.pi * np.outer(np.arange(1, n_waves + 1), share))
-    return ((waves @ rows) ** 2).sum(axis=0) / (n_waves - n_fitted)
-
-
-@dataclass(frozen=True)
-class DailyNoise:
-    """Correlation of residuals of neighbouring days, and covariance of what each day adds to them.
-
-    The covariance is that of a day times the number of days for which additions last.
-    """
-
-    correlation: float
-    covariance: Array
-
-    @classmethod
-    def fitted(cls, residuals: Array, n_columns: int, lags: int = 10, *, lasts_for_months: bool = True) -> DailyNoise:
-        """From residuals by day, NaN where a mode is missing, of a regression on so many columns.
-
-        Additions that last for some days show in their products; those that last for months, such as moisture, in
-        waves over all days. The larger variance counts.
-        """
-        known = ~np.isnan(residuals)
-        pairs, rest = known[1:] & known[:-1], np.nan_to_num(residuals)
-        products, squares = np.where(pairs, rest[1:] * rest[:-1], 0).sum(), np.where(pairs, rest[1:] ** 2, 0).sum()
-        correlation = float(np.clip(products / max(squares, 1e-300), 1e-6, 0.98))
-        added, n_days = np.zeros(residuals.shape), known.sum(axis=0)
-        for mode, column in enumerate(residuals.T):
-            added[known[:, mode], mode] = whitened(np.zeros((len(column), 0)), column, correlation)[1]
-        total = lasting_covariance(added, min(lags, len(added) // 5))
-        larger = np.ones(len(total))
-        if lasts_for_months:
-            larger = np.sqrt(np.fmax(slow_squares(added) / np.maximum(np.diag(total), 1e-300), 1.0))
-        lost = n_days.max() / max(n_days.max() - n_columns, 1)
-        covariance = lost * total * np.outer(larger, larger) / np.sqrt(np.outer(n_days, n_days)).clip(1)
-        return cls(correlation, covariance + 1e-16 * np.eye(len(covariance)))
-
-    @property
-    def deviations(self) -> Array:
-        return np.sqrt(np.diag(self.covariance))
-
-    def independent(self, n_days: float) -> float:
-        """As how many independent days so many count."""
-        return n_days * (1 - self.correlation) / (1 + self.correlation)
+    def chance(self) -> tuple[Array, Array, float]:
+        """Coefficients of the last column of time, their covariance, and Hotelling's probability of such by chance."""
+        n_modes, n_times = self.change.shape
+        last, own = self.change[:, -1], self.covariance[n_times - 1 :: n_times, n_times - 1 :: n_times]
+        freedom = max(self.freedom - n_modes + 1, 1.0)
+        squared = float(last @ np.linalg.solve(own, last))
+        share = freedom / (n_modes * max(self.freedom, n_modes))
+        return last, own, float(stats.f.sf(squared * share, n_modes, freedom))
 
 
 def bending_line(years: Array, bends: Array) -> Array:
@@ -158,354 +146,217 @@ def bending_line(years: Array, bends: Array) -> Array:
     return np.column_stack([years, np.maximum(years[:, np.newaxis] - bends, 0.0)])
 
 
-@dataclass(frozen=True)
-class NormalEquations:
-    """Those of a regression of each mode on the same columns, of days that have the mode."""
-
-    information: Array
-    moments: Array
-
-    @classmethod
-    def summed(cls, X: Array, y: Array, correlation: float, n_before: int = 0) -> NormalEquations:
-        """Those of successive days, whose noise is correlated; the first ones may only predict."""
-        parts = [whitened(X, column, correlation, n_before) for column in y.T]
-        return cls(np.array([rows.T @ rows for rows, _ in parts]), np.array([rows.T @ own for rows, own in parts]))
-
-    def first(self, size: int) -> NormalEquations:
-        """Without later columns."""
-        return NormalEquations(self.information[:, :size, :size], self.moments[:, :size])
-
-    def __add__(self, later: NormalEquations) -> NormalEquations:
-        """With those of other days, in whose regression there may be more columns."""
-        more = later.moments.shape[1] - self.moments.shape[1]
-        information = np.pad(self.information, [(0, 0), (0, more), (0, more)]) + later.information
-        return NormalEquations(information, np.pad(self.moments, [(0, 0), (0, more)]) + later.moments)
-
-    def solved(self, noise: Array, deviations: Array) -> tuple[Array, Array]:
-        """Coefficients, (n_modes, n_columns), and roots of their covariances.
-
-        ``noise`` are standard deviations by mode, ``deviations`` those that the coefficients have beforehand.
-        """
-        weight = noise[:, np.newaxis, np.newaxis] ** -2.0
-        covariance = np.linalg.inv(self.information * weight + np.diag(deviations**-2.0))
-        coefficients = np.einsum("mpq,mq->mp", covariance, self.moments * weight[:, 0])
-        return coefficients, np.linalg.cholesky((covariance + covariance.swapaxes(1, 2)) / 2)
+def products_of(fit: DailyRegression, slopes: Array) -> Array:
+    """Products of the effects of groups, and last of the modes' changes, in standard errors of the latter."""
+    effects = np.kron(slopes, np.eye(fit.change.shape[1]))
+    root = np.linalg.cholesky(fit.covariance)
+    whitened = np.linalg.solve(root, np.column_stack([effects, fit.change.ravel()]))
+    return whitened.T @ whitened
 
 
-def prior_deviations(n_weather: int, n_times: int, mislearned: float = 0.3, trend: float = 0.3) -> Array:
-    """Prior standard deviations of the coefficients of ln f: a wide one of the constant, then weather and time."""
-    return np.r_[10.0, np.full(n_weather - 1, mislearned), np.full(n_times, trend)]
+class StiffnessTrends:
+    """Changes of groups that explain how modes change along a bending line in time.
 
-
-@dataclass(frozen=True)
-class ModeTrends:
-    """Coefficients of the bending line of each mode, mode by mode, and their covariance, and what groups move them.
-
-    ``freedom`` is that of the noise's covariance.
+    All sets of one or two groups, and an even change of all, by decreasing evidence against no change; most often one
+    group changes, and steadily. Of the bends, the yearly standard deviation counts by which the best set explains the
+    modes. ``p_value`` is the probability that one of the groups would seem to change as clearly by chance, along a
+    straight line: Student's law of the largest change in its standard errors, times the number of groups (Bonferroni).
+    ``rate_errors`` are standard errors of the yearly change of each group if no other changes.
     """
 
-    mean: Array
-    covariance: Array
-    slopes: Array
-    freedom: float
-
-    @classmethod
-    def fitted(
-        cls, equations: NormalEquations, noise: DailyNoise, slopes: Array, n_times: int, freedom: float
-    ) -> ModeTrends:
-        size = equations.moments.shape[1]
-        coefficients, roots = equations.solved(noise.deviations, prior_deviations(size - n_times, n_times))
-        rows, correlation = roots[:, -n_times:], noise.covariance / np.outer(noise.deviations, noise.deviations)
-        covariance = np.einsum("mn,mip,njp->minj", correlation, rows, rows, optimize=True)
-        covariance = covariance.reshape(2 * [rows.shape[0] * n_times])
-        covariance += 1e-9 * np.diag(np.diag(covariance))  # of modes that are copies of each other
-        return cls(coefficients[:, -n_times:].ravel(), covariance, slopes, freedom)
-
-    @property
-    def n_times(self) -> int:
-        return len(self.mean) // len(self.slopes)
-
-    def p_value(self) -> float:
-        """Probability that one of the groups would seem to change as clearly by chance, of a line that does not bend.
-
-        Student's law of the largest change in its standard errors, times the number of groups (Bonferroni).
-        """
-        weighted = np.linalg.solve(self.covariance, np.column_stack([self.slopes, self.mean]))
-        products = self.slopes.T @ weighted
-        scores = np.abs(products[:, -1]) / np.sqrt(np.maximum(np.diag(products), 1e-300))
-        return float(min(2 * len(scores) * stats.t.sf(scores.max(), max(self.freedom, 3.0)), 1.0))
-
-    def design(self, groups: Sequence[int]) -> Array:
-        return np.kron(self.slopes[:, list(groups)], np.eye(self.n_times))
-
-    def evidence(self, groups: Sequence[int], deviations: Array) -> float:
-        """Logarithm of how many times likelier these are with drift of some groups than without any."""
-        design = self.design(groups) * np.tile(deviations, len(groups))
-        laws = (self.covariance, self.covariance + design @ design.T)
-        none, drift = (stats.multivariate_normal.logpdf(self.mean, cov=law, allow_singular=True) for law in laws)
-        return float(drift - none)
-
-    def of_groups(self, groups: Sequence[int], deviations: Array) -> tuple[Array, Array]:
-        """Coefficients of ln stiffness, group by group, if no others drift, and their covariance."""
-        design = self.design(groups)
-        weighted = np.linalg.solve(self.covariance, design)
-        prior = np.tile(np.maximum(deviations, 1e-7) ** -2.0, len(groups))
-        covariance = np.linalg.inv(design.T @ weighted + np.diag(prior))
-        return covariance @ weighted.T @ self.mean, covariance
-
-
-@dataclass(frozen=True)
-class DriftExplanation:
-    """Sets of groups that may drift, by decreasing evidence, beside the trends of the modes.
-
-    ``bend`` is the standard deviation of a yearly bend by which the best set explains the trends.
-    """
-
-    trends: ModeTrends
-    names: list[str]
-    sets: list[tuple[int, ...]]
-    evidence: Array
-    bend: float
-
-    @classmethod
-    def weighed(cls, trends: ModeTrends, names: list[str], rate: float = 0.03) -> DriftExplanation:
-        """All sets of one or two groups, and a change of all alike; most often one group drifts, and steadily."""
+    def __init__(self, X: Array, line: Array, y: Array, slopes: Array, names: list[str]):
+        straight, self.modes = (DailyRegression.fitted(X, times, y) for times in (line[:, :1], line))
+        self.names, self.line, self._products = names, line, products_of(self.modes, slopes)
+        steady, n = products_of(straight, slopes), len(names)
+        with np.errstate(divide="ignore"):
+            self.rate_errors = np.diag(steady)[:n] ** -0.5  # infinite where no mode moves
+        scores = np.abs(steady[:n, n]) * np.minimum(self.rate_errors, 1e150)
+        self.p_value = float(min(2 * n * stats.t.sf(scores.max(), straight.freedom), 1.0))
         apart = [place for place, name in enumerate(names) if name != ALL_GROUPS]
-        sets = [*((place,) for place in range(len(names))), *combinations(apart, 2)]
-        shares = {1: 0.8 / len(names), 2: 0.2 / max(len(sets) - len(names), 1)}
-        bends = (0.0, 0.005, 0.02)[: trends.n_times + 1 if trends.n_times > 1 else 1]
-        table = [
-            [
-                trends.evidence(one, np.r_[rate, np.full(trends.n_times - 1, bend)]) + np.log(shares[len(one)])
-                for bend in bends
-            ]
-            for one in sets
-        ]
-        evidence = np.logaddexp.reduce(table, axis=1) - np.log(len(bends))
+        pairs, bends = list(combinations(apart, 2)), (0.0, 0.005, 0.02)[: line.shape[1] + 1 if line.shape[1] > 1 else 1]
+        sets = [*((place,) for place in range(n)), *pairs]
+        shares = np.r_[np.full(n, 0.8 / n), np.full(len(pairs), 0.2 / max(len(pairs), 1))]
+        table = np.array([[self._explained(one, 0.03, bend)[2] for bend in bends] for one in sets])
+        evidence = np.logaddexp.reduce(table, axis=1) + np.log(shares / len(bends))
         order = np.argsort(-evidence, kind="stable")
-        bend = bends[int(np.argmax(table[order[0]]))]
-        return cls(trends, names, [sets[place] for place in order], evidence[order], bend)
-
-    @property
-    def probabilities(self) -> Array:
-        weights = np.exp(self.evidence - self.evidence[0])
-        return weights / weights.sum()
+        self.sets, self.evidence = [sets[place] for place in order], evidence[order]
+        self.bend = bends[int(np.argmax(table[order[0]]))]
 
     def alternatives(self, as_likely: float = 3.0) -> dict[str, list[str]]:
-        """For each group of the best set, those that explain the trends about as well in its place."""
-        best = set(self.sets[0])
-        likely = [set(one) for one in np.array(self.sets, dtype=object)[self.evidence[0] - self.evidence <= as_likely]]
-        found = {}
+        """For each group of the best set, those that explain the modes about as well in its place."""
+        best, found = set(self.sets[0]), {}
+        likely = [set(one) for one in self.sets[: np.count_nonzero(self.evidence >= self.evidence[0] - as_likely)]]
         for group in sorted(best):
             others = best - {group}
             rivals = {place for one in likely if len(one) == len(best) and others < one for place in one - others}
             found[self.names[group]] = [self.names[place] for place in sorted(rivals)]
         return found
 
-    def change(self, group: int, beside: Sequence[int], line: Array) -> tuple[Array, Array]:
-        """Ln stiffness of a group by day, and its standard deviation, if some others drift as well.
+    def change(self, group: int, beside: Sequence[int]) -> tuple[Array, Array]:
+        """Ln stiffness of a group by day, and its standard deviation, if some others change as well.
 
         Three per cent of it may be an error of the FE model's effects.
         """
-        deviations = np.r_[0.1, np.full(self.trends.n_times - 1, self.bend)]
-        coefficients, covariance = self.trends.of_groups([group, *beside], deviations)
-        size = self.trends.n_times
-        mean = line @ coefficients[:size]
-        spread = np.sqrt(np.einsum("ti,ij,tj->t", line, covariance[:size, :size], line))
+        coefficients, covariance, _ = self._explained([group, *beside], 0.1, self.bend)
+        size = self.line.shape[1]
+        mean = self.line @ coefficients[:size]
+        spread = np.sqrt(np.einsum("ti,ij,tj->t", self.line, covariance[:size, :size], self.line))
         return mean, np.hypot(spread, 0.03 * mean)
 
+    def expected(self) -> Array:
+        """Ln stiffness of each group on the last day: the mean over all sets, and none, weighed by their evidence."""
+        found = np.zeros(len(self.names))
+        for weight, one in zip(softmax(np.r_[0.0, self.evidence])[1:], self.sets, strict=True):
+            coefficients = self._explained(one, 0.1, self.bend)[0].reshape(len(one), -1)
+            found[list(one)] += weight * coefficients @ self.line[-1]
+        return found
 
-def regressed(X: Array, y: Array, n_times: int, **noise_options: bool) -> tuple[NormalEquations, DailyNoise]:
-    """Normal equations of the modes on columns, the last ones of time, and the noise beside them."""
-    size, noise = X.shape[1], DailyNoise(1e-6, np.diag(np.nanvar(y, axis=0)))
-    prior = prior_deviations(size - n_times, n_times)
-    for _ in range(2):  # the first time as if days were independent
-        equations = NormalEquations.summed(X, y, noise.correlation)
-        rest = y - X @ equations.solved(noise.deviations, prior)[0].T
-        noise = DailyNoise.fitted(rest, size, **noise_options)
-    return NormalEquations.summed(X, y, noise.correlation), noise
+    def _explained(self, groups: Sequence[int], rate: float, bend: float) -> tuple[Array, Array, float]:
+        """Coefficients of ln stiffness, group by group, if no others change, their covariance, and their evidence.
 
-
-def rate_errors(steady: ModeTrends) -> Array:
-    """Standard error of the yearly change of each group if no other drifts; infinite where no mode moves."""
-    information = steady.slopes.T @ np.linalg.solve(steady.covariance, steady.slopes)
-    with np.errstate(divide="ignore"):
-        return 1 / np.sqrt(np.diag(information))
+        ``rate`` and ``bend`` are standard deviations of a yearly change beforehand. The evidence is the logarithm of
+        how many times likelier the modes' lines are than if no group changed.
+        """
+        size = self.line.shape[1]
+        places = np.add.outer(size * np.array(groups), np.arange(size)).ravel()
+        deviations = np.tile(np.maximum(np.r_[rate, np.full(size - 1, bend)], 1e-7), len(groups))
+        covariance = np.linalg.inv(self._products[np.ix_(places, places)] + np.diag(deviations**-2))
+        coefficients = covariance @ self._products[places, -1]
+        squares = coefficients @ self._products[places, -1]
+        evidence = (squares + np.linalg.slogdet(covariance)[1]) / 2 - np.log(deviations).sum()
+        return coefficients, covariance, float(evidence)
 
 
 @dataclass(frozen=True)
 class DriftState(SavesFrames):
     """What a `DriftFollower` knows at the end of a day.
 
-    ``number`` counts days since the baseline. ``equations`` hold the days that are learned, ``waiting`` are the last of
-    these and the days since, a row each: columns of the weather, then the modes. ``sudden`` marks days of a time that
-    departs from the prediction: these are never learned.
+    Daily means of temperatures and ln f of the days that are learned and of those that wait, and the logarithm of each
+    group's stiffness that is taken out.
     """
 
-    day: pd.Timestamp
-    number: int
-    equations: NormalEquations
-    earlier: Array
-    waiting: Array
-    sudden: Array
+    learned: pd.DataFrame
+    waiting: pd.DataFrame
+    change: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class DriftFollower:
     """Takes slow drift out of measured frequencies, and leaves sudden changes in.
 
-    The regression of `track_parameters` grows day by day, a month behind: a day is learned when it has waited for
-    ``delay`` days, if in all that time the mean of the waiting days agreed with the prediction. So a sudden change is
-    never learned as drift, however long it lasts; one that the mean of a month does not show is learned in time, and
-    reported as the drift that it looks like. The correction is the drift since the middle of the baseline, times a
-    share that is 0 as long as it may be chance and goes to 1 as it becomes clear.
+    Once a week, the regression of `track_parameters` learns a week more of daily means, a month behind. If the days
+    that wait are then a step away from those that are learned, they are never learned: a sudden change does not count
+    as drift, however long it lasts. A step that the mean of a month does not show is learned in time, and reported as
+    the drift that it looks like. The correction is the drift since the middle of the baseline, by how probable it is.
     """
 
     temperatures: list[Any]
     modes: list[Any]
     groups: list[str]
     slopes: Array
-    weather: DailyWeather
-    noise: DailyNoise
-    years: float
     start_: DriftState
-    delay: int = 30
-    chance: float = 1e-3
+    n_days: int
 
     @classmethod
-    def fitted(cls, fem: Any, T: pd.DataFrame, F: pd.DataFrame, groups: Any = None) -> DriftFollower:
-        """Learn from the temperatures and frequencies of a baseline, for a fitted chain; by default for all groups."""
+    def fitted(cls, fem: Any, T: pd.DataFrame, F: pd.DataFrame) -> DriftFollower:
+        """Learn from the temperatures and frequencies of a baseline, for all groups of a fitted chain."""
         check_is_fitted(fem)
-        inputs = list(getattr(fem, "feature_names_in_", ["named temperatures"]))
-        missing = [one for one in inputs if one not in T] + [one for one in fem.mode_names_ if one not in F]
+        inputs, modes = list(getattr(fem, "feature_names_in_", ["named temperatures"])), list(fem.mode_names_)
+        missing = [one for one in inputs if one not in T] + [one for one in modes if one not in F]
         if missing:
             raise ValueError(
                 f"the baseline lacks {missing}, to which the chain fem was fitted; expected "
                 f"their names among the temperatures {list(T.columns)} and the frequencies {list(F.columns)}"
             )
-        names, slopes = read_slopes(fem, groups)
-        daily_T, daily_F = daily_means(T[inputs], np.log(F[list(fem.mode_names_)]))
-        weather, y = DailyWeather.fitted(daily_T.to_numpy()), daily_F.to_numpy()
-        columns, earlier = weather.of_days(daily_T.to_numpy())
-        years = len(y) * (DAY / YEAR)
-        line = bending_line((np.arange(len(y)) + 1) * (DAY / YEAR) - years / 2, np.empty(0))
-        equations, noise = regressed(np.hstack([columns, line]), y, 1)
-        state = DriftState(daily_F.index[-1], 0, equations, earlier, np.hstack([columns, y])[-1:], np.array([False]))
-        return cls(inputs, list(fem.mode_names_), names, slopes, weather, noise, years, state)
+        names, slopes = read_slopes(fem, None)
+        learned = daily_means(T[inputs].join(np.log(F[modes])))
+        state = DriftState(learned, learned.iloc[:0], (0.0,) * len(names))
+        return cls(inputs, modes, names, slopes, state, len(learned))
 
     def start(self) -> DriftState:
         return self.start_
 
-    def advance(self, state: DriftState, T: pd.DataFrame, F: pd.DataFrame) -> DriftState:
+    def advance(self, state: DriftState, T: pd.DataFrame, F: pd.DataFrame, n_weeks: int = 5) -> DriftState:
         """The state at the end of one complete day; as it is without records, or if that day is known already."""
-        if not len(F) or F.index[-1] < days_later(state.day, 1):
+        last = (state.waiting if len(state.waiting) else state.learned).index[-1]
+        if not len(F) or midnight(F.index[-1]) <= last:
             return state
-        for _ in midnights_between(state.day, F.index[-1])[1:-1]:
-            state = self._with_day(state, np.full(len(self.temperatures), np.nan), np.full(len(self.modes), np.nan))
-        means = (means_of_known(as_floats(one)) for one in (T[self.temperatures], np.log(F[self.modes])))
-        return self._with_day(state, *means)
+        means = T[self.temperatures].join(np.log(F[self.modes])).mean().to_frame(midnight(F.index[-1])).T
+        waiting = pd.concat([state.waiting, means])
+        if len(waiting) < 7 * n_weeks:
+            return replace(state, waiting=waiting)
+        if self._is_apart(state.learned, waiting):
+            return replace(state, waiting=waiting.iloc[:0])
+        learned = DriftState(pd.concat([state.learned, waiting[:7]]), waiting[7:], state.change)
+        trends = self._trends(learned)
+        return learned if trends is None else replace(learned, change=tuple(trends.expected().tolist()))
 
     def corrected(self, state: DriftState, F: pd.DataFrame) -> pd.DataFrame:
         """Measured frequencies of the day after a state without the drift that is taken out."""
-        shift = dict(zip(self.modes, self.slopes @ np.log1p(self._change(state)), strict=True))
+        shift = dict(zip(self.modes, self.slopes @ np.array(state.change), strict=True))
         return F * np.exp([-shift.get(mode, 0.0) for mode in F])
 
     def taken_out(self, state: DriftState) -> pd.Series:
         """Relative change of each group's stiffness that is taken out of the frequencies."""
-        found = pd.Series(self._change(state), pd.Index(self.groups, name="group"), name="change")
-        return found.drop(ALL_GROUPS, errors="ignore")
+        change = pd.Series(state.change, pd.Index(self.groups, name="group"))
+        return np.expm1(change.drop(ALL_GROUPS, errors="ignore") + change.get(ALL_GROUPS, 0.0))
 
-    def _change(self, state: DriftState, rate: float = 0.02, bend: float = 0.01) -> Array:
-        """Change that is taken out of each group; 0 for all groups alike, whose change is that of each."""
-        trends, line = self._trends(state)
-        apart = [place for place, name in enumerate(self.groups) if name != ALL_GROUPS]
-        coefficients, covariance = trends.of_groups(apart, np.r_[rate, np.full(trends.n_times - 1, bend)])
-        at_day, slopes = np.kron(np.eye(len(apart)), line), self.slopes[:, apart]
-        change = at_day @ coefficients
-        sizes, axes = np.linalg.eigh(slopes @ at_day @ covariance @ at_day.T @ slopes.T)
-        clear = sizes > 1e-8 * sizes[-1]
-        distance = float(((slopes @ change @ axes[:, clear]) ** 2 / sizes[clear]).sum())
-        by_chance = float(stats.chi2.isf(0.05, clear.sum()))
-        found = np.zeros(len(self.groups))
-        found[apart] = np.expm1(max(1 - (by_chance / distance) ** 2, 0.0) * change) if distance > 0 else 0.0
-        return found
-
-    def report(self, state: DriftState, significance: float = 0.01, limit: float = 0.05) -> pd.DataFrame:
+    def report(self, state: DriftState) -> pd.DataFrame:
         """Drift of each group since the middle of the baseline, as `track_parameters` finds it.
 
         Of its stiffness: relative ``change`` and ``standard_error``, the same a year (``per_year``,
         ``per_year_error``), the ``p_value`` of the structure's drift, by which groups it is explained best
         (``significant``, none if that may be chance), and whether such a change is ``beyond_limit``.
         """
-        trends, line = self._trends(state)
-        p_value = self._trends(state, is_straight=True)[0].p_value()
-        explanation = DriftExplanation.weighed(trends, self.groups)
-        best = explanation.sets[0] if p_value <= significance else ()
-        years, rows = self.years / 2 + state.number * (DAY / YEAR), {}
-        for group, name in enumerate(self.groups):
-            if name == ALL_GROUPS and group not in best:
-                continue
-            beside = [one for one in best if one != group]
-            (mean,), (deviation,) = explanation.change(group, beside, line[np.newaxis])
-            change, error = np.expm1(mean), np.exp(mean) * deviation
-            found = group in best, group in best and abs(change) > limit
-            rows[name] = change, error, change / years, error / years, p_value, *found
-        columns = ["change", "standard_error", "per_year", "per_year_error", "p_value", "significant", "beyond_limit"]
-        return pd.DataFrame.from_dict(rows, "index", columns=columns).rename_axis("group")
+        trends, n = self._trends(state), len(self.groups)
+        best, levels, p_value = (), np.array([[0.0, np.nan]] * n), 1.0
+        if trends is not None:
+            p_value, best = trends.p_value, trends.sets[0] if trends.p_value <= 0.01 else ()
+            found = [trends.change(group, [one for one in best if one != group]) for group in range(n)]
+            levels = np.array([(mean[-1], deviation[-1]) for mean, deviation in found])
+        table = pd.DataFrame({"change": np.expm1(levels[:, 0])}, pd.Index(self.groups, name="group"))
+        table["standard_error"] = np.exp(levels[:, 0]) * levels[:, 1]
+        years = self._years(pd.concat([state.learned, state.waiting]).index)[-1]
+        table[["per_year", "per_year_error"]] = table / years
+        is_best = np.isin(np.arange(n), best)
+        table = table.assign(
+            p_value=p_value, significant=is_best, beyond_limit=is_best & (table["change"].abs() > 0.05)
+        )
+        return table[is_best | (table.index != ALL_GROUPS)]
 
-    def _lines(self, numbers: Array, n_bends: int) -> Array:
-        """The bending line on days of service: zero in the middle of the baseline, which bends as each year begins."""
-        return bending_line(numbers * (DAY / YEAR) + self.years / 2, np.arange(n_bends) + self.years / 2)
+    def _years(self, days: pd.DatetimeIndex) -> Array:
+        """Time since the middle of the baseline."""
+        return ((days - days[0]) / YEAR).to_numpy() - self.n_days / 2 * (DAY / YEAR)
 
-    def _trends(self, state: DriftState, *, is_straight: bool = False) -> tuple[ModeTrends, Array]:
-        """Trends of the modes by the days that are learned, and the line on the last day."""
-        n_weather = self.start_.equations.moments.shape[1] - 1
-        n_times = 1 if is_straight else state.equations.moments.shape[1] - n_weather
-        n_days = self.years * (YEAR / DAY) + state.number - len(state.sudden)
-        freedom = self.noise.independent(n_days) - n_weather
-        equations = state.equations.first(n_weather + n_times)
-        trends = ModeTrends.fitted(equations, self.noise, self.slopes, n_times, freedom)
-        return trends, self._lines(np.array([state.number]), n_times - 1)[0]
+    def _regression(self, daily: pd.DataFrame) -> tuple[Array, Array, Array]:
+        """Columns of the weather, a line that bends as each year of service begins, and the modes."""
+        daily = daily.reindex(midnights_between(*daily.index[[0, -1]]))
+        years, service = self._years(daily.index), self.n_days / 2 * (DAY / YEAR)
+        line = bending_line(years, np.arange(int(np.ceil(max(years[-1] - service, 0.0)))) + service)
+        return weather_columns(daily[self.temperatures].to_numpy()), line, daily[self.modes].to_numpy()
 
-    def _with_day(self, state: DriftState, T: Array, y: Array) -> DriftState:
-        """The state after one more day; the day that has waited longest is learned, in a year that may bend."""
-        columns, earlier = self.weather.of_days(T[np.newaxis], state.earlier)
-        waiting, number = np.vstack([state.waiting, np.r_[columns[0], y]]), state.number + 1
-        sudden, equations = np.append(state.sudden, False), state.equations
-        sudden[1:] |= self._departs(equations, waiting[1:], number)
-        if len(waiting) > self.delay + 1:
-            two, y = np.split(waiting[:2], [columns.shape[1]], axis=1)
-            numbers = number - self.delay + np.array([-1, 0])
-            X = np.hstack([two, self._lines(numbers, 1 + int(numbers[1] * (DAY / YEAR)))])
-            y = np.where(sudden[:2, np.newaxis], np.nan, y)
-            equations += NormalEquations.summed(X, y, self.noise.correlation, n_before=1)
-            waiting, sudden = waiting[1:], sudden[1:]
-        return DriftState(days_later(state.day, 1), number, equations, earlier, waiting, sudden)
+    def _trends(self, state: DriftState) -> StiffnessTrends | None:
+        """By the days that are learned, with the line up to the newest; None where no mode has enough days."""
+        X, line, y = self._regression(pd.concat([state.learned, state.waiting[self.temperatures]]))
+        enough = enough_days(X, line, y)
+        return StiffnessTrends(X, line, y[:, enough], self.slopes[enough], self.groups) if enough.any() else None
 
-    def _departs(self, equations: NormalEquations, waiting: Array, number: int, trend: float = 0.01) -> bool:
-        """Whether the mean of the days that wait is too far from the prediction."""
-        n_modes = len(self.modes)
-        n_weather, size = waiting.shape[1] - n_modes, equations.moments.shape[1]
-        lines = self._lines(number - np.arange(len(waiting))[::-1], size - n_weather - 1)
-        X, y = np.hstack([waiting[:, :n_weather], lines]), waiting[:, n_weather:]
-        known = ~np.isnan(y) & ~np.isnan(X).any(axis=1, keepdims=True)
-        modes = np.flatnonzero(known.any(axis=0))
-        if not len(modes):
+    def _is_apart(self, learned: pd.DataFrame, waiting: pd.DataFrame, chance: float = 1e-3) -> bool:
+        """Whether there is a step between the days that are learned and those that wait, beside a slow drift."""
+        X, line, y = self._regression(pd.concat([learned, waiting]))
+        step = (np.arange(len(y)) >= len(y) - len(waiting)).astype(float)
+        enough = enough_days(X, line, y) & ~np.isnan(y[step > 0]).all(axis=0)
+        if not enough.any():
             return False
-        prior = prior_deviations(n_weather, size - n_weather, trend=trend)
-        coefficients, roots = equations.solved(self.noise.deviations, prior)
-        weights = known / np.maximum(known.sum(axis=0), 1)
-        usual = weights.T @ np.nan_to_num(X)
-        apart = np.einsum("tm,tm->m", weights, np.nan_to_num(y)) - np.einsum("mp,mp->m", usual, coefficients)
-        rows = np.einsum("mp,mpq->mq", usual, roots)
-        n_days = self.noise.independent(1.0) * known.sum(axis=0)
-        correlation = self.noise.covariance / np.outer(self.noise.deviations, self.noise.deviations)
-        own = self.noise.deviations / np.sqrt((1 - self.noise.correlation**2) * np.maximum(n_days, 1e-9))
-        spread = correlation * (rows @ rows.T + np.outer(own, own))
-        apart, spread = apart[modes], spread[np.ix_(modes, modes)]
-        freedom = max(self.noise.independent(self.years * (YEAR / DAY)) - n_weather, 4.0)
-        distance = float(apart @ np.linalg.solve(spread, apart))
-        return distance > len(modes) * stats.f.isf(self.chance, len(modes), freedom)
+        deviations = np.r_[np.full(line.shape[1], 0.01), 0.3]
+        found = DailyRegression.fitted(X, np.column_stack([line, step]), y[:, enough], deviations=deviations)
+        return found.chance()[2] < chance
+
+
+def enough_days(X: Array, line: Array, y: Array) -> Array:
+    """Which modes were measured on three times as many days as the regression has columns."""
+    n_known = (~np.isnan(y) & ~np.isnan(X).any(axis=1, keepdims=True)).sum(axis=0)
+    return n_known >= 3 * (X.shape[1] + line.shape[1])
 
 
 def track_parameters(
@@ -574,55 +425,48 @@ def track_parameters(
     (True, 'bottom')
     """
     check_probability(significance, "significance")
-    step = _step_of(freq)
+    step, rest = divmod(check_duration(freq, "freq", may_be_zero=False), DAY)
+    if rest:
+        raise ValueError(f"freq is {freq!r}; expected a day or some days, such as '7D'")
     T, F = _checked(fem, T, F)
     names, slopes = read_slopes(fem, groups)
-    daily_T, daily_F = daily_means(T, np.log(F))
-    days, y = daily_F.index, daily_F.to_numpy()
+    daily = daily_means(T.join(np.log(F)))
+    days, y, X = daily.index, daily[F.columns].to_numpy(), weather_columns(daily[T.columns].to_numpy())
     years = np.arange(len(days)) * (DAY / YEAR)
     line = bending_line(years, np.arange(1, int(years[-1])))
-    X = DailyWeather.fitted(daily_T.to_numpy()).of_days(daily_T.to_numpy())[0]
-    n_known = (~np.isnan(y) & ~np.isnan(X[:, :1])).sum(axis=0)
-    few = n_known < 3 * (X.shape[1] + line.shape[1])
-    if few.all():
-        counts = ", ".join(f"{mode} {number}" for mode, number in zip(F, n_known, strict=True))
+    enough = enough_days(X, line, y)
+    if not enough.any():
+        counts = ", ".join(f"{mode} {number}" for mode, number in daily[F.columns].count().items())
         least = 3 * (X.shape[1] + line.shape[1])
         raise ValueError(f"modes were measured, with temperatures, on too few days: {counts}; expected {least} or more")
-    equations, noise = regressed(np.hstack([X, line]), y[:, ~few], line.shape[1])
-    freedom = noise.independent(n_known.max()) - X.shape[1]
-    trends = ModeTrends.fitted(equations, noise, slopes[~few], line.shape[1], freedom)
-    steady = ModeTrends.fitted(equations.first(X.shape[1] + 1), noise, slopes[~few], 1, freedom)
-    p_value, explanation = steady.p_value(), DriftExplanation.weighed(trends, names)
-    best = explanation.sets[0] if p_value <= significance else ()
-    alternatives = explanation.alternatives() if best else {}
+    trends = StiffnessTrends(X, line, y[:, enough], slopes[enough], names)
+    best = trends.sets[0] if trends.p_value <= significance else ()
+    alternatives = trends.alternatives() if best else {}
     changes = {}
     for group, name in enumerate(names):
         beside = [one for one in best if one != group and name not in alternatives[names[one]]]
-        changes[name] = explanation.change(group, beside, line)
-    at_end = np.kron(np.eye(len(trends.slopes)), line[-1:])
-    errors = np.sqrt(np.diag(at_end @ trends.covariance @ at_end.T))
+        changes[name] = trends.change(group, beside)
     shifts = sum((np.outer(changes[names[group]][0], slopes[:, group]) for group in best), np.zeros(y.shape))
+    at_end = np.kron(np.eye(enough.sum()), line[-1:])
     modes = pd.DataFrame(np.nan, pd.Index(F.columns, name="mode"), ["measured", "explained", "standard_error"])
-    modes.loc[~few] = np.column_stack([at_end @ trends.mean, shifts[-1, ~few], errors])
+    errors = np.sqrt(np.diag(at_end @ trends.modes.covariance @ at_end.T))
+    modes.loc[enough] = np.column_stack([at_end @ trends.modes.change.ravel(), shifts[-1, enough], errors])
+    sides = zip(["estimate", "ci_low", "ci_high"], stats.norm.ppf([0.5, 0.025, 0.975]), strict=True)
+    table = {
+        (name, what): np.exp(mean + side * deviation)[::step]
+        for what, side in sides
+        for name, (mean, deviation) in changes.items()
+    }
     return ParameterHistory(
-        table=pd.DataFrame(
-            {
-                (name, what): np.exp(mean + side * deviation)[::step]
-                for name, (mean, deviation) in changes.items()
-                for what, side in zip(
-                    ["estimate", "ci_low", "ci_high"], stats.norm.ppf([0.5, 0.025, 0.975]), strict=True
-                )
-            },
-            days[::step],
-        ),
-        rates=_rates(explanation, alternatives, changes, rate_errors(steady), years[-1], significance),
-        p_value=p_value,
+        table=pd.DataFrame(table, days[::step])[names],
+        rates=_rates(trends, alternatives, changes, years[-1], significance),
+        p_value=trends.p_value,
         significance=significance,
         explanations=pd.DataFrame(
             {
-                "groups": [tuple(names[group] for group in one) for one in explanation.sets],
-                "probability": explanation.probabilities,
-                "log_evidence": explanation.evidence,
+                "groups": [tuple(names[group] for group in one) for one in trends.sets],
+                "probability": softmax(trends.evidence),
+                "log_evidence": trends.evidence,
             }
         ),
         alternatives=alternatives,
@@ -632,36 +476,25 @@ def track_parameters(
 
 
 def _rates(
-    explanation: DriftExplanation,
+    trends: StiffnessTrends,
     alternatives: Mapping[str, list[str]],
     changes: Mapping[str, tuple[Array, Array]],
-    alone: Array,
     years: float,
     significance: float,
 ) -> pd.DataFrame:
-    """One row a group, as in `ParameterHistory`; ``alone`` are standard errors of yearly changes."""
-    names = explanation.names
+    """One row a group, as in `ParameterHistory`."""
     levels, deviations = np.array([(mean[-1], deviation[-1]) for mean, deviation in changes.values()]).T
-    drifts = np.where(2 * alone * years > 0.05, "unobservable", "no sign").astype(object)
+    names, alone = list(changes), trends.rate_errors
+    table = pd.DataFrame({"change": np.expm1(levels), "change_error": np.exp(levels) * deviations}, names)
+    table[["per_year", "standard_error"]] = table[["change", "change_error"]] / years
+    table["p_value"] = 2 * stats.norm.sf(np.abs(levels) / np.maximum(deviations, 1e-300))
+    has_group = np.array([[group in one for one in trends.sets] for group in range(len(names))])
+    table["probability"] = has_group @ softmax(trends.evidence)
+    table["drifts"] = np.where(2 * alone * years > 0.05, "unobservable", "no sign").astype(object)
     for others in alternatives.values():
-        drifts[[names.index(name) for name in others]] = "yes" if len(others) == 1 else "perhaps"
-    change, errors = np.expm1(levels), np.exp(levels) * deviations
-    return pd.DataFrame(
-        {
-            "change": change,
-            "change_error": errors,
-            "per_year": change / years,
-            "standard_error": errors / years,
-            "p_value": 2 * stats.norm.sf(np.abs(levels) / np.maximum(deviations, 1e-300)),
-            "probability": [
-                sum(p for one, p in zip(explanation.sets, explanation.probabilities, strict=True) if group in one)
-                for group in range(len(names))
-            ],
-            "drifts": drifts,
-            "detectable_rates": (stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone,
-        },
-        index=pd.Index(names, name="group"),
-    )
+        table.loc[others, "drifts"] = "yes" if len(others) == 1 else "perhaps"
+    table["detectable_rates"] = (stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone
+    return table.rename_axis("group")
 
 
 @dataclass(frozen=True, eq=False)
@@ -806,14 +639,6 @@ class ParameterHistory(Sentences):
         of_day = np.clip(days.searchsorted(F.index, side="right") - 1, 0, len(days) - 1)
         return frame_like(F, as_floats(found.frequencies) * np.exp(-self.shifts.to_numpy()[of_day]))
 
-    def __repr__(self) -> str:
-        drifting = self.rates[self.rates["drifts"].isin(["yes", "perhaps"])]
-        found = ", ".join(
-            f"{name} {row['per_year']:+.2%} ± {2 * row['standard_error']:.2%} a year"
-            for name, row in drifting.iterrows()
-        )
-        return f"ParameterHistory({found or 'no drift'})"
-
     def _answer(self) -> Iterator[str]:
         first, last = (f"{self.shifts.index[end]:%Y-%m-%d}" for end in (0, -1))
         found = "The" if self.has_drift else "No significant"
@@ -823,7 +648,7 @@ class ParameterHistory(Sentences):
         for group, others in self.alternatives.items():
             rate = self.rates.loc[group]
             verb = "loses" if rate["per_year"] < 0 else "gains"
-            yearly = f"{_share(rate['per_year'])} (±{SPACE}{_share(2 * rate['standard_error'])})"
+            yearly = f"{share_text(abs(rate['per_year']))} (±{SPACE}{share_text(2 * rate['standard_error'])})"
             yield f"{group} {verb} {yearly} of its stiffness a year, {percent(rate['change'], '+.2g')} in all."
             others = [other for other in others if other != group]
             if others:
@@ -833,13 +658,10 @@ class ParameterHistory(Sentences):
         is_hidden = self.rates["drifts"] == "unobservable"
         hidden, seen = list(self.rates.index[is_hidden]), self.rates["detectable_rates"][~is_hidden]
         if not self.has_drift and len(seen):
-            each = ", ".join(f"{group} {_share(rate)}" for group, rate in seen.items())
+            each = ", ".join(f"{group} {share_text(rate)}" for group, rate in seen.items())
             yield f"Smallest steady drift a year that is detected with probability 90{SPACE}%: {each}."
         if hidden:
             yield f"A loss of 5{SPACE}% of stiffness in {listed(hidden)} is unobservable in these modes."
-        n_groups, n_modes = len(self.rates.index.drop(ALL_GROUPS, errors="ignore")), len(self.modes)
-        if n_groups > n_modes:
-            yield f"{n_groups} groups and {counted(n_modes, 'mode')} do not determine which group drifts."
         if self.years < 1.5:
             yield f"Records of {self.years:.1f} years hardly distinguish season and drift."
         missing = list(self.modes.index[self.modes["measured"].isna()])
@@ -871,18 +693,3 @@ def _checked(fem: Any, T: Any, F: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
         for table in (found.temperatures, found.frequencies)
     )
     return T.dropna(axis=1, how="all"), F
-
-
-def _step_of(freq: Any) -> int:
-    """Days of a step; an error for what is no period of whole days."""
-    try:
-        step = pd.Timedelta(freq) / DAY if isinstance(freq, str) else np.nan
-    except ValueError:
-        step = np.nan
-    if not step >= 1 or step % 1:
-        raise ValueError(f"freq is {freq!r:.100}; expected a day or some days, such as '1D' or '7D'")
-    return int(step)
-
-
-def _share(value: float) -> str:
-    return f"{significant(100 * abs(float(value)))}{SPACE}%"

@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 from sklearn.base import BaseEstimator, clone
+from sklearn.dummy import DummyRegressor
 from sklearn.utils import check_random_state
 
-from skthermo._core.arrays import Array
 from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correlation_times, usual_step
 from skthermo._core.text import capital, counted, listed, probability_text
 from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, TemperatureCompensator
-from skthermo.monitoring._drift import DailyWeather, ModeTrends, daily_means, regressed
+from skthermo.monitoring._drift import DailyRegression, daily_means, weather_columns
 from skthermo.monitoring._events import WATCH
 from skthermo.monitoring._records import compensators_of
 
@@ -105,8 +104,7 @@ class Retraining:
             lines.append(
                 f"Left out: {row.n_records:,} {what} from {row.start:%Y-%m-%d %H:%M} to {until}, {row.reason}."
             )
-        lines += [f"{capital(note)}." for note in self.notes]
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"{capital(note)}." for note in self.notes)])
 
 
 def retrained(monitor: Any, records: pd.DataFrame | None, *, until: Any = None, force: bool = False) -> Retraining:
@@ -133,18 +131,10 @@ def retrained(monitor: Any, records: pd.DataFrame | None, *, until: Any = None, 
     is_harmless = np.zeros(len(baseline), dtype=bool)
     for event in events[events["harmless"]].itertuples():
         is_harmless |= (baseline.index >= event.start) & (pd.isna(event.end) | (baseline.index <= event.end))
-    changes = level_changes(baseline[~is_harmless], list(monitor.targets_), new.index[0])
-    reasons, notes = what_speaks(changes)
-    step, steady, years = changes[0], changes[-1], (baseline.index[-1] - baseline.index[0]) / YEAR
-    columns = {
-        "change": step.change,
-        "standard_error": step.standard_error,
-        "per_year": steady.change / years,
-        "per_year_error": steady.standard_error / years,
-    }
-    learned = {"baseline": baseline, "prior": prior, "since": since, "detector": _fitted(monitor, baseline)}
+    reasons, notes, table = level_changes(baseline[~is_harmless], list(monitor.targets_), new.index[0])
+    detector = _fitted(monitor, baseline)
     accepted = force or not reasons
-    return Retraining("refit", accepted, reasons, notes, pd.DataFrame(columns), excluded, **learned)
+    return Retraining("refit", accepted, reasons, notes, table, excluded, baseline, prior, since, detector)
 
 
 def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
@@ -159,9 +149,8 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
     prior = prior[prior.index < since]
     if not len(prior):
         raise ValueError(f"since is {since}, but the baseline begins at {trained.index[0]}; expected a later time")
-    events, kept = monitor.events_, monitor.corrected_
+    events, trained, kept = monitor.events_, trained[trained.index >= first], monitor.corrected_
     damage = events[events["acknowledged"] & ~events["harmless"] & (events["start"] >= since)]
-    trained = trained[trained.index >= first]
     known = pd.concat([trained, kept[~kept.index.isin(trained.index)]]).sort_index()
     own, excluded = may_train(_until(known[known.index >= since], until), damage, monitor.faults_, is_in_place=True)
     missing = [str(name) for name in monitor.targets_ if own[name].notna().sum() < 2]
@@ -169,16 +158,14 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
         few = f"fewer than two records of {listed(missing)} since {since}"
         return Retraining("new baseline", False, (few,), (), pd.DataFrame(), excluded)
     table, moved = at_new_level(monitor, prior, own)
-    baseline = pd.concat([moved, own])
+    baseline, left = pd.concat([moved, own]), prior if len(moved) else None
     note = (
         f"{counted((own.index[-1] - own.index[0]).days + 1, 'day')} and {counted(len(own), 'record')} since "
         f"{since:%Y-%m-%d %H:%M}; {counted(len(moved), 'older record')}, moved to the new level, stand for weather not "
         "met since"
     )
-    learned = {"baseline": baseline, "prior": prior if len(moved) else None, "since": since}
-    return Retraining(
-        "new baseline", True, (), (note,), table, excluded, **learned, detector=_fitted(monitor, baseline)
-    )
+    detector = _fitted(monitor, baseline)
+    return Retraining("new baseline", True, (), (note,), table, excluded, baseline, left, since, detector)
 
 
 def may_train(
@@ -214,47 +201,23 @@ def may_train(
     return masked[kept & ~empty], excluded[excluded["n_records"] > 0].reset_index(drop=True)
 
 
-@dataclass(frozen=True)
-class LevelChange:
-    """A change of the responses that follows a profile in time, from 0 to 1, and that weather does not explain.
+def level_changes(
+    records: pd.DataFrame, targets: list[Any], since: pd.Timestamp, chance: float = 1e-3, matters: float = 0.2
+) -> tuple[tuple[str, ...], tuple[str, ...], pd.DataFrame]:
+    """What speaks against learning from records since a time, notes, and the change of each mode.
 
-    Changes are relative, or in the unit of a response that is not positive. ``size`` is their length in standard
-    deviations of a day's noise, ``p_value`` the probability of one as large by chance, allowing for ``what`` else was
-    tried, and ``is_clear`` says whether weather could hide it.
-    """
-
-    what: str
-    change: pd.Series
-    standard_error: pd.Series
-    size: float
-    p_value: float
-    is_clear: bool
-
-    def __str__(self) -> str:
-        worst = (self.change / self.standard_error).abs().idxmax()
-        return (
-            f"{self.what}, beside the weather, {worst} changes by {self.change[worst]:+.2g} +- "
-            f"{self.standard_error[worst]:.1g}, all modes together by {self.size:.2g} standard deviations of a day "
-            f"(p value {probability_text(self.p_value)})"
-        )
-
-
-def level_changes(records: pd.DataFrame, targets: list[Any], since: pd.Timestamp) -> list[LevelChange]:
-    """Steps each 30 days from the first new record on, and lines over the new and over all records, beside the weather.
-
-    Daily means are regressed on the weather and on one profile at a time, as for drift, but slow means of the weather
-    and noise that lasts for months would hide a step: a refit is refused rather than that; Hotelling's law, times the
-    number of profiles, tells chance.
+    Daily means are regressed on the weather and on a step each 30 days from that time on, or a line over the new or
+    over all records. What speaks against it is a change beyond chance, in view of their number, that moves a detector's
+    rates. Slow means of the weather and noise that lasts for months could hide a step; a refit is refused rather than
+    that, and they are left out.
     """
     F = records[targets]
     is_positive = F.min() > 0
-    scale = F.std().where(~is_positive, 0.01) * 100  # others vary by about 0.01 then, as logarithms do
-    y = pd.DataFrame(
-        {name: np.log(F[name]) if is_positive[name] else (F[name] - F[name].mean()) / scale[name] for name in F}
-    )
-    daily_T, daily_y = daily_means(records.drop(columns=targets), y)
-    T, y, days = daily_T.to_numpy(), daily_y.to_numpy(), daily_y.index
-    X = DailyWeather.fitted(T, half_lives=(5.0,)).of_days(T)[0] if T.shape[1] else np.ones((len(y), 1))
+    scale = (100 * F.std()).where(~is_positive, 1.0)  # others vary by about 0.01 then, as logarithms do
+    y = F / scale
+    y.loc[:, is_positive] = np.log(F.loc[:, is_positive])
+    daily = daily_means(records.drop(columns=targets)).join(daily_means(y))
+    days, X = daily.index, weather_columns(daily.drop(columns=targets).to_numpy(), half_lives=(5.0,))
     first, places = days.searchsorted(since, side="right") - 1, np.arange(len(days))
     profiles = {
         f"from {days[start]:%Y-%m-%d} on": (places >= start).astype(float)
@@ -262,40 +225,34 @@ def level_changes(records: pd.DataFrame, targets: list[Any], since: pd.Timestamp
     }
     for what, start in (("steadily over the new records", first), ("steadily over all records", 0)):
         profiles[what] = np.maximum((places - start) / max(len(days) - 1 - start, 1), 0.0)
-    found, n = [], len(targets)
+    found = []
     for what, profile in profiles.items():
-        equations, noise = regressed(np.column_stack([X, profile]), y, 1, lasts_for_months=False)
-        freedom = noise.independent((~np.isnan(y)).sum(axis=0).max()) - X.shape[1]
-        trend = ModeTrends.fitted(equations, noise, np.eye(n), 1, freedom)
-        day = noise.covariance / (1 - noise.correlation**2)
-        squares = [float(trend.mean @ np.linalg.solve(one, trend.mean)) for one in (trend.covariance, day)]
-        own = max(freedom - n + 1, 1.0)
-        p_value = stats.f.sf(squares[0] * own / (n * max(freedom, n)), n, own) * len(profiles)
-        errors = np.sqrt(np.diag(trend.covariance))
-        is_clear = bool(np.median(errors / np.sqrt(np.diag(day))) <= 0.5)
-        named = (pd.Series(one, pd.Index(targets)) * scale for one in (trend.mean, errors))
-        found.append(LevelChange(what, *named, squares[1] ** 0.5, min(float(p_value), 1.0), is_clear))
-    return found
-
-
-def what_speaks(
-    changes: list[LevelChange], chance: float = 1e-3, matters: float = 0.2
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What speaks against learning: a change beyond chance that moves a detector's rates; and notes."""
-    clearest, step, notes = min(changes, key=lambda one: one.p_value), changes[0], []
-    reasons = (
-        f"the new records are not those of the baseline's structure: {clearest}; a detector fitted to them would not "
-        "detect that change",
-    )
-    if clearest.p_value >= chance or clearest.size <= matters:
-        reasons = ()
-        notes += [f"small but significant change: {clearest}"] if clearest.p_value < 0.01 else []
-    if not step.is_clear:
-        notes.append(
-            "the new records have hardly any weather in common with the baseline: a change between the two of up "
-            f"to {2 * step.standard_error.median():.2g} could not be distinguished from weather"
+        fit = DailyRegression.fitted(X, profile[:, np.newaxis], daily[targets].to_numpy(), n_waves=0)
+        change, covariance, p_value = fit.chance()
+        day = pd.DataFrame(fit.rest).cov().to_numpy()
+        size = float(change @ np.linalg.solve(day, change)) ** 0.5  # in standard deviations of a day
+        table = pd.DataFrame({"change": change, "standard_error": np.sqrt(np.diag(covariance))}, targets)
+        is_clear = bool((table["standard_error"] / np.sqrt(np.diag(day))).median() <= 0.5)
+        found.append((min(p_value * len(profiles), 1.0), what, size, is_clear, table.mul(scale, axis=0)))
+    step, steady, years = found[0], found[-1], (records.index[-1] - records.index[0]) / YEAR
+    yearly = (steady[-1] / years).set_axis(["per_year", "per_year_error"], axis=1)
+    p_value, what, size, _, table = min(found, key=lambda one: one[0])
+    reasons, notes = (), ()
+    if p_value < chance and size > matters:
+        worst = table.loc[(table["change"] / table["standard_error"]).abs().idxmax()]
+        reasons = (
+            f"the new records are not those of the baseline's structure: {what}, beside the weather, {worst.name} "
+            f"changes by {worst['change']:+.2g} +- {worst['standard_error']:.1g}, all modes together by {size:.2g} "
+            f"standard deviations of a day (p value {probability_text(p_value)}); a detector fitted to them would not "
+            "detect that change",
         )
-    return reasons, tuple(notes)
+    if not step[3]:
+        hidden = 2 * step[-1]["standard_error"].median()
+        notes = (
+            "the new records have hardly any weather in common with the baseline: a change between the two of up to "
+            f"{hidden:.2g} could not be distinguished from weather",
+        )
+    return reasons, notes, step[-1].join(yearly)
 
 
 def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -324,27 +281,18 @@ def at_new_level(monitor: Any, prior: pd.DataFrame, own: pd.DataFrame) -> tuple[
 
 def residuals_of(
     detector: BaseEstimator, baseline: pd.DataFrame, new: pd.DataFrame, targets: list[Any]
-) -> tuple[pd.DataFrame, pd.DataFrame, Array]:
+) -> tuple[pd.DataFrame, pd.DataFrame, Any]:
     """Residuals of a baseline, out of fold, and of new records, by the regression within a detector.
 
     Also which are relative, ln f - ln f expected. Without weather, they are departures from the mean.
     """
-    if len(baseline.columns) == len(targets):
-        level, is_relative = baseline[targets].mean(), baseline[targets].min() > 0
-        old, own = (
-            pd.DataFrame(
-                {
-                    name: np.log(one[name] / level[name]) if is_relative[name] else one[name] - level[name]
-                    for name in one
-                }
-            )
-            for one in (baseline[targets], new[targets])
-        )
-        return old, own, is_relative.to_numpy()
     plain = TemperatureCompensator(targets=targets)
     for part in compensators_of(detector):
         is_whole = isinstance(part, CompensatedDetector)
         plain = TemperatureCompensator(part.regressor, targets=part.targets, cv=part.cv) if is_whole else clone(part)
+    if len(baseline.columns) == len(targets):
+        plain = TemperatureCompensator(DummyRegressor(), targets=targets)
+        baseline, new = (table.assign(nothing=0.0) for table in (baseline, new))
     with collected(drop_others=True):
         left = np.asarray(plain.fit_transform(baseline)), np.asarray(plain.transform(new))
     names = list(plain.get_feature_names_out())

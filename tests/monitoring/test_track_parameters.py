@@ -143,8 +143,8 @@ def test_wrong_input_is_refused(healthy):
         track_parameters(fem, T, F, significance=2)
     with pytest.raises(ValueError, match="0 sample"):
         track_parameters(fem, T[:0], F[:0])
-    for freq in ("month", "ME", 7, "0D", "NaT"):
-        with pytest.raises(ValueError, match=f"freq is {freq!r}; expected a day or some days"):
+    for freq in ("month", "ME", 7, "0D", "NaT", "12h"):
+        with pytest.raises(ValueError, match=f"freq is {freq!r}; expected"):
             track_parameters(fem, T, F, freq=freq)
 
 
@@ -191,4 +191,3 @@ def test_mirror_images_are_named_together():
     assert (history.rates.loc[["k1", "k6"], "drifts"] == "perhaps").all()
     assert history.alternatives == {"k1": ["k1", "k6"]} or history.alternatives == {"k6": ["k1", "k6"]}
     assert_allclose(history.rates.loc["k1", "per_year"], -0.02, atol=3 * history.rates.loc["k1", "standard_error"])
-    assert "do not determine which group drifts" in history.summary()
