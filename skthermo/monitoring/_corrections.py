@@ -14,7 +14,7 @@ from skthermo._core.arrays import Array
 from skthermo._core.frames import MISSING_CODES, midnights
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._drift import DriftFollower
-from skthermo.monitoring._sensors import SensorWatch, Watched
+from skthermo.monitoring._sensors import SensorWatch
 from skthermo.preprocessing.checks import Plausible
 
 
@@ -95,25 +95,21 @@ class Corrections:
         T, F = self._split(raw.mask(wrong))
         notes, sensors, drift, taken_out = self._missing(raw, wrong), state.sensors, state.drift, {}
         if self.sensors is None:
-            none = np.zeros(len(raw), dtype=np.int64)
-            seen = Watched(T.drop(columns=self.reference), F, np.zeros(F.shape, dtype=bool), [""] * len(raw), none)
+            seen_T, seen_F = T.drop(columns=self.reference), F
+            about = pd.DataFrame({"n_held": 0.0, "held": "", "n_left_out": 0, "note": ""}, raw.index)
         else:  # it is to see what is implausible, but not what stands for a missing value
-            seen = self.sensors.masked(sensors, T, F, acknowledged)
+            seen_T, seen_F, about = self.sensors.masked(sensors, T, F, acknowledged)
             is_missing = wrong & (raw.isin(MISSING_CODES) | np.isinf(raw))
             sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
-        responses = seen.F
+        responses = seen_F
         if self.drift is not None:
-            responses = self.drift.corrected(drift, seen.F)
+            responses = self.drift.corrected(drift, seen_F)
             taken_out = self.drift.taken_out(drift).add_prefix("drift ").to_dict()
-            drift = self.drift.advance(drift, seen.T, seen.F.where(seen.F > 0))
-        table = {
-            "n_held": seen.held.sum(axis=1).astype(float),
-            "held": [", ".join(str(name) for name, is_one in zip(F, row, strict=True) if is_one) for row in seen.held],
-            "n_left_out": seen.n_left_out + wrong.sum(axis=1),
-            "note": ["; ".join(filter(None, parts)) for parts in zip(notes, seen.notes, strict=True)],
-        }
-        records = seen.T.join(responses)[[name for name in raw.columns if name not in self.reference]]
-        notes = pd.DataFrame(table | taken_out, raw.index).astype({"held": object, "note": object})
+            drift = self.drift.advance(drift, seen_T, seen_F.where(seen_F > 0))
+        about["n_left_out"] += wrong.sum(axis=1)
+        about["note"] = ["; ".join(filter(None, parts)) for parts in zip(notes, about["note"], strict=True)]
+        records = seen_T.join(responses)[[name for name in raw.columns if name not in self.reference]]
+        notes = about.assign(**taken_out).astype({"held": object, "note": object})
         return records, notes, DayState(state.day, sensors, drift)
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -11,97 +11,76 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, as_floats, median, robust_deviation
-from skthermo._core.frames import DAY, DAY_NS, YEAR, as_index, columns_by_sensor, frame_like
+from skthermo._core.arrays import Array, median, robust_deviation
+from skthermo._core.frames import DAY, YEAR, as_index, days_later, midnight, midnights
+from skthermo._core.saved_frames import SavesFrames
 from skthermo.preprocessing.checks import Plausible, equal_runs
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.gaussian import Gaussian
 
-Counts = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-
 
 @dataclass(frozen=True)
-class Fault:
-    """Position of its column, the other one where two are exchanged (else -1), times in nanoseconds, None as it lasts.
+class Fault(SavesFrames):
+    """A fault of a column, of thermometers with the ``size`` of the departure, or exchanged with an ``other`` one."""
 
-    ``size`` is the departure or the repeated value, ``rate`` that of a drift in a day.
-    """
-
+    column: Hashable
     kind: str
-    column: int
-    since: int
-    detected: int
-    other: int = -1
+    since: pd.Timestamp
+    detected: pd.Timestamp
+    detail: str
+    until: pd.Timestamp | None = None
     size: float = 0.0
-    rate: float = 0.0
-    until: int | None = None
-
-    def detail(self, other: Hashable, unit: str) -> str:
-        value = f"{self.size:.6g} {unit}".rstrip()
-        return {
-            "dead": "has had no value for longer than gaps of the baseline",
-            "stuck": f"repeats {value}; left out",
-            "implausible": f"shows implausible values, such as {value}; left out",
-            "offset": f"{self.size:+.1f} degrees beside the other thermometers; left out",
-            "drift": f"{self.rate * YEAR.days / 12:+.2f} degrees a month beside the other thermometers; left out",
-            "swapped": f"its values are in the column of {other!r}; put back in place",
-        }[self.kind]
+    other: Hashable = None
 
 
 @dataclass(frozen=True)
-class WatchState:
+class WatchState(SavesFrames):
     """Records of the last days, daily means of thermometers over the last months, and all faults as they were found."""
 
-    stamps: Counts
-    days: Counts
-    values: Array
-    days_of_means: Counts
-    means: Array
+    records: pd.DataFrame
+    means: pd.DataFrame
     faults: tuple[Fault, ...] = ()
 
-    def lasting(self, *kinds: str) -> list[Fault]:
-        return [fault for fault in self.faults if fault.until is None and fault.kind in kinds]
+    def lasting(self, *kinds: str) -> dict[Hashable, Fault]:
+        """By column, faults of some kinds that have not ended."""
+        return {fault.column: fault for fault in self.faults if fault.until is None and fault.kind in kinds}
 
-    def left_out(self) -> dict[int, Fault]:
-        """By position of each column that is left out, the fault for which it is."""
-        return {fault.column: fault for fault in self.lasting("dead", "stuck", "implausible", "offset", "drift")}
+    def left_out(self) -> dict[Hashable, Fault]:
+        """By column that is left out, the fault for which it is."""
+        return self.lasting("dead", "stuck", "implausible", "offset", "drift")
 
-    def opened(self, *args: Any, **values: Any) -> WatchState:
-        return replace(self, faults=(*self.faults, Fault(*args, **values)))
+    def in_place(self, records: pd.DataFrame) -> pd.DataFrame:
+        """Records with exchanged values back in their columns."""
+        swapped = self.lasting("swapped")
+        order = [swapped[name].other if name in swapped else name for name in records]
+        return records[order].set_axis(records.columns, axis=1)
 
-    def changed(self, fault: Fault, **values: Any) -> WatchState:
-        return replace(self, faults=tuple(replace(one, **values) if one is fault else one for one in self.faults))
-
-    def in_place(self, values: Array) -> Array:
-        """Values with exchanged ones back in their columns."""
-        order = np.arange(values.shape[1])
-        for fault in self.lasting("swapped"):
-            order[[fault.column, fault.other]] = order[[fault.other, fault.column]]
-        return values[:, order]
+    def updated(self, changes: Mapping[Fault, Fault], found: Sequence[Fault]) -> WatchState:
+        """With faults in place of others, and more."""
+        return replace(self, faults=(*(changes.get(fault, fault) for fault in self.faults), *found))
 
 
-@dataclass(frozen=True)
-class Watched:
-    """Records without what sensors at fault show, and what became of their values.
+def season_of(days: pd.DatetimeIndex) -> Array:
+    """Two harmonics of the year."""
+    angle = 2 * np.pi * days.day_of_year.to_numpy()[:, np.newaxis] * (DAY / YEAR)
+    return np.hstack([np.sin(angle), np.cos(angle), np.sin(2 * angle), np.cos(2 * angle)])
 
-    ``held`` are responses that were set aside although the structure may have moved them, (n_records, n_responses).
-    ``notes`` say of each record what was left out, ``n_left_out`` how many of its values.
+
+def windows(rest: pd.DataFrame) -> Array:
+    """Medians of departures over 3, 7 and 30 days, and steps from the month before to the last 3 and 7 days.
+
+    For each day, (n_days, n_windows, n_thermometers); NaN where fewer than half of the days have a value.
     """
-
-    T: pd.DataFrame
-    F: pd.DataFrame
-    held: Mask
-    notes: list[str]
-    n_left_out: Counts
+    last = {n: rest.rolling(n, min_periods=n // 2 + 1).median() for n in (3, 7, 30)}
+    return np.stack([*last.values(), *(last[n] - last[30].shift(n) for n in (3, 7))], axis=1)
 
 
 @dataclass(frozen=True)
 class Thermometers:
     """Daily means of thermometers, each predicted from the others and, after a whole year, the season.
 
-    ``known`` are the lowest and highest means of the baseline; ``limits``, (n_windows, n_thermometers), medians of
-    departures that are beyond chance, of the `windows`.
+    ``known`` are the lowest and highest means of the baseline; ``limits`` are medians of departures that are beyond
+    chance, (n_windows, n_thermometers), of the `windows`.
     """
 
     together: Gaussian
@@ -109,74 +88,59 @@ class Thermometers:
     limits: Array
 
     @classmethod
-    def fitted(cls, days: Counts, means: Array, least: float = 1.0, sigmas: float = 5.0) -> Thermometers:
+    def fitted(cls, means: pd.DataFrame, least: float = 1.0, sigmas: float = 5.0) -> Thermometers:
         """Limits are so many standard deviations of a median, as far as the baseline itself goes, and a degree."""
-        has_season = bool(days[-1] - days[0] >= 330)
-        rows = np.hstack([means, harmonics(days)]) if has_season else means
-        folds = days // 15 % 5 if has_season else np.arange(len(days)) * 5 // len(days)
+        values, number = means.to_numpy(), ((means.index - means.index[0]) / DAY).to_numpy().round().astype(int)
+        has_season = number[-1] >= 330
+        rows = np.hstack([values, season_of(means.index)]) if has_season else values
 
         def learned(train: NDArray[np.intp]) -> Thermometers:
-            found = Gaussian.fitted(rows[train][~np.isnan(means[train]).all(axis=1)])
+            found = Gaussian.fitted(rows[train][~np.isnan(values[train]).all(axis=1)])
             own = np.diag(1e-6 * np.diag(found.covariance) + 0.05**2)  # thermometers are not better than that
-            known = np.array([f.reduce(means[train]) for f in (np.fmin, np.fmax)])
+            known = np.array([f.reduce(values[train]) for f in (np.fmin, np.fmax)])
             return cls(Gaussian(found.mean, found.covariance + own), known, np.empty(0))
 
         def departures(train: NDArray[np.intp]) -> Any:
             part = learned(train)
-            return lambda test: part.departures(days[test], means[test])
+            return lambda test: part.departures(means.iloc[test]).to_numpy()
 
-        rest = out_of_fold(departures, folds)
-        found = np.array([windows(rest[max(stop - 40, 0) : stop]) for stop in range(1, len(rest) + 1)])
-        spread = sigmas * robust_deviation(found.reshape(len(found), -1)).reshape(found.shape[1:])
+        folds = number // 15 % 5 if has_season else np.arange(len(means)) * 5 // len(means)
+        found = windows(pd.DataFrame(out_of_fold(departures, folds)))
         largest = 1.2 * np.nanmax(np.abs(found), axis=0, initial=0.0)
-        return replace(learned(np.arange(len(days))), limits=np.fmax(np.fmax(spread, largest), least))
+        spread = robust_deviation(found.reshape(len(found), -1)).reshape(largest.shape)
+        return replace(learned(np.arange(len(means))), limits=np.fmax(np.fmax(sigmas * spread, largest), least))
 
-    def departures(self, days: Counts, means: Array, trusted: Mask | None = None) -> Array:
+    def departures(self, means: pd.DataFrame, trusted: Sequence[Hashable] | None = None) -> pd.DataFrame:
         """Daily means less what the other trusted thermometers predict; NaN where either has no value.
 
         In weather that the baseline does not have, only what goes beyond the prediction's own change by it counts.
         """
-        n, found = means.shape[1], np.full(means.shape, np.nan)
-        season = harmonics(days)[:, : len(self.together.mean) - n]
-        for sensor in range(n):
-            others = np.where(
-                np.arange(n) == sensor, np.nan, means if trusted is None else np.where(trusted, means, np.nan)
-            )
-            has_others = ~np.isnan(others).all(axis=1)
+        values, sensors = means.to_numpy(), list(means)
+        season = season_of(means.index)[:, : len(self.together.mean) - len(sensors)]
+        is_trusted = np.array([trusted is None or name in trusted for name in sensors])
+        found = np.full(values.shape, np.nan)
+        for place in range(len(sensors)):
+            others = np.where(is_trusted & (np.arange(len(sensors)) != place), values, np.nan)
+            known = ~np.isnan(others).all(axis=1)
             expected, within = (
-                np.where(has_others, self.together.completed(np.hstack([one, season]))[0][:, sensor], np.nan)
+                self.together.completed(np.hstack([one, season])[known])[0][:, place]
                 for one in (others, np.clip(others, *self.known))
             )
-            rest, beyond = means[:, sensor] - expected, np.abs(expected - within) / 2
-            found[:, sensor] = np.sign(rest) * np.maximum(np.abs(rest) - beyond, 0.0)
-        return found
+            rest = values[known, place] - expected
+            found[known, place] = np.sign(rest) * np.maximum(np.abs(rest) - np.abs(expected - within) / 2, 0.0)
+        return pd.DataFrame(found, means.index, means.columns)
 
-
-def harmonics(days: Counts) -> Array:
-    """Two harmonics of the year."""
-    angle = 2 * np.pi * days[:, np.newaxis] / (YEAR / DAY)
-    return np.hstack([np.sin(angle), np.cos(angle), np.sin(2 * angle), np.cos(2 * angle)])
-
-
-def windows(rest: Array) -> Array:
-    """Medians of departures in the last 3, 7 and 30 days, and steps from the month before to the last 3 and 7 days.
-
-    NaN where fewer than half of the days have a value, (n_windows, n_thermometers).
-    """
-
-    def typical(rows: Array, n_days: int) -> Array:
-        is_known = (~np.isnan(rows)).sum(axis=0) > n_days / 2
-        return np.where(is_known, median(rows) if len(rows) else np.nan, np.nan)
-
-    last = {n_days: typical(rest[-n_days:], n_days) for n_days in (3, 7, 30)}
-    return np.array([*last.values(), *(last[n] - typical(rest[-30 - n : -n], 30) for n in (3, 7))])
+    def excess(self, rest: pd.DataFrame) -> pd.Series:
+        """The largest median departure of each thermometer at the end, over its limit."""
+        size = np.abs(windows(rest[-40:])[-1]) / self.limits
+        return pd.Series(np.nan_to_num(size).max(axis=0), rest.columns)
 
 
 @dataclass(frozen=True)
 class Responses:
     """Responses in their own units beside what the weather predicts.
 
-    ``together`` is the distribution of temperatures and of responses in robust deviations from their ``centre``.
+    ``together`` is the distribution of temperatures and responses, ``reach`` the lowest and highest responses.
     ``limits`` are departures from which a value that moves alone is implausible: more than 25 robust deviations, a
     quarter of its level, and three times the departure that one value in a thousand of the baseline exceeds.
     ``deviations`` are those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may
@@ -184,31 +148,27 @@ class Responses:
     """
 
     together: Gaussian
-    centre: Array
-    scatter: Array
     reach: Array
     limits: Array
     deviations: Array
-    pairs: list[tuple[int, int]]
+    pairs: list[list[int]]
 
     @classmethod
-    def fitted(cls, temperatures: Array, values: Array, days: Counts, units: Sequence[str]) -> Responses:
-        centre, scatter = median(values), robust_deviation(values)
-        least = 1e-4 * np.fmax(np.where(scatter > 0, scatter, np.abs(centre)), 1e-8)
-        scatter = np.fmax(scatter, least)
-        rows = np.hstack([temperatures, (values - centre) / scatter])
+    def fitted(cls, temperatures: Array, values: Array, days: pd.DatetimeIndex, units: Sequence[str]) -> Responses:
+        centre, scatter = np.abs(median(values)), robust_deviation(values)
+        least = 1e-4 * np.fmax(np.where(scatter > 0, scatter, centre), 1e-8)
+        rows = np.hstack([temperatures, values])
         found = Gaussian.fitted(rows[~np.isnan(rows).all(axis=1)])
         own = np.diag(1e-6 * np.maximum(np.diag(found.covariance), 1e-8))
         reach = np.array([f.reduce(values) for f in (np.fmin, np.fmax)])
-        together = Gaussian(found.mean, found.covariance + own)
-        bare = cls(together, centre, scatter, reach, scatter, scatter, [])
+        bare = cls(Gaussian(found.mean, found.covariance + own), reach, centre, centre, [])
         rest = bare.residuals(temperatures, values)[0]
-        usual = np.fmax(25 * robust_deviation(rest), 0.25 * np.abs(centre))
-        limits = np.fmax(usual, 3 * np.nanquantile(np.abs(rest), 0.999, axis=0))
+        limits = np.fmax(25 * robust_deviation(rest), np.fmax(0.25 * centre, 25 * least))
+        limits = np.fmax(limits, 3 * np.nanquantile(np.abs(rest), 0.999, axis=0))
         deviations = np.fmax(robust_deviation(pd.DataFrame(rest).groupby(days).median().to_numpy()), least)
-        sizes = np.fmax(np.abs(centre), scatter), scatter
+        sizes = np.fmax(centre, scatter), np.fmax(scatter, least)
         pairs = [
-            (a, b)
+            [a, b]
             for a, b in combinations(range(len(centre)), 2)
             if units[a] == units[b] and all(max(size[a], size[b]) <= 10 * min(size[a], size[b]) for size in sizes)
         ]
@@ -216,47 +176,39 @@ class Responses:
 
     def residuals(self, temperatures: Array, values: Array) -> tuple[Array, Array]:
         """Responses minus those that the weather predicts, and these."""
-        rows = np.hstack([temperatures, np.full(values.shape, np.nan)])
-        expected = self.centre + self.scatter * self.together.completed(rows)[0][:, temperatures.shape[1] :]
-        expected = np.clip(np.where(np.isnan(expected), self.centre, expected), *self.reach)
+        n = temperatures.shape[1]
+        expected = self.together.completed(np.hstack([temperatures, np.full(values.shape, np.nan)]))[0][:, n:]
+        expected = np.clip(np.where(np.isnan(expected), self.together.mean[n:], expected), *self.reach)
         return values - expected, expected
 
-    def implausible(self, values: Array, rest: Array) -> Mask:
+    def implausible(self, values: Array, rest: Array) -> NDArray[np.bool_]:
         """Values farther from the prediction than damage explains while the others of their record stay.
 
         Whatever the others do, none is a thousand times as far, and none zero or below where the baseline is above.
         """
         size = np.abs(rest) / self.limits
-        far, never = size > 1, (size > 1000) | ((values <= 0) & (self.reach[0] > 0))
-        rows = far.any(axis=1) & (rest.shape[1] >= 3)
-        alone = np.zeros(far.shape, dtype=bool)
-        alone[rows] = far[rows] & (median(size[rows].T) < 0.2)[:, np.newaxis]
-        return alone | never
+        never = (size > 1000) | ((values <= 0) & (self.reach[0] > 0))
+        is_alone = (rest.shape[1] >= 3) & (median(size.T) < 0.2)
+        return never | ((size > 1) & is_alone[:, np.newaxis])
 
     def exchanged(
-        self, rest: Array, expected: Array, days: Counts, certain: float = 20.0
-    ) -> list[tuple[int, int, int]]:
+        self, rest: Array, expected: Array, days: pd.DatetimeIndex, certain: float = 20.0
+    ) -> list[tuple[list[int], pd.Timestamp]]:
         """Pairs whose values of the last days are exchanged, and the first of these days.
 
         Both come much nearer to their places by it: one has risen and the other one fallen, by about their distance. No
         damage does that. A day adds at most 50 to the logarithm of the odds.
         """
-        found = []
-        for first, second in self.pairs:
-            both, total = [first, second], 0.0
-            for day in np.unique(days)[::-1]:
-                today, places = (median(table[days == day][:, both]) for table in (rest, expected))
-                if np.isnan(today).any():
-                    continue
-                gap = places[1] - places[0]
-                here = today / self.deviations[both]
-                there = np.array([today[1] + gap, today[0] - gap]) / self.deviations[both]
-                if not (np.abs(there) < np.abs(here) / 2).all():
-                    break
-                total += min((here @ here - there @ there) / 2, 50.0)
-                if total > certain:
-                    found.append((first, second, int(day)))
-                    break
+        found, (daily, places) = [], (pd.DataFrame(one).groupby(days).median()[::-1] for one in (rest, expected))
+        for pair in self.pairs:
+            here, (first, second), deviations = daily.to_numpy()[:, pair], places.to_numpy()[:, pair].T, self.deviations
+            known = ~np.isnan(here).any(axis=1)
+            there = here[:, ::-1] + np.column_stack([second - first, first - second])
+            here, there = ((one[known] / deviations[pair]) ** 2 for one in (here, there))
+            nearer = np.logical_and.accumulate((there < here / 4).all(axis=1))
+            odds = np.minimum((here - there).sum(axis=1) / 2, 50.0)[nearer].cumsum()
+            if (odds > certain).any():
+                found.append((pair, daily.index[known][np.argmax(odds > certain)]))
         return found
 
 
@@ -268,21 +220,20 @@ class SensorWatch:
     it, and without no other one. A response that moves may be damaged: it is set aside only where no damage explains
     its values. References check thermometers and fill their gaps.
 
-    The state is immutable, and what it says depends on complete days alone. ``runs``, (2, n_columns), are numbers of
-    records from which missing or equal values are a fault.
+    The state is immutable, and what it says depends on complete days alone. ``runs`` are numbers of records from which
+    missing or equal values of a column are a fault.
     """
 
     sensors: list[Hashable]
-    columns: list[list[int]]
-    is_reference: Mask
+    reference: list[Hashable]
     modes: list[Hashable]
-    units: list[str]
-    zone: str
+    units: dict[Hashable, str]
     weather: Plausible
-    runs: Counts
+    runs: dict[Hashable, tuple[int, int]]
     per_day: float
     thermometers: Thermometers | None
     expected: Responses
+    start_: WatchState
 
     @classmethod
     def fitted(
@@ -293,268 +244,210 @@ class SensorWatch:
         reference: Sequence[Hashable] = (),
         units: Mapping[Hashable, str] | None = None,
     ) -> SensorWatch:
-        """Learn from the baseline; lags of a sensor may have columns of their own.
-
-        ``reference`` names columns of T, ``units`` are texts by column.
-        """
-        by_sensor, T, F = columns_by_sensor(T), T.sort_index(kind="stable"), F.sort_index(kind="stable")
-        columns, days, n_sensors = list(by_sensor.values()), local_days(T.index), len(by_sensor)
-        temperatures, responses = as_floats(T)[:, [own[0] for own in columns]], as_floats(F)
-        texts = [dict(units or {}).get(name, "") for name in (*by_sensor, *F.columns)]
-        n_days = len(np.unique(days))
-        per_day, thermometers = len(days) / max(n_days, 1), None
-        if n_sensors > 1 and n_days >= 3 * n_sensors + 5 and not np.isnan(temperatures).all(axis=0).any():
-            thermometers = Thermometers.fitted(*means_by_day(days, temperatures, 0.3 * per_day))
+        """Learn from the baseline; ``reference`` names columns of T, ``units`` are texts by column."""
+        T, F, units = T.sort_index(kind="stable"), F.sort_index(kind="stable"), dict(units or {})
+        records, days = T.join(F) if T.index.is_unique else pd.concat([T, F], axis=1), midnights(T.index)
+        per_day = len(days) / max(days.nunique(), 1)
+        means, has_values = means_by_day(T, per_day), T.notna().any().all()
+        can_compare = T.shape[1] > 1 and len(means) >= 3 * T.shape[1] + 5 and has_values
+        filled = records.dropna(how="all")
         return cls(
-            sensors=list(by_sensor),
-            columns=columns,
-            is_reference=np.array([sensor in set(reference) for sensor in by_sensor], dtype=bool),
-            modes=list(F.columns),
-            units=texts,
-            zone="" if T.index.tz is None else str(T.index.tz),
-            weather=Plausible.of_weather(temperatures),
-            runs=run_limits(np.hstack([temperatures, responses]), per_day),
+            sensors=list(T),
+            reference=[name for name in T if name in reference],
+            modes=list(F),
+            units={name: units.get(name, "") for name in records},
+            weather=Plausible.of_weather(T.to_numpy()),
+            runs={name: run_limits(filled[name].to_numpy(), per_day) for name in records},
             per_day=per_day,
-            thermometers=thermometers,
-            expected=Responses.fitted(temperatures, responses, days, texts[n_sensors:]),
+            thermometers=Thermometers.fitted(means) if can_compare else None,
+            expected=Responses.fitted(T.to_numpy(), F.to_numpy(), days, [units.get(name, "") for name in F]),
+            start_=WatchState(records.iloc[:0], means.iloc[:0]),
         )
 
     def start(self) -> WatchState:
-        none, n_sensors = np.empty(0, np.int64), len(self.sensors)
-        return WatchState(none, none, np.empty((0, n_sensors + len(self.modes))), none, np.empty((0, n_sensors)))
+        return self.start_
 
     def faults(self, state: WatchState) -> pd.DataFrame:
-        """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``.
+        """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``."""
+        columns, zone = ["column", "kind", "since", "detected", "until", "detail"], state.records.index.tz
+        table = pd.DataFrame([vars(fault) for fault in state.faults], columns=columns, dtype=object)
+        return table.assign(**{name: as_stamps_of(table[name], zone) for name in columns[2:5]})
 
-        One row a fault, two where two columns are exchanged.
-        """
-        names = [*self.sensors, *self.modes]
-        rows = [
-            (names[own], one.kind, one.since, one.detected, one.until, one.detail(names[other], self.units[own]))
-            for one in state.faults
-            for own, other in [(one.column, one.other), (one.other, one.column)][: 1 if one.other < 0 else 2]
-        ]
-        table = pd.DataFrame(rows, columns=["column", "kind", "since", "detected", "until", "detail"], dtype=object)
-        stamps = ("since", "detected", "until")
-        return table.assign(**{name: as_index(table[name].tolist(), self.zone) for name in stamps})
-
-    def masked(self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()) -> Watched:
+    def masked(
+        self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()
+    ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
         """Records without what sensors at fault show: NaN there, and exchanged responses back in place.
 
-        What has been ``acknowledged`` as a fault of a sensor, at times in nanoseconds, is not held afterwards.
+        Also, of each record, ``n_held`` responses that were set aside although the structure may have moved them, and
+        their names ``held``; ``n_left_out`` values, and a ``note`` on them. What has been ``acknowledged`` as a fault
+        of a sensor, at times in nanoseconds, is not held afterwards.
         """
-        n, own = len(self.sensors), [columns[0] for columns in self.columns]
-        values, out = as_floats(T).copy(), state.left_out()
-        given = state.in_place(np.hstack([values[:, own], as_floats(F)]))
-        is_far, is_out = self._evaluated(given)[0], np.isin(np.arange(given.shape[1]), list(out))
-        removed, held = (is_far | is_out) & ~np.isnan(given), is_far[:, n:].copy()
-        for column, fault in out.items():
-            if column >= n and fault.kind in ("stuck", "implausible"):
-                said = [time for time in acknowledged if time >= fault.since]
-                held[:, column - n] = T.index.as_unit("ns").asi8 <= min(said) if said else True
-        kept = np.where(removed, np.nan, given)
-        for sensor in np.flatnonzero(is_out[:n]):
-            values[:, self.columns[sensor]] = np.nan
-        values[:, own] = kept[:, :n]
-        if self.is_reference.any():
-            rows = np.hstack([kept[:, :n], np.full((len(kept), len(self.modes)), np.nan)])
-            values[:, own] = self.expected.together.completed(rows)[0][:, :n]
-        references = [
-            k for columns, is_one in zip(self.columns, self.is_reference, strict=True) if is_one for k in columns
-        ]
-        inputs = frame_like(T, values)[T.columns.delete(references)]
-        notes = self._notes(state, given, is_far & ~is_out)
-        return Watched(inputs, frame_like(F, kept[:, n:]), held, notes, removed.sum(axis=1))
-
-    def _notes(self, state: WatchState, given: Array, far: Mask) -> list[str]:
-        """What was left out of each record, and why."""
-        names = [*map(str, self.sensors), *map(str, self.modes)]
-        lasting = [
-            f"{names[one.column]} is left out ({one.kind} since {as_index([one.since], self.zone)[0]:%Y-%m-%d})"
-            for one in state.left_out().values()
-        ]
-        lasting += [
-            f"{names[one.column]} and {names[one.other]} are exchanged and were put back in place"
-            for one in state.lasting("swapped")
-        ]
+        given, out = state.in_place(T.join(F)), state.left_out()
+        far = self._evaluated(given)[0]
+        removed = (far | given.columns.isin(list(out))) & given.notna()
+        kept, held = given.mask(removed), far[self.modes].copy()
+        for name, fault in out.items():
+            if name in self.modes and fault.kind in ("stuck", "implausible"):
+                said = [time for time in acknowledged if time >= fault.since.value]
+                held[name] = given.index.as_unit("ns").asi8 <= min(said) if said else True
+        if self.reference:
+            rows = kept[self.sensors].reindex(columns=kept.columns).to_numpy()
+            kept[self.sensors] = self.expected.together.completed(rows)[0][:, : len(self.sensors)]
+        lasting = [f"{name} is left out ({one.kind} since {one.since:%Y-%m-%d})" for name, one in out.items()]
+        for name, one in state.lasting("swapped").items():
+            if self.modes.index(name) < self.modes.index(one.other):
+                lasting.append(f"{name} and {one.other} are exchanged and were put back in place")
         notes = ["; ".join(lasting)] * len(given)
+        far = far & ~far.columns.isin(list(out))
         for row in np.flatnonzero(far.any(axis=1)):
-            values = [f"{names[k]} is {given[row, k]:.4g} {self.units[k]}".rstrip() for k in np.flatnonzero(far[row])]
-            notes[row] = "; ".join([f"{', '.join(values)}: implausible, left out", *lasting])
-        return notes
+            values = given.iloc[row][far.iloc[row]]
+            said = ", ".join(f"{name} is {value:.4g} {self.units[name]}".rstrip() for name, value in values.items())
+            notes[row] = "; ".join([f"{said}: implausible, left out", *lasting])
+        about = {
+            "n_held": held.sum(axis=1).astype(float),
+            "held": [", ".join(map(str, held.columns[row])) for row in held.to_numpy()],
+            "n_left_out": removed.sum(axis=1),
+            "note": notes,
+        }
+        inputs = [name for name in self.sensors if name not in self.reference]
+        return kept[inputs], kept[self.modes], pd.DataFrame(about, given.index)
 
     def advance(self, state: WatchState, T_day: pd.DataFrame, F_day: pd.DataFrame) -> WatchState:
         """The state after one complete day with these records, if any."""
         if not len(T_day):
             return state
-        days, n = local_days(T_day.index), len(self.sensors)
-        values = np.hstack([as_floats(T_day)[:, [columns[0] for columns in self.columns]], as_floats(F_day)])
-        known = np.where(self.weather.implausible(values[:, :n]), np.nan, values[:, :n])
-        day, mean = means_by_day(days, known, 0.3 * self.per_day)
-        span = 5 + int(np.ceil(self.runs.max(initial=0) / self.per_day))
-        recent, recent_means = state.days > days[-1] - span, state.days_of_means > days[-1] - 120
-        state = WatchState(
-            stamps=np.r_[state.stamps[recent], T_day.index.as_unit("ns").asi8],
-            days=np.r_[state.days[recent], days],
-            values=np.vstack([state.values[recent], values]),
-            days_of_means=np.r_[state.days_of_means[recent_means], day],
-            means=np.vstack([state.means[recent_means], mean]),
-            faults=state.faults,
-        )
-        state = self._with_runs(self._with_exchanges(state))
-        return state if self.thermometers is None else self._with_departures(self._without_ended(state))
+        today = midnight(T_day.index[-1])
+        means = means_by_day(T_day.mask(self.weather.implausible(T_day.to_numpy())), self.per_day)
+        n_days = 5 + int(np.ceil(max(map(max, self.runs.values()), default=0) / self.per_day))
+        records = pd.concat([state.records, T_day.join(F_day)]).loc[days_later(today, 1 - n_days) :]
+        state = WatchState(records, pd.concat([state.means, means])[-120:], state.faults)
+        state = self._with_runs(self._with_exchanges(state, today), today)
+        return state if self.thermometers is None else self._with_departures(state, today)
 
-    def _evaluated(self, values: Array) -> tuple[Mask, Array, Array]:
+    def _evaluated(self, records: pd.DataFrame) -> tuple[pd.DataFrame, Array, Array]:
         """Which values are implausible, responses minus the expected ones, and the expected ones."""
-        temperatures, responses = np.split(values, [len(self.sensors)], axis=1)
+        temperatures, responses = records[self.sensors].to_numpy(), records[self.modes].to_numpy()
         impossible = self.weather.implausible(temperatures)
         rest, expected = self.expected.residuals(np.where(impossible, np.nan, temperatures), responses)
-        return np.hstack([impossible, self.expected.implausible(responses, rest)]), rest, expected
+        far = np.hstack([impossible, self.expected.implausible(responses, rest)])
+        return pd.DataFrame(far, records.index, records.columns), rest, expected
 
-    def _with_exchanges(self, state: WatchState) -> WatchState:
+    def _with_exchanges(self, state: WatchState, today: pd.Timestamp) -> WatchState:
         """Modes that are exchanged from now on, or no longer."""
-        n, since = len(self.sensors), max((one.detected for one in state.faults if one.kind == "swapped"), default=0)
-        recent = (state.days > state.days[-1] - 5) & (state.stamps >= since)
-        _, rest, expected = self._evaluated(state.in_place(state.values[recent]))
-        for first, second, day in self.expected.exchanged(rest, expected, state.days[recent]):
-            known = [one for one in state.lasting("swapped") if {one.column, one.other} == {n + first, n + second}]
-            if known:
-                state = state.changed(known[0], until=self._midnight(day))
-            else:
-                today = self._midnight(state.days[-1])
-                state = state.opened("swapped", n + first, self._midnight(day), today, n + second)
-        return state
+        begin = max([days_later(today, -4), *(one.detected for one in state.faults if one.kind == "swapped")])
+        recent, lasting = state.in_place(state.records.loc[begin:]), state.lasting("swapped")
+        changes, found = {}, []
+        for places, day in self.expected.exchanged(*self._evaluated(recent)[1:], midnights(recent.index)):
+            pair = [self.modes[place] for place in places]
+            known = [lasting[name] for name in pair if name in lasting]
+            changes |= {fault: replace(fault, until=day) for fault in known}
+            for name, other in () if known else (pair, pair[::-1]):
+                detail = f"its values are in the column of {other!r}; put back in place"
+                found.append(Fault(name, "swapped", day, today, detail, other=other))
+        return state.updated(changes, found)
 
-    def _with_runs(self, state: WatchState) -> WatchState:
+    def _with_runs(self, state: WatchState, today: pd.Timestamp) -> WatchState:
         """Columns that are dead, stuck or implausible from now on, or no longer."""
-        is_given, out = ~np.isnan(state.values).all(axis=1), state.left_out()  # empty records tell nothing of a column
-        values, stamps, today = (
-            state.in_place(state.values[is_given]),
-            state.stamps[is_given],
-            self._midnight(state.days[-1]),
-        )
-        far = self._evaluated(values)[0]
-        for column, series in enumerate(values.T):
-            kind, first, size = self._run(series, far[:, column], self.runs[:, column])
-            fault = out.get(column)
-            known = fault.kind if fault is not None and fault.kind in ("dead", "stuck", "implausible") else None
-            if known == kind:
+        records, out = state.in_place(state.records.dropna(how="all")), state.left_out()  # empty records tell nothing
+        far, changes, found = self._evaluated(records)[0], {}, []
+        for name, series in records.items():
+            kind, first, value = run_of(series.to_numpy(), far[name].to_numpy(), *self.runs[name])
+            fault, size = out.get(name), f"{value:.6g} {self.units[name]}".rstrip()
+            is_run = fault is not None and fault.kind in ("dead", "stuck", "implausible")
+            if kind == (fault.kind if is_run else ""):
                 continue
-            if fault is not None and (known or kind):
-                state = state.changed(fault, until=today)
-            if kind:
-                state = state.opened(kind, column, int(stamps[first]), today, size=size)
-        return state
+            if is_run or (kind and fault is not None):
+                changes[fault] = replace(fault, until=today)
+            detail = {
+                "dead": "has had no value for longer than gaps of the baseline",
+                "stuck": f"repeats {size}; left out",
+                "implausible": f"shows implausible values, such as {size}; left out",
+            }
+            found += [Fault(name, kind, records.index[first], today, detail[kind])] if kind else []
+        return state.updated(changes, found)
 
-    def _run(self, series: Array, is_far: Mask, limits: Counts) -> tuple[str | None, int, float]:
-        """Kind of the run of values with which a column ends if it is a fault, its first place, and the last value."""
-        known = np.flatnonzero(~np.isnan(series))
-        last = known[-1] if len(known) else -1
-        if len(series) - 1 - last >= limits[0]:
-            return "dead", last + 1, 0.0
-        if not len(known):
-            return None, 0, 0.0
-        n_far, n_equal = (
-            int(np.append(is_other[known][::-1], True).argmax()) for is_other in (~is_far, series != series[last])
-        )
-        if n_far >= 3:
-            return "implausible", known[-n_far], float(series[last])
-        return ("stuck" if n_equal >= limits[1] else None), known[-n_equal], float(series[last])
-
-    def _departures(self, state: WatchState, trusted: Mask) -> Array:
-        """Departures of thermometers from what the trusted ones predict, without values of other faults."""
-        means, days = state.means.copy(), state.days_of_means
-        for fault in state.faults:
-            if fault.column < len(self.sensors) and (fault.until is not None or fault.kind not in ("offset", "drift")):
-                first, stop = (
-                    local_days(as_index([time], self.zone))[0] for time in (fault.since, fault.until or 2**62)
-                )
-                means[(days >= first) & (days < stop), fault.column] = np.nan
-        return self.thermometers.departures(days, means, trusted)
-
-    def _without_ended(self, state: WatchState, n_days: int = 4) -> WatchState:
+    def _with_departures(self, state: WatchState, today: pd.Timestamp, n_days: int = 4) -> WatchState:
         """Thermometers that have come back to less than half of their departure for some days are used again.
 
-        In its first two months, an offset that goes on may turn out to be a drift.
+        In its first two months, an offset that goes on may turn out to be a drift. The thermometer that departs from
+        the others is left out if without it, and without no other one, none does.
         """
-        days, rest = state.days_of_means, self._departures(state, self._trusted(state))
-        for fault in state.lasting("offset", "drift"):
-            own = rest[:, fault.column]
-            known = np.flatnonzero(~np.isnan(own) & (days * DAY_NS > fault.detected - DAY_NS))[-n_days:]
-            if len(known) == n_days and (np.abs(own[known]) < abs(fault.size) / 2).all():
-                state = state.changed(fault, until=self._midnight(days[known[0]]))
-            elif (days[-1] - 60) * DAY_NS < fault.detected:
-                state = state.changed(fault, **self._change(days, own))
-        return state
-
-    def _change(self, days: Counts, rest: Array) -> dict[str, Any]:
-        """Offset or drift of a thermometer at fault: its first day, its size on the last one, and its rate in a day.
-
-        The one of least squares, a drift where it explains clearly more; the rate of an offset is 0.
-        """
-        known = ~np.isnan(rest)
-        at, values = days[known].astype(float), rest[known]
-        slow = at[: max(len(at) - 6, 0)]
-        shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
-        shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
-        gains, is_drift = shapes @ values, np.arange(len(shapes)) >= len(at)
-        best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
-        first, size = int(np.r_[at, slow][best]), float(gains[best] * shapes[best, -1])
-        rate = float(size / (at[-1] - first + 1)) if is_drift[best] else 0.0
-        return {"kind": "drift" if rate else "offset", "since": self._midnight(first), "size": size, "rate": rate}
-
-    def _with_departures(self, state: WatchState) -> WatchState:
-        """The thermometer that departs from the others, if without it, and without no other one, none does."""
-        trusted = self._trusted(state)
-        rest = self._departures(state, trusted)
-        far = self._excess(rest, trusted)
-        if not (far > 1).any() or 2 * (1 + len(state.lasting("offset", "drift"))) > len(self.sensors):
-            return state
-        resolved = []
-        for sensor in np.flatnonzero((far > far.max() / 2) & ~self.is_reference):
-            others = trusted & (np.arange(len(trusted)) != sensor)
-            if not (self._excess(self._departures(state, others), others) > 1).any():
-                resolved.append(int(sensor))
-        if len(resolved) != 1:
-            return state
-        found = self._change(state.days_of_means, rest[:, resolved[0]])
-        return state.opened(column=resolved[0], detected=self._midnight(state.days[-1]), **found)
-
-    def _excess(self, rest: Array, trusted: Mask) -> Array:
-        """The largest median departure of each trusted thermometer over its limit."""
-        return np.where(trusted, np.nan_to_num(np.abs(windows(rest)) / self.thermometers.limits).max(axis=0), 0.0)
-
-    def _trusted(self, state: WatchState) -> Mask:
-        return ~np.isin(np.arange(len(self.sensors)), list(state.left_out()))
-
-    def _midnight(self, day: int) -> int:
-        stamp = pd.Timestamp(int(day) * DAY_NS)
-        return (stamp.tz_localize(self.zone, nonexistent="shift_forward", ambiguous=True) if self.zone else stamp).value
+        means, changes, found, lasting = state.means.copy(), {}, [], state.lasting("offset", "drift")
+        for fault in state.faults:
+            if fault.column in self.sensors and fault not in lasting.values():
+                is_in = (means.index >= midnight(fault.since)) & (means.index < (fault.until or days_later(today, 1)))
+                means.loc[is_in, fault.column] = np.nan
+        trusted = [name for name in self.sensors if name not in state.left_out()]
+        rest = self.thermometers.departures(means, trusted)
+        for fault in lasting.values():
+            own = rest[fault.column].dropna()
+            last = own[own.index >= fault.detected][-n_days:]
+            if len(last) == n_days and (last.abs() < abs(fault.size) / 2).all():
+                changes[fault] = replace(fault, until=last.index[0])
+            elif today - fault.detected < 60 * DAY:
+                changes[fault] = replace(fault, **change_of(own))
+        excess = self.thermometers.excess(rest)[trusted]
+        if (excess > 1).any() and 2 * (1 + len(lasting)) <= len(self.sensors):
+            resolved = []
+            for name in excess.index[excess > excess.max() / 2].difference(self.reference, sort=False):
+                others = [other for other in trusted if other != name]
+                if self.thermometers.excess(self.thermometers.departures(means, others))[others].max() <= 1:
+                    resolved.append(name)
+            if len(resolved) == 1:
+                found = [Fault(column=resolved[0], detected=today, **change_of(rest[resolved[0]].dropna()))]
+        return state.updated(changes, found)
 
 
-def local_days(stamps: pd.DatetimeIndex) -> Counts:
-    """Calendar day of each stamp in its own time zone, in days since 1970."""
-    return stamps.tz_localize(None).as_unit("ns").asi8 // DAY_NS
+def as_stamps_of(times: pd.Series, zone: Any) -> pd.DatetimeIndex:
+    return as_index([None if pd.isna(time) else time.value for time in times], zone)
 
 
-def means_by_day(days: Counts, values: Array, least: float) -> tuple[Counts, Array]:
-    """Days that have records, and means of those that have enough values; else NaN."""
-    by_day = pd.DataFrame(values).groupby(days)
-    means = by_day.mean().where(by_day.count() >= max(least, 1.0))
-    return means.index.to_numpy(), means.to_numpy()
+def means_by_day(T: pd.DataFrame, per_day: float) -> pd.DataFrame:
+    """Means of the days that have records; NaN without three in ten of their values."""
+    by_day = T.groupby(midnights(T.index))
+    return by_day.mean().where(by_day.count() >= max(0.3 * per_day, 1.0))
 
 
-def run_limits(values: Array, per_day: float) -> Counts:
-    """Numbers of records in a row from which missing and equal values are a fault, (2, n_columns).
+def run_limits(values: Array, per_day: float) -> tuple[int, int]:
+    """Numbers of records in a row from which missing and equal values are a fault.
 
     The third longest run of the baseline is its usual one: its own faults are no rule.
     """
-    limits = np.empty((2, values.shape[1]), dtype=np.int64)
-    for column, series in enumerate(values[~np.isnan(values).all(axis=1)].T):
-        known = np.flatnonzero(~np.isnan(series))
-        equal = equal_runs(series[known])[1]
-        gaps, equal = (np.sort(np.append(runs, [0, 0, 0]))[::-1] for runs in (np.diff(known) - 1, equal[equal > 1]))
-        least = max(3, round(per_day)) * (2 if gaps[0] else 1)
-        limits[0, column] = max(least, np.ceil(min(1.7 * gaps[0], 3.0 * gaps[2])))
-        limits[1, column] = max(5, 4 * equal[2])
-    return limits
+    known = np.flatnonzero(~np.isnan(values))
+    equal = equal_runs(values[known])[1]
+    gaps, equal = (np.sort(np.append(runs, [0, 0, 0]))[::-1] for runs in (np.diff(known) - 1, equal[equal > 1]))
+    least = max(3, round(per_day)) * (2 if gaps[0] else 1)
+    return max(least, int(np.ceil(min(1.7 * gaps[0], 3.0 * gaps[2])))), max(5, 4 * int(equal[2]))
+
+
+def run_of(series: Array, is_far: Array, most_missing: int, most_equal: int) -> tuple[str, int, float]:
+    """Kind of the run of values with which a column ends if it is a fault, else "", its first place, and its value."""
+    known = np.flatnonzero(~np.isnan(series))
+    last = known[-1] if len(known) else -1
+    if len(series) - 1 - last >= most_missing:
+        return "dead", last + 1, 0.0
+    if not len(known):
+        return "", 0, 0.0
+    far, equal = (rows[known[::-1]].cumprod().sum() for rows in (is_far, series == series[last]))
+    if far >= 3:
+        return "implausible", known[-far], series[last]
+    return ("stuck", known[-equal], series[last]) if equal >= most_equal else ("", 0, 0.0)
+
+
+def change_of(rest: pd.Series) -> dict[str, Any]:
+    """Offset or drift of a thermometer at fault: its first day, its size on the last one, and what to say of it.
+
+    The one of least squares by day, a drift where it explains clearly more.
+    """
+    at = ((rest.index - rest.index[0]) / DAY).to_numpy().round()
+    slow = at[: max(len(at) - 6, 0)]
+    shapes = np.vstack([at >= at[:, np.newaxis], np.maximum(at - slow[:, np.newaxis] + 1.0, 0.0)])
+    shapes = shapes / np.sqrt((shapes**2).sum(axis=1, keepdims=True))
+    gains, is_drift = shapes @ rest.to_numpy(), np.arange(len(shapes)) >= len(at)
+    best = int(np.argmax(np.abs(gains) * np.where(is_drift, 0.95, 1.0)))
+    first, size = best % len(at), float(gains[best] * shapes[best, -1])
+    kind, shown = "offset", f"{size:+.1f} degrees"
+    if is_drift[best]:
+        kind, shown = "drift", f"{size / (at[-1] - at[first] + 1) * YEAR.days / 12:+.2f} degrees a month"
+    detail = f"{shown} beside the other thermometers; left out"
+    return {"kind": kind, "since": rest.index[first], "size": size, "detail": detail}
