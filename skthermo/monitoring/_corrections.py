@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._core.arrays import Array
 from skthermo._core.frames import MISSING_CODES, midnights
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._drift import DriftFollower
-from skthermo.monitoring._sensors import SensorWatch
+from skthermo.monitoring._sensors import SensorWatch, values_text
 from skthermo.preprocessing.checks import Plausible
 
 
@@ -59,7 +58,7 @@ class Corrections:
 
     def start(self, day: pd.Timestamp) -> DayState:
         """The state before the first record since the baseline."""
-        return DayState(day, *(None if one is None else one.start() for one in (self.sensors, self.drift)))
+        return DayState(day, *(getattr(one, "start_", None) for one in (self.sensors, self.drift)))
 
     def cleaned(self, raw: pd.DataFrame) -> pd.DataFrame:
         """Records without what no sensor measures."""
@@ -93,7 +92,8 @@ class Corrections:
         """Records of one day, what became of their values, and the state after it."""
         wrong = self.plausible.implausible(raw.to_numpy())
         T, F = self._split(raw.mask(wrong))
-        notes, sensors, drift, taken_out = self._missing(raw, wrong), state.sensors, state.drift, {}
+        notes = values_text(raw, wrong, self.units, "taken as missing")
+        sensors, drift, taken_out = state.sensors, state.drift, {}
         if self.sensors is None:
             seen_T, seen_F = T.drop(columns=self.reference), F
             about = pd.DataFrame({"n_held": 0.0, "held": "", "n_left_out": 0, "note": ""}, raw.index)
@@ -114,15 +114,6 @@ class Corrections:
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
         return records.drop(columns=self.targets), records[self.targets]
-
-    def _missing(self, raw: pd.DataFrame, wrong: Array) -> list[str]:
-        """What is taken as missing of each record."""
-        notes = [""] * len(raw)
-        for row in np.flatnonzero(wrong.any(axis=1)):
-            columns = raw.columns[wrong[row]]
-            parts = [f"{name} is {f'{raw[name].iloc[row]:g} {self.units[name]}'.rstrip()}" for name in columns]
-            notes[row] = f"{', '.join(parts)}: taken as missing"
-        return notes
 
     def faults(self, state: DayState) -> pd.DataFrame:
         """Sensors that have failed."""

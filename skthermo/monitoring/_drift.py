@@ -273,9 +273,6 @@ class DriftFollower:
         state = DriftState(learned, learned.iloc[:0], (0.0,) * len(names))
         return cls(inputs, modes, names, slopes, state, len(learned))
 
-    def start(self) -> DriftState:
-        return self.start_
-
     def advance(self, state: DriftState, T: pd.DataFrame, F: pd.DataFrame, n_weeks: int = 5) -> DriftState:
         """The state at the end of one complete day; as it is without records, or if that day is known already."""
         last = (state.waiting if len(state.waiting) else state.learned).index[-1]
@@ -442,33 +439,23 @@ def track_parameters(
     trends = StiffnessTrends(X, line, y[:, enough], slopes[enough], names)
     best = trends.sets[0] if trends.p_value <= significance else ()
     alternatives = trends.alternatives() if best else {}
-    changes = {}
-    for group, name in enumerate(names):
-        beside = [one for one in best if one != group and name not in alternatives[names[one]]]
-        changes[name] = trends.change(group, beside)
-    shifts = sum((np.outer(changes[names[group]][0], slopes[:, group]) for group in best), np.zeros(y.shape))
+    beside = [[one for one in best if one != k and names[k] not in alternatives[names[one]]] for k in range(len(names))]
+    changes = [trends.change(group, others) for group, others in enumerate(beside)]
+    mean, deviation = (pd.DataFrame(dict(zip(names, some, strict=True)), days) for some in zip(*changes, strict=True))
+    shifts = mean.to_numpy()[:, list(best)] @ slopes[:, list(best)].T
     at_end = np.kron(np.eye(enough.sum()), line[-1:])
-    modes = pd.DataFrame(np.nan, pd.Index(F.columns, name="mode"), ["measured", "explained", "standard_error"])
     errors = np.sqrt(np.diag(at_end @ trends.modes.covariance @ at_end.T))
+    modes = pd.DataFrame(np.nan, pd.Index(F.columns, name="mode"), ["measured", "explained", "standard_error"])
     modes.loc[enough] = np.column_stack([at_end @ trends.modes.change.ravel(), shifts[-1, enough], errors])
-    sides = zip(["estimate", "ci_low", "ci_high"], stats.norm.ppf([0.5, 0.025, 0.975]), strict=True)
-    table = {
-        (name, what): np.exp(mean + side * deviation)[::step]
-        for what, side in sides
-        for name, (mean, deviation) in changes.items()
-    }
+    sides = dict(zip(["estimate", "ci_low", "ci_high"], stats.norm.ppf([0.5, 0.025, 0.975]), strict=True))
+    table = np.exp(pd.concat({what: mean + side * deviation for what, side in sides.items()}, axis=1))
+    explanations = pd.DataFrame({"groups": [tuple(names[group] for group in one) for one in trends.sets]})
     return ParameterHistory(
-        table=pd.DataFrame(table, days[::step])[names],
-        rates=_rates(trends, alternatives, changes, years[-1], significance),
+        table=table.swaplevel(axis=1)[[(name, what) for name in names for what in sides]][::step],
+        rates=_rates(trends, alternatives, mean.iloc[-1], deviation.iloc[-1], years[-1], significance),
         p_value=trends.p_value,
         significance=significance,
-        explanations=pd.DataFrame(
-            {
-                "groups": [tuple(names[group] for group in one) for one in trends.sets],
-                "probability": softmax(trends.evidence),
-                "log_evidence": trends.evidence,
-            }
-        ),
+        explanations=explanations.assign(probability=softmax(trends.evidence), log_evidence=trends.evidence),
         alternatives=alternatives,
         modes=modes,
         shifts=pd.DataFrame(shifts, days, F.columns),
@@ -478,23 +465,23 @@ def track_parameters(
 def _rates(
     trends: StiffnessTrends,
     alternatives: Mapping[str, list[str]],
-    changes: Mapping[str, tuple[Array, Array]],
+    mean: pd.Series,
+    deviation: pd.Series,
     years: float,
     significance: float,
 ) -> pd.DataFrame:
-    """One row a group, as in `ParameterHistory`."""
-    levels, deviations = np.array([(mean[-1], deviation[-1]) for mean, deviation in changes.values()]).T
-    names, alone = list(changes), trends.rate_errors
-    table = pd.DataFrame({"change": np.expm1(levels), "change_error": np.exp(levels) * deviations}, names)
+    """One row a group, as in `ParameterHistory`, by ln stiffness on the last day."""
+    alone = trends.rate_errors
+    table = pd.DataFrame({"change": np.expm1(mean), "change_error": np.exp(mean) * deviation}).rename_axis("group")
     table[["per_year", "standard_error"]] = table[["change", "change_error"]] / years
-    table["p_value"] = 2 * stats.norm.sf(np.abs(levels) / np.maximum(deviations, 1e-300))
-    has_group = np.array([[group in one for one in trends.sets] for group in range(len(names))])
+    table["p_value"] = 2 * stats.norm.sf(mean.abs() / deviation.clip(lower=1e-300))
+    has_group = np.array([[group in one for one in trends.sets] for group in range(len(mean))])
     table["probability"] = has_group @ softmax(trends.evidence)
     table["drifts"] = np.where(2 * alone * years > 0.05, "unobservable", "no sign").astype(object)
     for others in alternatives.values():
         table.loc[others, "drifts"] = "yes" if len(others) == 1 else "perhaps"
-    table["detectable_rates"] = (stats.norm.isf(significance / (2 * len(names))) + 1.28) * alone
-    return table.rename_axis("group")
+    table["detectable_rates"] = (stats.norm.isf(significance / (2 * len(mean))) + 1.28) * alone
+    return table
 
 
 @dataclass(frozen=True, eq=False)
@@ -593,19 +580,19 @@ class ParameterHistory(Sentences):
         """
         if not is_real(limit) or not -1 < limit < 1 or limit == 0:
             raise ValueError(f"limit is {limit!r}; expected a relative change, such as -0.1 for a loss of 10 %")
-        change, errors = self.rates["change"], self.rates["change_error"]
-        hidden = (self.rates["drifts"] == "unobservable").to_numpy()
-        error = np.maximum((errors / (1 + change) / self.years).to_numpy(), 1e-12)
-        towards, needed = np.sign(limit) * (np.log1p(change) / self.years).to_numpy(), abs(np.log1p(limit))
-        first, found = self.shifts.index[0], {}
+        change, errors = (self.rates[name].to_numpy() for name in ("change", "change_error"))
+        hidden, first = (self.rates["drifts"] == "unobservable").to_numpy(), self.shifts.index[0]
+        error = np.maximum(errors / (1 + change) / self.years, 1e-12)
+        towards, needed = np.sign(limit) * np.log1p(change) / self.years, abs(np.log1p(limit))
+        found = pd.DataFrame(index=self.rates.index)
         for name, share in {"date": 0.5, "earliest": 0.975, "latest": 0.025}.items():
             rate = stats.norm.ppf(share, towards, error)
-            years = np.where((rate > 0) & ~hidden, needed / np.where(rate > 0, rate, np.nan), np.inf)
-            found[name] = [
-                first + round(365.25 * after) * DAY if after - self.years <= 100 else pd.NaT for after in years
-            ]
-        chance = np.where(hidden, np.nan, stats.norm.sf(needed / (self.years + 10), towards, error))
-        return pd.DataFrame(found | {"probability": chance}, self.rates.index)
+            years = needed / np.where((rate > 0) & ~hidden, rate, np.nan)
+            days = np.where(years - self.years <= 100, np.round(365.25 * years), np.nan)
+            found[name] = first + pd.to_timedelta(days, unit="D")
+        return found.assign(
+            probability=np.where(hidden, np.nan, stats.norm.sf(needed / (self.years + 10), towards, error))
+        )
 
     def remove_drift(self, F: pd.DataFrame) -> pd.DataFrame:
         """Frequencies as they would be without the drift since the first day; unchanged where there is none.
@@ -641,10 +628,8 @@ class ParameterHistory(Sentences):
 
     def _answer(self) -> Iterator[str]:
         first, last = (f"{self.shifts.index[end]:%Y-%m-%d}" for end in (0, -1))
-        found = "The" if self.has_drift else "No significant"
-        is_it = " is significant" if self.has_drift else ""
-        chance = probability_text(self.p_value)
-        yield f"{found} drift of stiffness from {first} to {last}{is_it} (p value {chance})."
+        found = "A significant" if self.has_drift else "No significant"
+        yield f"{found} drift of stiffness from {first} to {last} (p value {probability_text(self.p_value)})."
         for group, others in self.alternatives.items():
             rate = self.rates.loc[group]
             verb = "loses" if rate["per_year"] < 0 else "gains"
@@ -673,15 +658,15 @@ def _checked(fem: Any, T: Any, F: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Records in order of time without values that cannot be and columns that say nothing, the first of each time."""
     if isinstance(fem, type) or not hasattr(fem, "simulator_"):
         raise ValueError(f"fem is {fem!r:.200}; expected a fitted DataInformedFEM")
-    check_is_fitted(fem)
     for what, table in (("temperatures", T), ("frequencies", F)):
         if not has_stamps(table):
             raise ValueError(f"the {what} are a {type(table).__name__}; expected a DataFrame with a DatetimeIndex")
         refuse_no_table(table, what)
-    if T.shape[1] != fem.n_features_in_:
-        raise ValueError(f"T has {T.shape[1]} columns, {list(T.columns)}; expected {fem.n_features_in_}, as in fit")
-    if list(F.columns) != fem.mode_names_:
-        raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
+    if T.shape[1] != fem.n_features_in_ or list(F.columns) != fem.mode_names_:
+        raise ValueError(
+            f"T and F have the columns {list(T.columns)} and {list(F.columns)}; expected {fem.n_features_in_} and "
+            f"{fem.mode_names_}, as in fit"
+        )
     if not len(F):
         raise ValueError("F has 0 samples; expected at least one record")
     found = set_aside(T, F, model=fem.model, exclude={"no-rows"})

@@ -29,9 +29,10 @@ import skthermo
 from skthermo._core.arrays import as_random_state, check_jobs, check_path, check_size
 from skthermo._core.estimators import seed_parts
 from skthermo._core.files import ReadWhenAsked, alone_with, write_when_complete
+from skthermo._core.frames import DAY, YEAR
 from skthermo._core.memory import as_new
 from skthermo._core.parallel import as_they_come, single_blas_thread, with_progress
-from skthermo._core.text import counted, counted_number, listed, percent, significant
+from skthermo._core.text import SPACE, counted, counted_number, listed, percent, significant
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import SkthermoWarning
 from skthermo.metrics import mape
@@ -63,19 +64,18 @@ class KnownBridge:
     def error(self) -> str:
         return "; ".join(text for _, text, _ in self.errors)
 
-    @property
-    def state(self) -> str:
-        """State at the newest record, "" without a monitor."""
-        return "" if self.status is None else self.status_at(self.status.now).state
-
-    def status_at(self, now: Any, max_age: Any = None) -> MonitorStatus:
+    def status_at(self, now: Any = None, max_age: Any = None) -> MonitorStatus:
         """Status at a time; nothing is healthy whose newest records failed."""
         if self.status is None:
             return MonitorStatus("not evaluated", self.error or "there is no monitor").at(now)
         status = self.status.at(now, max_age=max_age)
-        if not self.errors:
-            return status
-        return replace(status, state="alarm" if status.state == "alarm" else "not evaluated", reason=self.error)
+        state = "alarm" if status.state == "alarm" else "not evaluated"
+        return replace(status, state=state, reason=self.error) if self.errors else status
+
+    @property
+    def state(self) -> str:
+        """State at the newest record, "" without a monitor."""
+        return "" if self.status is None else self.status_at(self.status.now).state
 
     def after(self, monitor: Monitor) -> KnownBridge:
         """The bridge as its monitor knows it now."""
@@ -97,9 +97,9 @@ class KnownBridge:
 
     def failed(self, stage: str, error: BaseException) -> KnownBridge:
         """The bridge as it was, with an error and the line of code that raised it."""
-        last = traceback.extract_tb(error.__traceback__)[-1:]
-        places = [f"{Path(one.filename).name}:{one.lineno} in {one.name}" for one in last]
-        return replace(self, errors=((stage, f"{type(error).__name__}: {error}", "".join(places)),))
+        places = traceback.extract_tb(error.__traceback__)[-1:]
+        where = "".join(f"{Path(one.filename).name}:{one.lineno} in {one.name}" for one in places)
+        return replace(self, errors=((stage, f"{type(error).__name__}: {error}", where),))
 
     def warned(self, stage: str, found: Iterable[SkthermoWarning]) -> KnownBridge:
         """The bridge with the warnings of a stage in place of earlier ones."""
@@ -115,7 +115,7 @@ def fit_bridge(
     start, stage, bridge, fitted = time.perf_counter(), "records", KnownBridge(known.name), None
     with single_blas_thread(), collected() as found:
         try:
-            T, F = pair_of(called(records))
+            T, F = called(records)
             stage = "maker"
             estimator = clone(called(maker))
             seed_parts(estimator, np.random.RandomState(seed))
@@ -124,18 +124,16 @@ def fit_bridge(
             content = str(joblib.hash(content, coerce_mmap=True)) if keeps else ""
             if keeps and content == known.content:
                 return replace(known, errors=()), None
-            missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
-            facts = {"n_records": len(F), "gaps": missing.mean()}
-            bridge, stage = replace(bridge, content=content, facts=facts), "fit"
-            chain = estimator.fit(T, F)
+            stage, chain = "fit", estimator.fit(T, F)
             errors = chain.report_.modes["MAPE"] if hasattr(chain, "report_") else mape(np.asarray(F), chain.predict(T))
-            bridge = replace(bridge, is_fitted=True, facts=facts | {"mape": float(np.mean(errors))})
-            fitted = chain, None
+            missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
+            facts = {"n_records": len(F), "gaps": missing.mean(), "mape": float(np.mean(errors))}
+            bridge, fitted = replace(bridge, content=content, is_fitted=True, facts=facts), (chain, None)
             if monitor is not None:
                 stage = "monitor"
                 watch = monitor(chain)
                 seed_parts(watch, np.random.RandomState(seed))
-                watch.fit(joined(T, F))
+                watch.fit(pd.concat([T, F], axis=1))
                 bridge, fitted = bridge.after(watch), (chain, watch)
         except Exception as error:
             if stage in ("records", "maker") and known.is_fitted:
@@ -151,7 +149,7 @@ def update_bridge(known: KnownBridge, kept: Any, records: Any) -> tuple[KnownBri
     with single_blas_thread(), collected() as found:
         try:
             new = called(records)
-            new, stage = joined(*new) if isinstance(new, tuple) else new, "update"
+            new, stage = pd.concat(new, axis=1) if isinstance(new, tuple) else new, "update"
             chain, monitor = opened(kept, known.name)
             if monitor is None:
                 raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
@@ -161,34 +159,19 @@ def update_bridge(known: KnownBridge, kept: Any, records: Any) -> tuple[KnownBri
             bridge = known.failed(stage, error)
             row = {"time": pd.NaT, "state": "not evaluated", "index": np.nan, "reason": bridge.error, "event": 0}
             answers = pd.DataFrame([row | {"revised": False}])
-    answers.insert(0, "bridge", pd.Series([known.name] * len(answers), dtype=object))
-    return bridge.warned("update", found), fitted, answers
+    return bridge.warned("update", found), fitted, labelled(known.name, answers)
+
+
+def labelled(bridge: Hashable, table: pd.DataFrame) -> pd.DataFrame:
+    """A table with the name of its bridge in each row."""
+    table.insert(0, "bridge", pd.Series([bridge] * len(table), table.index, dtype=object))
+    return table
 
 
 def called(given: Any) -> Any:
     """What a function or a class gives; anything else as it is. Estimators are no functions."""
     is_function = callable(given) and (isinstance(given, type) or not hasattr(given, "get_params"))
     return given() if is_function else given
-
-
-def pair_of(records: Any) -> tuple[Any, Any]:
-    """Temperatures and frequencies."""
-    if not isinstance(records, tuple | list) or len(records) != 2:
-        raise ValueError(f"records are {type(records).__name__!r}; expected a pair (T, F)")
-    shapes = [np.shape(table) for table in records]
-    if not all(shape and shape[0] for shape in shapes):
-        raise ValueError(f"records have the shapes {shapes[0]} and {shapes[1]}; expected a row for each record")
-    return records[0], records[1]
-
-
-def joined(T: Any, F: Any) -> pd.DataFrame:
-    """Temperatures and frequencies side by side, as monitors want them."""
-    if not (isinstance(T, pd.DataFrame) and isinstance(F, pd.DataFrame) and T.index.equals(F.index)):
-        raise ValueError(
-            f"records for a monitor are {type(T).__name__} and {type(F).__name__}; expected two frames with the same "
-            "stamps"
-        )
-    return T.join(F)
 
 
 def by_value(thing: Any) -> bytes:
@@ -306,12 +289,8 @@ def fit_fleet(
     for what, one in (("estimators", estimators), ("records", records)):
         if not isinstance(one, Mapping) or not one:
             raise ValueError(f"{what} are {one!r:.100}; expected a mapping of at least one name of a bridge")
-    if set(estimators) != set(records):
-        missing, unknown = [n for n in estimators if n not in records], [n for n in records if n not in estimators]
-        raise ValueError(
-            f"{len(missing)} bridges have no records ({missing!r:.200}) and {len(unknown)} have no estimator "
-            f"({unknown!r:.200}); expected the same names in both"
-        )
+    if odd := [name for name in (*estimators, *records) if name not in estimators or name not in records]:
+        raise ValueError(f"bridges {odd!r:.200} have no estimator or no records; expected the same names in both")
     if monitor is not None and not callable(monitor):
         raise ValueError(
             f"monitor is {type(monitor).__name__!r}; expected a function of a fitted estimator that gives a Monitor"
@@ -332,8 +311,7 @@ def fit_fleet(
                 file = file_of(path, known.name)
                 file.replace(file.with_suffix(".replaced"))
                 restarted.append(known.name)
-            if known != before[known.name]:
-                fleet._put(known, fitted)
+            fleet._put(known, fitted)
     findings = list(fleet._findings(list(estimators), "fit"))
     if restarted:
         text = (
@@ -490,14 +468,7 @@ class Fleet:
         return len(self._known)
 
     def __repr__(self) -> str:
-        words = {"alarm": "in alarm", "watch": "to be watched", "not evaluated": "not evaluated"}
-        watched = [counted(len(self.monitors), "monitor")] if len(self.monitors) else []
-        watched += [f"{self._counts()[state]} {text}" for state, text in words.items() if self._counts()[state]]
-        parts = [counted(len(self), "bridge"), f"{len(self.chains)} fitted", *watched]
-        return f"Fleet({', '.join(parts)})".replace("\N{NO-BREAK SPACE}", " ")
-
-    def _counts(self) -> Counter:
-        return Counter(one.state for one in self._known.values())
+        return f"Fleet({len(self)} bridges, {len(self.chains)} fitted)"
 
     @property
     def chains(self) -> Mapping[Hashable, BaseEstimator]:
@@ -524,28 +495,23 @@ class Fleet:
         for name, one in self._known.items():
             about = {"n_warnings": sum(times for *_, times in one.warnings), "state": one.state}
             file = None if self._folder is None else file_of(self._folder, name)
-            size = file.stat().st_size / 1e6 if file is not None and file.exists() else np.nan
-            first = {"is_fitted": one.is_fitted, "error": one.error}
-            rows.append(first | usual | about | one.facts | {"megabytes": size})
-        names = pd.Index(list(self._known), name="bridge", tupleize_cols=False)
-        table = pd.DataFrame(rows, index=names)
-        last = pd.Series([without_zone(stamp) for stamp in table["last"]], index=names, dtype="datetime64[ns]")
-        table.insert(table.columns.get_loc("last") + 1, "days_silent", (last.max() - last) / pd.Timedelta("1D"))
+            size = {"megabytes": file.stat().st_size / 1e6 if file is not None and file.exists() else np.nan}
+            rows.append({"is_fitted": one.is_fitted, "error": one.error} | usual | about | one.facts | size)
+        table = pd.DataFrame(rows, index=pd.Index(list(self._known), name="bridge", tupleize_cols=False))
+        last = pd.Series(map(without_zone, table["last"]), table.index, dtype="datetime64[ns]")
+        table.insert(table.columns.get_loc("last") + 1, "days_silent", (last.max() - last) / DAY)
         counts = self.warnings.groupby(["bridge", "kind"], sort=False)["times"].sum().unstack(fill_value=0)
-        place = table.columns.get_loc("n_warnings") + 1
         for kind in sorted(counts.columns, reverse=True):
-            table.insert(place, f"warnings {kind}", counts[kind].reindex(names, fill_value=0))
+            place = table.columns.get_loc("n_warnings") + 1
+            table.insert(place, f"warnings {kind}", counts[kind].reindex(table.index, fill_value=0))
         return table
 
     @property
     def events(self) -> pd.DataFrame:
         """Events of all monitors."""
         known = [one for one in self._known.values() if one.events is not None]
-        tables = []
-        for one in [one for one in known if len(one.events)] or known[:1]:
-            table = one.events.reset_index()
-            table.insert(0, "bridge", pd.Series([one.name] * len(table), dtype=object))
-            tables.append(table)
+        filled = [one for one in known if len(one.events)] or known[:1]
+        tables = [labelled(one.name, one.events.reset_index()) for one in filled]
         return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["bridge", "event"])
 
     @property
@@ -602,11 +568,9 @@ class Fleet:
         check_jobs(n_jobs)
         if not isinstance(records, Mapping):
             raise ValueError(f"records are {records!r:.100}; expected a mapping of the names of bridges to new records")
-        unknown = [name for name in records if name not in self._known]
-        if unknown:
+        if unknown := [name for name in records if name not in self._known]:
             raise ValueError(
-                f"{len(unknown)} names of records are those of no bridge ({unknown!r:.200}); expected some of the "
-                f"{len(self)} bridges"
+                f"names of records are those of no bridge ({unknown!r:.200}); expected names of the {len(self)} bridges"
             )
         answers: dict[Hashable, pd.DataFrame] = {}
         with only_user(self._folder):
@@ -711,20 +675,20 @@ class Fleet:
             Plain sentences.
         """
         table = self.table
-        broken = table.index[~table["is_fitted"]]
         is_begun, is_watched = table["last"].notna(), table["state"] != ""
         rows = {
-            "Not fitted": broken,
-            "Fitted without a monitor, state not known": table.index[table["is_fitted"] & ~is_watched],
-            "Without a record since the fit, state not known": table.index[is_watched & ~is_begun],
-            "In alarm": table.index[table["state"] == "alarm"],
-            "Raised damage index without an alarm (watch)": table.index[table["state"] == "watch"],
-            "Not evaluated, state not known": table.index[is_begun & (table["state"] == "not evaluated")],
-            "Without a record for more than 7 days before the newest of all": table.index[table["days_silent"] > 7],
-            "With an error since the fit": table.index[table["is_fitted"] & (table["error"] != "")],
+            "Not fitted": ~table["is_fitted"],
+            "Fitted without a monitor, state not known": table["is_fitted"] & ~is_watched,
+            "Without a record since the fit, state not known": is_watched & ~is_begun,
+            "In alarm": table["state"] == "alarm",
+            "Raised damage index without an alarm (watch)": table["state"] == "watch",
+            "Not evaluated, state not known": is_begun & (table["state"] == "not evaluated"),
+            "Without a record for more than 7 days before the newest of all": table["days_silent"] > 7,
+            "With an error since the fit": table["is_fitted"] & (table["error"] != ""),
         }
-        lines = [f"{len(table) - len(broken)} of {len(table)} bridges are fitted, {self._counts()['healthy']} healthy."]
-        lines += [f"{what}: {len(names)} ({named(names)})." for what, names in rows.items() if len(names)]
+        n_fitted, n_healthy = table["is_fitted"].sum(), (table["state"] == "healthy").sum()
+        lines = [f"{n_fitted} of {len(table)} bridges are fitted, {n_healthy} healthy."]
+        lines += [f"{what}: {one.sum()} ({named(table.index[one])})." for what, one in rows.items() if one.any()]
         return "\n".join([*lines, *([f"Warnings: {kinds(self.warnings)}."] if len(self.warnings) else [])])
 
     def _findings(self, asked: list[Hashable], stage: str) -> Iterator[SkthermoWarning]:
@@ -765,7 +729,7 @@ def kinds(warned: pd.DataFrame) -> str:
     """Kinds of warnings by how many bridges gave them."""
     numbers = warned.groupby("kind")["bridge"].nunique().sort_values(ascending=False, kind="stable")
     shown = [f"{kind} ({counted(number, 'bridge')})" for kind, number in numbers.items()]
-    return named(shown).replace("\N{NO-BREAK SPACE}", " ")
+    return named(shown).replace(SPACE, " ")
 
 
 @dataclass(frozen=True, repr=False)
@@ -837,27 +801,25 @@ class Discoveries:
         str
             One sentence a line.
         """
-        names, n_open = self.bridges, self.table.loc[self.table["end"].isna(), "bridge"].nunique()
+        n_open = self.table.loc[self.table["end"].isna(), "bridge"].nunique()
+        names = f": {listed(self.bridges)}" if self.bridges else ""
         alarms = counted_number(float(significant(self.false_alarms_per_year, 2)), "false alarm")
-        false = significant(self.false_discoveries_per_year, 2)
-        found = f"{len(names)} of them significantly after correction for many bridges{': ' if names else ''}"
         lines = [
-            f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
-            if n_open
-            else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
-            f"Expected if all bridges are healthy: {alarms} a year over all bridges, {false} of them significant.",
+            f"{n_open} of {self.n_evaluated} evaluated bridges in alarm, {len(self.bridges)} of them significantly "
+            f"after correction for many bridges{names}.",
+            f"Expected if all bridges are healthy: {alarms} a year over all bridges, "
+            f"{significant(self.false_discoveries_per_year, 2)} of them significant.",
             f"False discovery rate: {percent(self.fdr)} of the significant bridges are healthy on average.",
         ]
         lines += [f"Not evaluated, state not known: {listed(self.not_evaluated)}."] if self.not_evaluated else []
-        return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
+        return "\n".join(lines).replace(SPACE, " ")
 
 
 def discover(monitors: Mapping[Hashable, Monitor], known: pd.DataFrame, fdr: float, days: float) -> Discoveries:
     """Compare the events of all monitors that were open within so many days before the newest record of all."""
     fdr = check_size(fdr, "fdr", 0, 1, "a number between 0 and 1, such as 0.1")
-    most = 100_000
-    days = check_size(days, "days", 0, most, f"a number of days up to {most}, such as 365")
-    begin = max((without_zone(last) for last in known["last"].dropna()), default=pd.NaT) - pd.Timedelta(days=days)
+    days = check_size(days, "days", 0, 100_000, "a number of days up to 100000, such as 365")
+    begin = pd.Series(map(without_zone, known["last"]), dtype="datetime64[ns]").max() - pd.Timedelta(days=days)
     tables, p_values, years, expected, not_evaluated = [], {}, {}, 0.0, []
     for name in monitors:
         try:
@@ -865,16 +827,15 @@ def discover(monitors: Mapping[Hashable, Monitor], known: pd.DataFrame, fdr: flo
             expected += monitor.false_alarms_per_year
             table, n_years = events_since(monitor, begin)
         except Exception:  # damaged files raise errors of every type, which are in the table of errors
-            not_evaluated.append(name)
-            continue
+            table, n_years = pd.DataFrame(), 0.0
         if not len(table) and (known.loc[name, "state"] == "not evaluated" or not n_years):
             not_evaluated.append(name)
             continue
-        peaks = monitor.baseline_peaks_.to_numpy()
-        n_times = [times_exceeded(peaks, peak) for peak in table["peak"]]  # in three days a peak
-        table = table.assign(bridge=name, p_value=-np.expm1(-n_years * np.array(n_times) / (len(peaks) * 3 / 365.25)))
+        peaks = monitor.baseline_peaks_.to_numpy()  # each of three days
+        rates = np.array([times_exceeded(peaks, peak) for peak in table["peak"]]) / (len(peaks) * 3 * (DAY / YEAR))
+        table = labelled(name, table.assign(p_value=-np.expm1(-n_years * rates)).reset_index())
         p_values[name], years[name] = table.loc[table["end"].isna(), "p_value"].min(), n_years
-        tables += [table.reset_index()] if len(table) else []
+        tables += [table] if len(table) else []
     p = pd.Series(p_values, dtype=float).fillna(1.0)
     is_found = false_discovery_control(p) <= fdr if len(p) else np.zeros(0, dtype=bool)
     level = fdr * max(np.count_nonzero(is_found), 1) / max(len(p), 1)

@@ -96,14 +96,12 @@ class Retraining:
             Several lines.
         """
         outcome = "accepted" if self.accepted else "refused; the old detector stays in use"
-        lines = [f"{self.kind.capitalize()}: {outcome}."]
-        lines += [f"{'Accepted despite' if self.accepted else 'Reason'}: {reason}." for reason in self.reasons]
-        for row in self.excluded.itertuples():
-            until = "the last record" if pd.isna(row.end) else f"{row.end:%Y-%m-%d %H:%M}"
+        why, out = "Accepted despite" if self.accepted else "Reason", self.excluded
+        until = out["end"].map(lambda end: "the last record" if pd.isna(end) else f"{end:%Y-%m-%d %H:%M}")
+        lines = [f"{self.kind.capitalize()}: {outcome}.", *(f"{why}: {reason}." for reason in self.reasons)]
+        for row, end in zip(out.itertuples(), until, strict=True):
             what = "records" if row.columns == "all" else f"values of {row.columns}"
-            lines.append(
-                f"Left out: {row.n_records:,} {what} from {row.start:%Y-%m-%d %H:%M} to {until}, {row.reason}."
-            )
+            lines.append(f"Left out: {row.n_records:,} {what} from {row.start:%Y-%m-%d %H:%M} to {end}, {row.reason}.")
         return "\n".join([*lines, *(f"{capital(note)}." for note in self.notes)])
 
 
@@ -181,24 +179,25 @@ def may_train(
     A change may have begun within the ``margin`` before the first alarm of an event.
     Modes that were exchanged for a time stand in their place already with ``is_in_place``.
     """
-    kept, masked, rows = np.ones(len(records), dtype=bool), records.copy(), []
-    for event in events[~events["harmless"] & (events["kind"] != WATCH)].itertuples():
-        start = event.start - margin
-        inside = (records.index >= start) & (pd.isna(event.end) | (records.index <= event.end))
-        kept &= ~inside
-        reason = f"event {event.Index} ({event.kind}), {'' if event.acknowledged else 'not '}acknowledged"
-        rows.append((start, event.end, "all", int(inside.sum()), reason))
-    for fault in faults.itertuples():
-        if (is_in_place and fault.kind == "swapped") or fault.column not in records:  # or the sensor is a reference
-            continue
-        inside = (records.index >= fault.since) & (pd.isna(fault.until) | (records.index < fault.until))
-        masked.loc[inside, fault.column] = np.nan
-        rows.append((fault.since, fault.until, fault.column, int((inside & kept).sum()), f"sensor: {fault.kind}"))
-    empty = kept & masked.isna().all(axis=1).to_numpy()
-    if empty.any():
-        rows.append((masked.index[empty][0], masked.index[empty][-1], "all", int(empty.sum()), "without a value"))
+    said = {True: "acknowledged", False: "not acknowledged"}
+    spans = [
+        (one.start - margin, one.end, "all", f"event {one.Index} ({one.kind}), " + said[one.acknowledged])
+        for one in events[~events["harmless"] & (events["kind"] != WATCH)].itertuples()
+    ]
+    spans += [
+        (one.since, one.until, one.column, f"sensor: {one.kind}")
+        for one in faults.itertuples()
+        if one.column in records and not (is_in_place and one.kind == "swapped")
+    ]
+    masked, rows = records.copy(), []
+    for start, end, column, reason in spans:
+        inside = (records.index >= start) & (pd.isna(end) | (records.index <= end))
+        columns = list(records) if column == "all" else [column]
+        n_records = int(masked.loc[inside, columns].notna().any(axis=1).sum())
+        masked.loc[inside, columns] = np.nan
+        rows += [(start, end, column, n_records, reason)] if n_records else []
     excluded = pd.DataFrame(rows, columns=["start", "end", "columns", "n_records", "reason"])
-    return masked[kept & ~empty], excluded[excluded["n_records"] > 0].reset_index(drop=True)
+    return masked.dropna(how="all"), excluded
 
 
 def level_changes(

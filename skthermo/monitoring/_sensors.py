@@ -53,7 +53,7 @@ class WatchState(SavesFrames):
         """Records with exchanged values back in their columns."""
         swapped = self.lasting("swapped")
         order = [swapped[name].other if name in swapped else name for name in records]
-        return records[order].set_axis(records.columns, axis=1)
+        return records[order].set_axis(records.columns, axis=1) if swapped else records
 
     def updated(self, changes: Mapping[Fault, Fault], found: Sequence[Fault]) -> WatchState:
         """With faults in place of others, and more."""
@@ -199,9 +199,10 @@ class Responses:
         Both come much nearer to their places by it: one has risen and the other one fallen, by about their distance. No
         damage does that. A day adds at most 50 to the logarithm of the odds.
         """
-        found, (daily, places) = [], (pd.DataFrame(one).groupby(days).median()[::-1] for one in (rest, expected))
+        found, daily = [], pd.DataFrame(np.hstack([rest, expected])).groupby(days).median()[::-1]
+        rests, places = np.split(daily.to_numpy(), 2, axis=1)
         for pair in self.pairs:
-            here, (first, second), deviations = daily.to_numpy()[:, pair], places.to_numpy()[:, pair].T, self.deviations
+            here, (first, second), deviations = rests[:, pair], places[:, pair].T, self.deviations
             known = ~np.isnan(here).any(axis=1)
             there = here[:, ::-1] + np.column_stack([second - first, first - second])
             here, there = ((one[known] / deviations[pair]) ** 2 for one in (here, there))
@@ -264,9 +265,6 @@ class SensorWatch:
             start_=WatchState(records.iloc[:0], means.iloc[:0]),
         )
 
-    def start(self) -> WatchState:
-        return self.start_
-
     def faults(self, state: WatchState) -> pd.DataFrame:
         """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``."""
         columns, zone = ["column", "kind", "since", "detected", "until", "detail"], state.records.index.tz
@@ -297,17 +295,13 @@ class SensorWatch:
         for name, one in state.lasting("swapped").items():
             if self.modes.index(name) < self.modes.index(one.other):
                 lasting.append(f"{name} and {one.other} are exchanged and were put back in place")
-        notes = ["; ".join(lasting)] * len(given)
         far = far & ~far.columns.isin(list(out))
-        for row in np.flatnonzero(far.any(axis=1)):
-            values = given.iloc[row][far.iloc[row]]
-            said = ", ".join(f"{name} is {value:.4g} {self.units[name]}".rstrip() for name, value in values.items())
-            notes[row] = "; ".join([f"{said}: implausible, left out", *lasting])
+        values = values_text(given, far.to_numpy(), self.units, "implausible, left out")
         about = {
             "n_held": held.sum(axis=1).astype(float),
             "held": [", ".join(map(str, held.columns[row])) for row in held.to_numpy()],
             "n_left_out": removed.sum(axis=1),
-            "note": notes,
+            "note": ["; ".join(filter(None, [text, *lasting])) for text in values],
         }
         inputs = [name for name in self.sensors if name not in self.reference]
         return kept[inputs], kept[self.modes], pd.DataFrame(about, given.index)
@@ -326,7 +320,7 @@ class SensorWatch:
 
     def _evaluated(self, records: pd.DataFrame) -> tuple[pd.DataFrame, Array, Array]:
         """Which values are implausible, responses minus the expected ones, and the expected ones."""
-        temperatures, responses = records[self.sensors].to_numpy(), records[self.modes].to_numpy()
+        temperatures, responses = np.split(records.to_numpy(), [len(self.sensors)], axis=1)
         impossible = self.weather.implausible(temperatures)
         rest, expected = self.expected.residuals(np.where(impossible, np.nan, temperatures), responses)
         far = np.hstack([impossible, self.expected.implausible(responses, rest)])
@@ -396,6 +390,16 @@ class SensorWatch:
             if len(resolved) == 1:
                 found = [Fault(column=resolved[0], detected=today, **change_of(rest[resolved[0]].dropna()))]
         return state.updated(changes, found)
+
+
+def values_text(records: pd.DataFrame, rows: Array, units: Mapping[Hashable, str], what: str) -> list[str]:
+    """Some values of each record, and what is said of them; "" without any."""
+    texts = [""] * len(records)
+    for place in np.flatnonzero(rows.any(axis=1)):
+        values = records.iloc[place][rows[place]]
+        texts[place] = ", ".join(f"{name} is {value:.4g} {units[name]}".rstrip() for name, value in values.items())
+        texts[place] += f": {what}"
+    return texts
 
 
 def as_stamps_of(times: pd.Series, zone: Any) -> pd.DatetimeIndex:

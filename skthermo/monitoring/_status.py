@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import timedelta
@@ -55,9 +56,7 @@ class RecordTimes:
         return self.age is not None and self.age < -DAY
 
     def __str__(self) -> str:
-        if self.counts is None:
-            return "not known"
-        n = {"n_late": 0, "n_too_late": 0, "n_ahead": 0, "n_left_out": 0} | self.counts
+        n = defaultdict(int, self.counts or {})
         return (
             f"{n['n_records']} since the baseline, {n['n_not_evaluated']} not evaluated, {n['n_late']} late, "
             f"{n['n_too_late']} too late, {n['n_ahead']} set aside as stamped too far ahead, {n['n_repeated']} "
@@ -93,7 +92,8 @@ class AlarmLevels:
     def __str__(self) -> str:
         if self.threshold is None:
             return "not known"
-        return f"open above {self.threshold:.4g}, close at or below {self.clear_threshold:.4g}"
+        watch = "" if self.watch_threshold is None else f"; watch: opens above {self.watch_threshold:.4g}"
+        return f"open above {self.threshold:.4g}, close at or below {self.clear_threshold:.4g}{watch}"
 
 
 @dataclass(frozen=True)
@@ -198,12 +198,11 @@ class MonitorStatus:
         return replace(status, state="alarm" if self.state == "alarm" else "not evaluated", reason=doubt)
 
     def __str__(self) -> str:
-        lines = [f"{self.state} ({self.reason})" if self.reason else self.state]
+        lines = [f"state: {self.state}" + (f" ({self.reason})" if self.reason else "")]
         lines += [f"records: {self.records}", f"damage events: {self.levels}"]
-        lines += [f"event {one['event']}: {one['kind']} since {one['since']}" for one in self.events]
-        return "\n".join(
-            [*lines, *(f"sensor: {one['column']} {one['kind']} since {one['since']}" for one in self.faults)]
-        )
+        lines += [f"event {one['event']}: {one['kind']} since {one['since']}, still open" for one in self.events]
+        lines += [f"sensor: {one['column']} {one['kind']} since {one['since']}" for one in self.faults]
+        return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values by name, as a JSON file holds them.
@@ -219,8 +218,7 @@ class MonitorStatus:
 
 def state_of(events: pd.DataFrame, evaluations: pd.DataFrame) -> str:
     """How the structure is by its open events, else by the newest record."""
-    is_open = events["end"].isna()
-    kinds = set(events["kind"][is_open & ~(events["harmless"] & (events["kind"] == MEASUREMENT))])
+    kinds = set(events["kind"][events["end"].isna() & ~(events["harmless"] & (events["kind"] == MEASUREMENT))])
     if kinds & {DAMAGE, MEASUREMENT}:
         return "alarm"
     newest = evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
@@ -231,6 +229,12 @@ def status_of(monitor: Any) -> MonitorStatus:
     """The status of a fitted monitor by its records alone, whatever the time is."""
     evaluations, events, baseline = monitor.evaluations_, monitor.events_, monitor.baseline_.index
     known, faults = evaluations[evaluations["state"] != "not evaluated"], monitor.faults_
+    opened = events[events["end"].isna()].reset_index().rename(columns={"start": "since"})
+    for name in ("modes", "groups"):
+        opened[name] = pd.Series([[one for one in text.split(", ") if one] for text in opened[name]], dtype=object)
+    shown = ["event", "kind", "since", "peak", "modes", "groups", "acknowledged"]
+    failed = faults[faults["until"].isna()].astype({"column": str})
+    levels = ("threshold_", "clear_threshold_", "watch_threshold_", "false_alarms_per_year", "watch_per_year")
     return MonitorStatus(
         state=state_of(events, evaluations),
         reason=str(evaluations["reason"].iloc[-1]) if len(evaluations) else "",
@@ -243,49 +247,31 @@ def status_of(monitor: Any) -> MonitorStatus:
         ),
         index=float(known["index"].iloc[-1]) if len(known) else None,
         levels=AlarmLevels(
-            threshold=float(monitor.threshold_),
-            clear_threshold=float(monitor.clear_threshold_),
-            watch_threshold=monitor.watch_threshold_,
-            false_alarms_per_year=float(monitor.false_alarms_per_year),
-            watch_per_year=None if monitor.watch_per_year is None else float(monitor.watch_per_year),
+            *(None if getattr(monitor, name) is None else float(getattr(monitor, name)) for name in levels),
             smallest_change=monitor.smallest_changes_.as_dict(),
         ),
-        events=tuple(
-            {"event": one.Index, "kind": one.kind, "since": one.start, "peak": one.peak}
-            | {name: [part for part in getattr(one, name).split(", ") if part] for name in ("modes", "groups")}
-            | {"acknowledged": one.acknowledged}
-            for one in events[events["end"].isna()].itertuples()
-        ),
-        faults=tuple(
-            {"column": str(one.column), "kind": one.kind, "since": one.since, "detail": one.detail}
-            for one in faults[faults["until"].isna()].itertuples()
-        ),
+        events=tuple(opened[shown].to_dict("records")),
+        faults=tuple(failed[["column", "kind", "since", "detail"]].to_dict("records")),
         transition=len(monitor.transitions()),
     )
 
 
 def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
-    """State, records, latest events, sensors and drift of a fitted monitor."""
-    status, events, drift, aside = status_of(monitor), monitor.events_, monitor.drift_, monitor.set_aside_
-    yield f"state: {status.state}" + (f" ({status.reason})" if status.reason else "")
-    yield f"records: {status.records}, the newest of {monitor.last_}"
-    yield f"damage events: {status.levels}; expected: {monitor.false_alarm_estimate_}"
-    if monitor.watch_threshold_ is not None:
-        yield f"watch: opens above {monitor.watch_threshold_:.4g}"
+    """The status of a fitted monitor, what it detects, its latest events, and drift."""
+    events, drift, aside = monitor.events_, monitor.drift_, monitor.set_aside_
+    yield str(replace(status_of(monitor), events=()))
+    yield f"expected: {monitor.false_alarm_estimate_}"
     yield f"smallest change: {monitor.smallest_changes_} in weather of the baseline"
+    if len(aside):
+        n_values = counted(int(aside["n_rows"].sum()), "value")
+        yield f"baseline: {n_values} set aside: {'; '.join(aside['detail'].head(3))}"
     for number, event in events.iloc[-most:].iterrows():
         until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
-        harmless = "harmless" if event["harmless"] else "not harmless"
-        said = f"acknowledged as {harmless}" if event["acknowledged"] else "not acknowledged"
+        said = f"acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
         parts = [f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {', '.join(filter(None, parts))}{note}"
     yield f"events: {len(events)}, {events['end'].isna().sum()} of them open" if len(events) else "events: none"
-    if len(aside):
-        n_values = counted(int(aside["n_rows"].sum()), "value")
-        yield f"baseline: {n_values} set aside: {'; '.join(aside['detail'].head(3))}"
-    for fault in status.faults:
-        yield f"sensor: {fault['column']} {fault['kind']} since {fault['since']}"
     for group, one in () if drift is None else drift[drift["significant"]].iterrows():
         beyond = ", beyond the limit" if one["beyond_limit"] else ""
         yield f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year{beyond}"

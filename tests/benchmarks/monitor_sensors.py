@@ -62,7 +62,8 @@ class Service:
         self.baseline = T.iloc[:n_baseline], F.iloc[:n_baseline]
         self.watch = SensorWatch.fitted(*self.baseline, reference=reference)
         self.days = days_of(self.T)
-        self.states = [self.watch.start()]
+        start = getattr(self.watch, "start", None)  # of 0.2
+        self.states = [start() if start else self.watch.start_]
         for _, rows in self.days:
             self.states.append(self.watch.advance(self.states[-1], self.T.iloc[rows], self.F.iloc[rows]))
         self.healthy = self.watch.faults(self.states[-1])
