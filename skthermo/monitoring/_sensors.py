@@ -247,7 +247,7 @@ class SensorWatch:
     ) -> SensorWatch:
         """Learn from the baseline; ``reference`` names columns of T, ``units`` are texts by column."""
         T, F, units = T.sort_index(kind="stable"), F.sort_index(kind="stable"), dict(units or {})
-        records, days = T.join(F) if T.index.is_unique else pd.concat([T, F], axis=1), midnights(T.index)
+        records, days = T.join(F), midnights(T.index)
         per_day = len(days) / max(days.nunique(), 1)
         means, has_values = means_by_day(T, per_day), T.notna().any().all()
         can_compare = T.shape[1] > 1 and len(means) >= 3 * T.shape[1] + 5 and has_values
@@ -269,7 +269,8 @@ class SensorWatch:
         """Faults so far: ``column``, ``kind``, ``since``, ``detected``, ``until`` (NaT while it lasts), ``detail``."""
         columns, zone = ["column", "kind", "since", "detected", "until", "detail"], state.records.index.tz
         table = pd.DataFrame([vars(fault) for fault in state.faults], columns=columns, dtype=object)
-        return table.assign(**{name: as_stamps_of(table[name], zone) for name in columns[2:5]})
+        times = {name: [None if pd.isna(time) else time.value for time in table[name]] for name in columns[2:5]}
+        return table.assign(**{name: as_index(some, zone) for name, some in times.items()})
 
     def masked(
         self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()
@@ -400,10 +401,6 @@ def values_text(records: pd.DataFrame, rows: Array, units: Mapping[Hashable, str
         texts[place] = ", ".join(f"{name} is {value:.4g} {units[name]}".rstrip() for name, value in values.items())
         texts[place] += f": {what}"
     return texts
-
-
-def as_stamps_of(times: pd.Series, zone: Any) -> pd.DatetimeIndex:
-    return as_index([None if pd.isna(time) else time.value for time in times], zone)
 
 
 def means_by_day(T: pd.DataFrame, per_day: float) -> pd.DataFrame:

@@ -267,7 +267,8 @@ def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
         yield f"baseline: {n_values} set aside: {'; '.join(aside['detail'].head(3))}"
     for number, event in events.iloc[-most:].iterrows():
         until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
-        said = f"acknowledged as {'' if event['harmless'] else 'not '}harmless" if event["acknowledged"] else ""
+        harmless = "harmless" if event["harmless"] else "not harmless"
+        said = f"acknowledged as {harmless}" if event["acknowledged"] else "not acknowledged"
         parts = [f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {', '.join(filter(None, parts))}{note}"
