@@ -56,10 +56,11 @@ def weather_columns(T: Array, half_lives: Sequence[float] = (5.0, 30.0)) -> Arra
 
     Exponential means of the first one stand for what follows the weather slowly.
     """
-    if not T.shape[1]:
+    T = T[:, ~np.isnan(T).all(axis=0)]
+    known = ~np.isnan(T).all(axis=1)
+    if known.sum() < 10:
         return np.ones((len(T), 1))
     filled = SensorRegression.fitted(T).fill(T)[0]
-    known = ~np.isnan(filled).any(axis=1)
     axes = make_pipeline(StandardScaler(), PCA(0.98, svd_solver="full", whiten=True))
     parts = axes.fit_transform(filled[known])[:, :3]
     columns = np.full((len(T), PolynomialFeatures(2).fit(parts).n_output_features_ + parts.shape[1]), np.nan)
