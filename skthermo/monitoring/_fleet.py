@@ -311,7 +311,8 @@ def fit_fleet(
                 file = file_of(path, known.name)
                 file.replace(file.with_suffix(".replaced"))
                 restarted.append(known.name)
-            fleet._put(known, fitted)
+            if known != before[known.name]:
+                fleet._put(known, fitted)
     findings = list(fleet._findings(list(estimators), "fit"))
     if restarted:
         text = (
