@@ -362,7 +362,7 @@ class Fleet:
     Raises
     ------
     ValueError
-        If there is no such folder, or it holds no bridge.
+        If the folder holds no bridge.
 
     See Also
     --------
@@ -388,19 +388,16 @@ class Fleet:
     >>> Fleet("no such folder")
     Traceback (most recent call last):
     ...
-    ValueError: there is no folder 'no such folder'; expected that of a fit_fleet
+    ValueError: the folder 'no such folder' holds no bridge; expected that of a fit_fleet
     """
 
     def __init__(self, folder: str | os.PathLike[str]):
-        path = check_path(folder, "folder")
-        if not path.is_dir():
-            raise ValueError(f"there is no folder {str(path)!r}; expected that of a fit_fleet")
-        self._folder: Path | None = path
+        self._folder: Path | None = check_path(folder, "folder")
         self._known: dict[Hashable, KnownBridge] = {}
         self._kept: dict[Hashable, Any] = {}
         self._read()
         if not self._known:
-            raise ValueError(f"the folder {str(path)!r} holds no bridge; expected that of a fit_fleet")
+            raise ValueError(f"the folder {str(folder)!r} holds no bridge; expected that of a fit_fleet")
 
     @classmethod
     def _in(cls, folder: Path | None) -> Fleet:

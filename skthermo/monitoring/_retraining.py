@@ -228,7 +228,7 @@ def level_changes(
     for what, profile in profiles.items():
         fit = DailyRegression.fitted(X, profile[:, np.newaxis], daily[targets].to_numpy(), n_waves=0)
         change, covariance, p_value = fit.chance()
-        day = pd.DataFrame(fit.rest).cov().to_numpy()
+        day = pd.DataFrame(fit.rest).cov().fillna(0.0).to_numpy() + 1e-16 * np.eye(len(targets))
         size = float(change @ np.linalg.solve(day, change)) ** 0.5  # in standard deviations of a day
         table = pd.DataFrame({"change": change, "standard_error": np.sqrt(np.diag(covariance))}, targets)
         is_clear = bool((table["standard_error"] / np.sqrt(np.diag(day))).median() <= 0.5)
