@@ -356,7 +356,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
         text = unpredicted_text(unknown, as_floats(inputs))
-        findings += [*filled, *doubts, *as_findings(UnevaluatedRowsWarning, text, "not-predicted")]
+        findings += [*filled, *doubts, *as_findings(UnevaluatedRowsWarning, text, "not-evaluated")]
         findings += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
         return findings, frame_like(F, residuals)
 
@@ -437,7 +437,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         findings += [
             *self.training_range_.doubts(inputs),
             *self.sensors_.doubts(T),
-            *as_findings(UnevaluatedRowsWarning, unpredicted_text(unknown, as_floats(inputs)), "not-predicted"),
+            *as_findings(UnevaluatedRowsWarning, unpredicted_text(unknown, as_floats(inputs)), "not-evaluated"),
         ]
         residuals = self._shrunk(self._difference(as_floats(F), predicted), inputs, predicted)
         return frame_like(F, residuals), inputs, findings
@@ -474,7 +474,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         """Inputs whose gaps the other sensors fill, and a finding that names these."""
         values, deviations = self.sensors_.fill(T)
         text = filled_text(deviations, column_names(T, "x"), "The spread of residuals includes the error of that")
-        return frame_like(T, values), as_findings(RecordsWarning, text, "filled-temperatures")
+        return frame_like(T, values), as_findings(RecordsWarning, text, "faulty-sensor")
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any, list[SkthermoWarning]]:
         """Inputs and targets without values that cannot be, and findings."""
@@ -487,7 +487,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         named_T = pd.DataFrame(as_floats(T), index, np.delete(names, self.targets_))
         named_F = pd.DataFrame(as_floats(F), named_T.index, names[self.targets_])
         # inputs need not be temperatures, and may be constant
-        inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"constant"})
+        inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"useless-column"})
         responses = set_aside(frequencies=named_F, unit="", needs_all=True)
         findings = [*inputs.others.warnings(), *responses.others.warnings(), *misplaced_columns(named_T, named_F)]
         cleaned = (np.ascontiguousarray(as_floats(found.frequencies)) for found in (inputs, responses))

@@ -28,7 +28,7 @@ from skthermo.detection import (
 from skthermo.preprocessing import HampelFilter
 from skthermo.preprocessing.checks import SetAside, set_aside
 
-OF_TRAINING = frozenset({"no-rows", "missing-column", "constant"})  # gross errors that do no harm to a few records
+OF_TRAINING = frozenset({"few-records", "useless-column"})  # gross errors that do no harm to a few records
 
 
 def read_records(X: Any, columns: list[Any] | None = None, zone: Any = None) -> pd.DataFrame:

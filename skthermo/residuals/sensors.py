@@ -90,7 +90,7 @@ class SensorRegression:
                 f"{self.reach.names[int(excess.argmax())]!r} departs from the other sensors' prediction more than it "
                 "did in training. It drifts, is stuck or was moved, which moves predictions and gives false alarms. "
                 "Put NaN where it is wrong: the other sensors fill it",
-                "sensor-disagrees",
+                "faulty-sensor",
             )
         ]
 

@@ -70,7 +70,7 @@ class TrainingRange:
                 f"temperatures are outside the training range by more than {FAR_OUTSIDE:.0%} of it: {names}. "
                 f"Predictions there are extrapolated (extrapolation_distance says how far). Give degrees Celsius"
                 f"{kelvin}, or train on such weather",
-                "outside-training-weather",
+                "weather",
             )
         ]
 
@@ -130,7 +130,7 @@ def implausible(known: TrainingRange, temperatures: Any) -> list[RecordsWarning]
         RecordsWarning(
             f"temperatures are implausible: {names}. Their predictions are wrong. Give degrees Celsius, and NaN where "
             "a value is missing",
-            "implausible-temperatures",
+            "doubtful-values",
         )
     ]
 
@@ -155,7 +155,7 @@ def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> l
         WeatherWarning(
             f"records of a fold are in weather that the other folds lack: {listed}. {consequence}. Train on a whole "
             "year, in folds that each have all seasons, such as blocks of a week",
-            "weather-of-one-fold",
+            "weather",
         )
     ]
 

@@ -27,7 +27,6 @@ from skthermo._core.arrays import (
     check_model,
     check_noise,
     check_prior,
-    is_auto,
     median,
     real_array,
     robust_deviation,
@@ -530,7 +529,7 @@ class ShapeInputs:
                 RecordsWarning(
                     "most measured modes lack a component of their shape at some sensor. Their shapes are not used. "
                     "Leave sensors that failed out of dofs",
-                    "few-shapes",
+                    "doubtful-shapes",
                 )
             )
         rows = spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), 100)
@@ -543,11 +542,11 @@ class ShapeInputs:
         mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
         if excess[mode, sensor] > 5:
             findings.append(
-                ModelWarning(
+                RecordsWarning(
                     f"measured shapes of {column_names(inputs, 'f')[mode]!r} are unlike those of the model at the "
                     f"parameters of the records, the most at sensor {sensor}. They distort the parameters. Check the "
                     "modes, and order, signs and gains of the sensors (dofs), or raise shape_noise",
-                    "foreign-shapes",
+                    "doubtful-shapes",
                 )
             )
         return findings
@@ -747,11 +746,9 @@ class PosteriorInverse(FrequencyInverse, Estimator):
                 FewRecordsWarning(
                     "fewer than 10 records teach the prior of the parameters and the noise of the modes. Both stay "
                     "near 1 to 3 %. Give prior and noise",
-                    "few-teaching-records",
+                    "few-records",
                 )
             )
-        if not is_auto(self.reduce):
-            self.findings_ += self.simulator_.doubts()
         warn_each(self.findings_)
         return self
 
@@ -874,22 +871,13 @@ def unconverged(found: Bunch) -> NDArray[np.bool_]:
 
 
 def doubts_of(found: Bunch, *, many: float = 0.01) -> list[ModelWarning]:
-    """Findings that many rows have not converged, or were solved by the full model."""
-    findings = []
-    if unconverged(found).sum() > many * len(found.weight):
-        findings.append(
-            ModelWarning(
-                "parameters of many records did not converge, and are what was reached in 100 steps (invert says "
-                "which). Use a model with track=True where modes cross",
-                "not-converged",
-            )
+    """The finding that many rows have not converged."""
+    if unconverged(found).sum() <= many * len(found.weight):
+        return []
+    return [
+        ModelWarning(
+            "parameters of many records did not converge, and are what was reached in 100 steps (invert says which). "
+            "Use a model with track=True where modes cross",
+            "poor-fit",
         )
-    if found.by_full_model.sum() > many * len(found.weight):
-        findings.append(
-            ModelWarning(
-                "parameters of many records are outside the box of the reduced model, and the full one was solved for "
-                "them, which takes longer (invert says for which). Fit to records of such weather",
-                "outside-reduced-model",
-            )
-        )
-    return findings
+    ]

@@ -183,20 +183,20 @@ class ThermalModel(SavesFrames):
         consequence = "Standard deviations and intervals of predictions include the error of that"
         message = filled_text(weather.deviations, column_names(weather.filled, "T"), consequence)
         if message:
-            findings.append(RecordsWarning(message, "filled-temperatures"))
+            findings.append(RecordsWarning(message, "faulty-sensor"))
         message = unpredicted_text(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled))
         if message:
-            findings.append(UnevaluatedRowsWarning(message, "not-predicted"))
+            findings.append(UnevaluatedRowsWarning(message, "not-evaluated"))
         findings += self.training_range.doubts(weather.inputs)
         if weather.impossible.any():
             findings.append(
                 ModelWarning(
                     "the mapper gave multipliers outside 1e-06 to 1e+06. These rows are NaN. Use a mapper that "
                     "extrapolates mildly, such as the default",
-                    "impossible-parameters",
+                    "outside-bounds",
                 )
             )
-        return findings + self.simulator.doubts_at(weather.theta)
+        return findings
 
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy; NaN where theta is."""
@@ -317,7 +317,7 @@ def doubts_of_factors(parameters: Mapping[str, float] | None, *, large: float = 
         ModelWarning(
             f"the factor of parameter {name!r} is {factor:g} (expected at most {large:g}). Its stiffness is multiplied "
             "by that. Give 1.02 for 2 % more",
-            "large-factor",
+            "doubtful-factor",
         )
         for name, factor in (as_mapping(parameters) or {}).items()
         if factor > large

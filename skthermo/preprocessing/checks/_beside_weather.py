@@ -81,7 +81,7 @@ def exchange_modes(F: Reading, values: Array, lines: Array, folds: Rows) -> None
             found.append((both, np.count_nonzero(known), exchanged | alone))
     for both, n_known, rows in found:
         names = f"{F.columns[both[0]]!r} and {F.columns[both[1]]!r}"
-        F.found("exchanged-modes", names, rows, f"{names} in {np.count_nonzero(rows)} of {n_known} rows")
+        F.found("mode-order", names, rows, f"{names} look exchanged in {np.count_nonzero(rows)} of {n_known} rows")
         values[np.ix_(rows, both)] = values[np.ix_(rows, both[::-1])]
 
 
@@ -110,7 +110,7 @@ def find_outliers(F: Reading, values: Array, lines: Array | None, folds: Rows | 
             f"{name!r} in {np.count_nonzero(far[:, place])} of {n_known} rows, the first "
             f"{values[first[0], place]:.4g}{F.unit} in {period_of(F.index, first)}"
         )
-        F.found("frequency-outliers", name, far[:, place], detail, period=False)
+        F.found("doubtful-values", name, far[:, place], detail, period=False)
     return far
 
 
@@ -149,17 +149,20 @@ def compare_times(
         late = "" if hours is None else abs(shift) * hours
         length = late and (f" (about {late:.3g} hours)" if late < 48 else f" (about {late / 24:.3g} days)")
         detail = (
-            f"those of {abs(shift)} rows {'before' if shift > 0 else 'after'}{length} explain {explained:.0%} of the "
-            f"variance in periods held out, those of the same rows {max(without, 0.0):.0%}"
+            f"temperatures of {abs(shift)} rows {'before' if shift > 0 else 'after'}{length} explain {explained:.0%} "
+            f"of the variance in periods held out, those of the same rows {max(without, 0.0):.0%}"
         )
         is_there = (np.arange(n_rows) >= shift) & (np.arange(n_rows) < n_rows + shift)
-        F.found("time-shift", "", is_there, detail, period=False)
+        F.found("different-rows", "", is_there, detail, period=False)
         return
     least = min(left(lines, 0, 0, n_parts).min(initial=1.0) for n_parts in (1, 4))
     if least > 0.98 and np.isnan(T.values[~np.isnan(T.before)]).mean() < 0.01:
         usable = ~np.isnan(values).all(axis=1) & ~np.isnan(places).any(axis=1)
-        detail = f"at most {max(1 - least, 0.0):.1%} of the variance of a mode, in periods held out"
-        F.found("no-thermal-effect", "", usable, f"{detail}, in {np.count_nonzero(usable)} rows", period=False)
+        detail = (
+            f"temperatures explain at most {max(1 - least, 0.0):.1%} of the variance of a mode, in periods held out, "
+            f"in {np.count_nonzero(usable)} rows"
+        )
+        F.found("different-rows", "", usable, detail, period=False)
 
 
 def unexplained(inputs: Array, values: Array, folds: Rows, n_parts: int = 1) -> Array:
@@ -231,14 +234,14 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
             f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
             "A mode that predicts the others hides damage. Put all modes among the targets, and only temperatures "
             "beside them",
-            "modes-among-temperatures",
+            "exchanged-tables",
         )
     if is_temperature.any():
         yield RecordsWarning(
             f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
             "and are nearly equal to other temperatures. A detector would evaluate the weather. Give only frequencies "
             "as targets",
-            "temperatures-among-modes",
+            "exchanged-tables",
         )
 
 
