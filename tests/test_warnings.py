@@ -71,6 +71,6 @@ def test_filters_tell_categories_apart():
 
 
 def test_the_code_ends_the_text_also_of_a_copy():
-    warning = FewRecordsWarning("3 records", "few-rows")
+    warning = FewRecordsWarning("3 records", "few-records")
     again = pickle.loads(pickle.dumps(warning))
-    assert (str(again), again.kind) == (str(warning), "few-rows") == ("3 records [few-rows]", "few-rows")
+    assert (str(again), again.kind) == (str(warning), "few-records") == ("3 records [few-records]", "few-records")

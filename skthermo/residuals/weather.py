@@ -70,7 +70,7 @@ class TrainingRange:
                 f"temperatures are outside the training range by more than {FAR_OUTSIDE:.0%} of it: {names}. "
                 f"Predictions there are extrapolated (extrapolation_distance says how far). Give degrees Celsius"
                 f"{kelvin}, or train on such weather",
-                "weather",
+                "other-weather",
             )
         ]
 
@@ -155,7 +155,7 @@ def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> l
         WeatherWarning(
             f"records of a fold are in weather that the other folds lack: {listed}. {consequence}. Train on a whole "
             "year, in folds that each have all seasons, such as blocks of a week",
-            "weather",
+            "other-weather",
         )
     ]
 

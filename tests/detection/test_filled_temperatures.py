@@ -11,7 +11,7 @@ from skthermo.residuals.weather import unpredicted_text
 
 MODES = ["f1", "f2"]
 EFFECT = np.array([[-0.02, 0.01], [-0.03, -0.04], [0.0, -0.02]])
-FILLED = pytest.mark.filterwarnings("ignore:.*filled-temperatures")
+FILLED = pytest.mark.filterwarnings("ignore:.*faulty-sensor")
 
 
 def campaign(n_rows=4000, seed=0, noise=0.02):

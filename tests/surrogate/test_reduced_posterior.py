@@ -106,7 +106,7 @@ def test_rows_that_end_outside_the_box_are_solved_by_the_full_model_and_counted(
     np.testing.assert_array_equal(np.flatnonzero(outside), [4, 7, 9])
     np.testing.assert_array_equal(found.by_full_model, outside)
     assert is_same(found, exact)
-    with pytest.warns(UserWarning, match="outside the box of the reduced model.*outside-reduced-model"):
+    with pytest.warns(UserWarning, match="outside the box of the reduced model.*outside-bounds"):
         reduced.transform(F)
 
 
@@ -115,7 +115,7 @@ def test_where_no_basis_is_accurate_the_full_model_is_solved(narrow):
     T, F = records(0.7, 0.95)
     with pytest.warns(UserWarning, match="(?s).*") as said:
         fem = chain().fit(T, F)
-    (text,) = (str(one.message) for one in said if one.message.kind == "no-reduced-model")
+    (text,) = (str(one.message) for one in said if one.message.kind == "outside-bounds")
     assert "expected errors up to 1e-05" in text
     found = fem.inverse_.invert(F)
     assert fem.inverse_.simulator_.reduced is fem.simulator_.reduced is None

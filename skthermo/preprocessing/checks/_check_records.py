@@ -132,7 +132,7 @@ def check_records(
     0  different-rows     305
     >>> print(check_records(year.temperatures[["T1"]] + 273.15))
     1 finding in 365 records.
-    unit: 'T1' lies between 268.093 and 309.327, as in kelvin, in 365 rows, 2025-01-01 to 2025-12-31
+    wrong-unit: 'T1' lies between 268.093 and 309.327, as in kelvin, in 365 rows, 2025-01-01 to 2025-12-31
         They are read as degrees Celsius and Hz. Convert them, or order modes as the model does
     """
     readings, findings, belong_together = examine(temperatures, frequencies, unit, model)

@@ -175,11 +175,11 @@ def look_at_temperatures(T: Reading) -> None:
         known = np.sort(column[~np.isnan(column)])
         if known.size and known[0] > COLDEST + 273.15 and known[-1] < HOTTEST + 273.15:
             detail = f"lies between {known[0]:.6g} and {known[-1]:.6g}, as in kelvin,"
-            T.found_in("unit", place, detail, meaningless=True)
+            T.found_in("wrong-unit", place, detail, meaningless=True)
             continue
         wrong = np.isin(column, marker_levels(known, 30.0, COLDEST, HOTTEST))
         is_kelvin = wrong & (column > COLDEST + 273.15) & (column < HOTTEST + 273.15)
-        is_changed = T.put_aside("unit", place, is_kelvin, meaningless=True)
+        is_changed = T.put_aside("wrong-unit", place, is_kelvin, meaningless=True)
         if T.put_aside("placeholders", place, wrong) or is_changed:
             known = np.sort(column[~np.isnan(column)])
         low, high = usual_range(known, 10.0)  # a structure passes gaps while records are left out
@@ -320,7 +320,7 @@ def in_degrees(T: Reading, places: list[int]) -> list[int]:
         hint = hints.get(number, "beside others in such a unit" if is_rule else "")
         if hint:
             span = f"lies between {lowest[number]:.6g} and {highest[number]:.6g}"
-            T.found_in("unit", place, f"{span}, {hint},")
+            T.found_in("wrong-unit", place, f"{span}, {hint},")
         else:
             celsius.append(place)
     return celsius
@@ -386,13 +386,13 @@ def compare_with_model(F: Reading, model: Any) -> None:
     if typical[best] < 0.2 and typical[0] > 0.5:
         detail = f"the medians {texts_of(middles)} beside {texts_of(nominal)} Hz of the model are about those in"
         detail = f"{detail} {names[best]}; {len(everywhere)} rows"
-        F.found("unit", "", everywhere, detail, meaningless=True)
+        F.found("wrong-unit", "", everywhere, detail, meaningless=True)
         return
     for place in np.flatnonzero(off[0] > 0.5):
         fits = np.flatnonzero(off[1:, place] < 0.2)
         hint = f", as in {names[1 + fits[0]]}," if len(fits) else ""
         detail = f"has the median {middles[place]:.4g}, the model {nominal[place]:.4g} Hz{hint}"
-        F.found_in("unit", place, detail)
+        F.found_in("wrong-unit", place, detail)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ WARNINGS = {
     "useless-column": "columns say nothing, or repeat another: {}. Nothing can be learned from them, and a spread of "
     "zero makes any change infinite. Repair the sensors, or leave the columns out",
     "set-aside": "values cannot be measurements: {}. They count as missing. Put NaN there",
-    "unit": "columns have another unit or sign: {}. They are read as degrees Celsius and Hz. Convert them, or "
+    "wrong-unit": "columns have another unit or sign: {}. They are read as degrees Celsius and Hz. Convert them, or "
     "order modes as the model does",
     "exchanged-tables": "temperatures and frequencies look exchanged: {}. Frequencies would be predicted from "
     "frequencies, which hides all damage. Give temperatures in the first table only, and frequencies in the second",

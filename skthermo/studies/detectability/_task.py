@@ -320,7 +320,7 @@ class DetectionTask(Bunch):
         fresh, findings = _task(self.fem, T, self.scenarios, self.baseline, self.measurement, limit, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
             text = "the weather is that of the task: the optimism is that of the noise alone. Give that of another year"
-            findings.append(WeatherWarning(text, "weather"))
+            findings.append(WeatherWarning(text, "other-weather"))
         rows = []
         for name, detector in named.items():
             fitted = self.refit(detector)
