@@ -604,7 +604,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         Whether steps are taken on the reduced model ``model.reduced(bounds)`` within what the records need, much faster
         for large models. "auto" reduces where ``model.reduction_pays`` and a basis is accurate. True allows a relative
         error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. Rows that end outside its box
-        are solved by the full model, with a warning that counts them (:doc:`/guide/costs`).
+        are solved by the full model (:doc:`/guide/costs`).
     memory : str or joblib.Memory, optional
         Folder for what `fit` learns and for the inversion of the records, so that searches and cross-validation make
         each only once. Clear it when the program behind a model of your own changes.
@@ -806,8 +806,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
               they have reached;
             - ``by_full_model`` (n_samples,): whether the full model was solved for the row because steps ended outside
               the box of the reduced one;
-            - ``findings``, a list: warnings that more than 1 % of the rows have not converged, or were solved by the
-              full model.
+            - ``findings``, a list: a warning if more than 1 % of the rows have not converged.
 
         Examples
         --------

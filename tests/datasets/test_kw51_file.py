@@ -161,7 +161,7 @@ def test_bad_content_names_file_field_and_place(tmp_path):
 
 def test_a_doubtful_weather_channel_does_not_hide_the_rest(tmp_path):
     file = write(tmp_path / "modes.mat", kw51_fields() | replaced("env", (4, 5), -999))
-    with pytest.warns(UserWarning, match=r"'env' .*row 4, column 'grVL'.*-999.*\[placeholders\]"):
+    with pytest.warns(UserWarning, match=r"'env' .*row 4, column 'grVL'.*-999.*\[doubtful-values\]"):
         data = load_kw51(file)
     assert data.temperatures["grVL"].iloc[4] == -999
 

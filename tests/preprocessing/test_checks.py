@@ -123,7 +123,7 @@ class TestTime:
         found = one(check_records(T, F.shift(shift)))
         assert found["what"] == "different-rows"
         direction = "before" if shift > 0 else "after"
-        assert f"those of 60 rows {direction} (about 60 days)" in found["detail"]
+        assert f"temperatures of 60 rows {direction} (about 60 days)" in found["detail"]
         array = one(check_records(T.to_numpy(), F.shift(shift).to_numpy()))
         assert array["detail"] == found["detail"].replace(" (about 60 days)", "")
 
@@ -140,7 +140,7 @@ class TestTime:
         tables = [pd.DataFrame(table, index).iloc[abs(shift) : -abs(shift)] for table in (late, modes)]
         found = one(check_records(*tables))
         assert found["what"] == "different-rows"
-        rows, direction = re.search(r"those of (\d+) rows (\w+)", found["detail"]).groups()
+        rows, direction = re.search(r"temperatures of (\d+) rows (\w+)", found["detail"]).groups()
         assert abs(int(rows) - abs(shift)) <= 1  # the deck follows the air within a row
         assert direction == ("after" if shift > 0 else "before")
 

@@ -157,7 +157,7 @@ class TestUnits:
 
     def test_periods_and_modes_too_few(self):
         assert kinds(check_records(None, 1 / F, model=make_truss())) == {"wrong-unit"}
-        assert kinds(check_records(None, F.iloc[:, 1:], model=make_truss())) == {"wrong-unit"}
+        assert kinds(check_records(None, F.iloc[:, 1:], model=make_truss())) == {"mode-order"}
 
 
 class TestTables:

@@ -243,11 +243,11 @@ def set_aside(
     others.refuse_meaningless()
     for reading in readings:
         reading.use(ASIDE_REASONS - reasons)
-        tables[reading.what], reasons = reading.cleaned(**needs)
-        left_out |= reasons
-        if reading.columns and set(reading.columns) == set(reasons):
+        tables[reading.what], useless = reading.cleaned(**needs)
+        left_out |= useless
+        if reading.columns and set(reading.columns) == set(useless):
             raise ValueError(
-                f"no column of the {reading.what} can be used: {'; '.join(reasons.values())}; expected measurements"
+                f"no column of the {reading.what} can be used: {'; '.join(useless.values())}; expected measurements"
             )
     RecordFindings(table[:0], n_rows, left_out=left_out).refuse_meaningless(needs_all=needs_all)
     aside = table[is_useless | what.isin(reasons)]

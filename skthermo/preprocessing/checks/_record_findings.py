@@ -32,7 +32,7 @@ WARNINGS = {
     "exchanged-tables": "temperatures and frequencies look exchanged: {}. Frequencies would be predicted from "
     "frequencies, which hides all damage. Give temperatures in the first table only, and frequencies in the second",
     "mode-order": "columns do not have one mode of the model each: {}. One mode would be read as another. Track modes "
-    "by shape, and give those of the model in their order, or model.with_modes of those that match_modes finds",
+    "by shape, or order columns as the model does (match_modes finds how)",
     "doubtful-values": "frequencies are far from their neighbours in time and from a regression on the weather: {}. "
     "Impossible values are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
     "HampelFilter does",
@@ -136,7 +136,7 @@ class RecordFindings(SavesFrames):
     >>> print(check_records(year.temperatures, year.frequencies))
     1 finding in 365 records.
     stuck: 'T1' is 20 °C in 31 of 365 rows, 2025-12-01 to 2025-12-31
-        They count as missing. Put NaN where a sensor or a mode is stuck
+        They count as missing. Put NaN there
     """
 
     table: pd.DataFrame
@@ -157,9 +157,9 @@ class RecordFindings(SavesFrames):
         if self.table.empty:
             return f"No finding in {self.n_rows} records."
         lines = [f"{len(self.table)} finding{'s' if len(self.table) > 1 else ''} in {self.n_rows} records."]
-        for kind, rows in self.table.groupby("what", sort=False):
-            lines += [f"{kind}: {detail}" for detail in rows["detail"]]
-            lines.append(f"    {rows['consequence'].iloc[0]}. {rows['action'].iloc[0]}")
+        for (consequence, action), rows in self.table.groupby(["consequence", "action"], sort=False):
+            lines += [f"{what}: {detail}" for what, detail in zip(rows["what"], rows["detail"], strict=True)]
+            lines.append(f"    {consequence}. {action}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
