@@ -92,11 +92,8 @@ def kinds_of_warnings(tree):
     """Kinds of warnings, each with the category that the source gives it; None in the table of findings' texts."""
     for node in ast.walk(tree):
         match node:
-            case (
-                ast.Call(func=ast.Name(id=category), args=[_, ast.Constant(value=kind)])
-                | ast.Call(func=ast.Name(id="as_findings"), args=[ast.Name(id=category), _, ast.Constant(value=kind)])
-            ) if re.fullmatch(r"\w+Warning", category):
-                yield kind, category
+            case ast.Call(func=ast.Name(id=name), args=[_, ast.Constant(value=kind)]) if name.endswith("Warning"):
+                yield kind, name
             case ast.Assign(targets=[ast.Name(id="WARNINGS")], value=ast.Dict(keys=keys)):
                 yield from ((key.value, None) for key in keys)
 

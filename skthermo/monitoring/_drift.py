@@ -799,8 +799,8 @@ class ParameterHistory(Sentences):
                 f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
             )
         harmless = {"few-records", "useless-column"}
-        found = set_aside(frequencies=F, exclude=harmless, needs_all=True, is_baseline=False)
-        warn_each(found.others.warnings())
+        found, doubts = set_aside(frequencies=F, exclude=harmless, needs_all=True, is_baseline=False)
+        warn_each(doubts)
         days = self.shifts.index
         of_day = np.clip(days.searchsorted(F.index, side="right") - 1, 0, len(days) - 1)
         return frame_like(F, as_floats(found.frequencies) * np.exp(-self.shifts.to_numpy()[of_day]))
@@ -862,8 +862,8 @@ def _checked(fem: Any, T: Any, F: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
     if not len(F):
         raise ValueError("F has 0 samples; expected at least one record")
     in_order = (table.sort_index(kind="stable") for table in (T, F))
-    found = set_aside(*in_order, model=fem.model, exclude={"few-records"})
-    warn_each(found.others.warnings())
+    found, doubts = set_aside(*in_order, model=fem.model, exclude={"few-records"})
+    warn_each(doubts)
     firsts = (table[~table.index.duplicated()] for table in (found.temperatures, found.frequencies))
     T, F = (
         table.drop(columns=list(found.left_out), errors="ignore").reindex(columns=table.columns) for table in firsts

@@ -32,9 +32,9 @@ from skthermo._core.estimators import (
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
-from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
-from skthermo.residuals.sensors import SensorRegression, filled_text
-from skthermo.residuals.weather import TrainingRange, unpredicted_text
+from skthermo.exceptions import ModelWarning, SkthermoWarning
+from skthermo.residuals.sensors import SensorRegression, filled_findings
+from skthermo.residuals.weather import TrainingRange, unpredicted_findings
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
 from skthermo.surrogate._simulator import Simulator
 
@@ -179,15 +179,13 @@ class ThermalModel(SavesFrames):
 
     def doubts(self, weather: Weather) -> list[SkthermoWarning]:
         """Findings: filled sensors, unknown weather, impossible parameters."""
-        findings = self.sensors.doubts(weather.given)
         consequence = "Standard deviations and intervals of predictions include the error of that"
-        message = filled_text(weather.deviations, column_names(weather.filled, "T"), consequence)
-        if message:
-            findings.append(RecordsWarning(message, "faulty-sensor"))
-        message = unpredicted_text(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled))
-        if message:
-            findings.append(UnevaluatedRowsWarning(message, "not-evaluated"))
-        findings += self.training_range.doubts(weather.inputs)
+        findings = [
+            *self.sensors.doubts(weather.given),
+            *filled_findings(weather.deviations, column_names(weather.filled, "T"), consequence),
+            *unpredicted_findings(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled)),
+            *self.training_range.doubts(weather.inputs),
+        ]
         if weather.impossible.any():
             findings.append(
                 ModelWarning(

@@ -59,51 +59,41 @@ def unfinished(outcome: Outcome, residuals: Residuals) -> ModelWarning:
 def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[RecordsWarning]:
     """Warnings about measured modes that are not the modes in the updated model's columns of the same number."""
     names = np.array(measured.names)
-    if not (measured.dofs.size and hasattr(model, "local_modes")):
-        swapped = names[_swapped(model, theta)[measured.columns]]
-        if swapped.size:
+    if measured.dofs.size and hasattr(model, "local_modes"):
+        modes = paired_modes(model, measured, theta)
+        unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < LOW_MAC)]
+        if unlike.size:
             yield RecordsWarning(
-                f"modes {swapped.tolist()} change their order between the nominal model and the optimum. Frequencies "
-                "of other modes are fitted to theirs. Use a model with track=True, or give shapes",
-                "mode-order",
+                f"no mode of the updated model has the measured shapes of {unlike.tolist()} (MAC below {LOW_MAC}). "
+                "Check the order and signs of the sensors (dofs), or leave these shapes out",
+                "doubtful-shapes",
             )
-        return
-    modes = paired_modes(model, measured, theta)
-    unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < LOW_MAC)]
-    if unlike.size:
-        yield RecordsWarning(
-            f"no mode of the updated model has the measured shapes of {unlike.tolist()} (MAC below {LOW_MAC}). Check "
-            "the order and signs of the sensors (dofs), or leave these shapes out",
-            "doubtful-shapes",
-        )
-    columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
-    other = names[modes.ranks != columns[measured.columns]]
+        columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
+        other = names[modes.ranks != columns[measured.columns]]
+        what = "have the shapes of other modes of the updated model than those in their columns"
+    else:
+        other = names[_swapped(model, theta)[measured.columns]]
+        what = "change their order between the nominal model and the optimum, and are fitted to other modes"
     if other.size:
         yield RecordsWarning(
-            f"modes {other.tolist()} have the shapes of other modes of the updated model than those in their columns. "
-            "Put the measured modes in the model's order, or use track=True where modes change their order",
+            f"modes {other.tolist()} {what}. Put the measured modes in the model's order, give shapes, or use "
+            "track=True where modes change their order",
             "mode-order",
         )
 
 
-def undetermined(names: Sequence[str], n_residuals: int, covariance: Array) -> Iterator[ResultWarning]:
-    """The warning, without a prior, about parameters that the measured modes do not determine."""
-    if len(names) > n_residuals:
-        yield ResultWarning(
-            f"{len(names)} parameters are to be found from {n_residuals} residuals. Many theta fit equally well. Use "
-            "fewer parameters, shapes, or a prior",
-            "undetermined",
-        )
-        return
+def undetermined(names: Sequence[str], n_residuals: int, covariance: Array) -> list[ResultWarning]:
+    """The finding, without a prior, that the measured modes do not determine some parameters."""
     deviations = np.sqrt(np.diagonal(covariance))
     hardly = ~(deviations < 1e4 * np.fmin.reduce(deviations))
-    if hardly.any() and not hardly.all():
+    if len(names) > n_residuals:
+        text = f"{len(names)} parameters are to be found from {n_residuals} residuals. Many theta fit equally well"
+    elif hardly.any() and not hardly.all():
         listed = [names[i] for i in np.flatnonzero(hardly)]
-        yield ResultWarning(
-            f"the parameters {listed} hardly move the measured modes and are not determined. Leave them out, or "
-            "give a prior",
-            "undetermined",
-        )
+        text = f"the parameters {listed} hardly move the measured modes, and are not determined"
+    else:
+        return []
+    return [ResultWarning(f"{text}. Use fewer parameters, shapes, or a prior", "undetermined")]
 
 
 def at_bounds(theta: Array, bounds: Array) -> NDArray[np.bool_]:

@@ -100,13 +100,13 @@ class TestStuck:
         warm, stiff = T.copy(), F.copy()
         warm.iloc[rows, 1], stiff.iloc[rows, 2] = 20.0, F.iloc[first, 2]
         with pytest.warns(UserWarning, match="'T2' is 20 °C in 40 of .*; 'f3' is .* Hz in 40 of "):
-            found = set_aside(warm, stiff)
+            found, _ = set_aside(warm, stiff)
         assert found.table["what"].tolist() == ["stuck", "stuck"]
         assert found.temperatures.isna().to_numpy().sum() == found.frequencies.isna().to_numpy().sum() == 40
         assert check_records(warm, stiff).table["what"].tolist() == ["stuck", "stuck"]
 
     def test_lags_begin_with_copies_and_are_not_set_aside(self):
-        assert set_aside(LagFeatures([0, 24]).fit_transform(T), F).table.empty
+        assert set_aside(LagFeatures([0, 24]).fit_transform(T), F)[0].table.empty
 
     @pytest.mark.parametrize("kind", [pd.DataFrame, np.asarray])
     def test_lags_of_a_sensor_are_no_sensors(self, kind):
@@ -253,7 +253,7 @@ def test_the_cleaned_tables_are_those_of_set_aside():
     spoiled.iloc[7, 1] = 0.0
     found = check_records(stuck, spoiled)
     with pytest.warns(UserWarning, match="set-aside|useless-column"):
-        expected = set_aside(stuck, spoiled)
+        expected, _ = set_aside(stuck, spoiled)
     assert found.temperatures["T1"].isna().sum() == 2
     assert found.left_out == expected.left_out == {"T3": found.left_out["T3"]}
     pd.testing.assert_frame_equal(found.temperatures, expected.temperatures)

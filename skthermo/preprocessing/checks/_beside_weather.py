@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -205,16 +204,15 @@ def looks_exchanged(temperatures: Array, frequencies: Array) -> bool:
     return bool(np.median(vary[0]) < min(0.075, np.median(vary[1]) / 4))
 
 
-def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[RecordsWarning]:
-    """A warning about temperatures that behave like frequencies, and one about frequencies that behave like
-    temperatures.
+def misplaced_columns(temperatures: Table, frequencies: Table) -> list[RecordsWarning]:
+    """The finding of temperatures that behave like frequencies, and of frequencies that behave like temperatures.
 
     Frequencies are positive, vary by a few percent of their median, at most 15, and rise and fall together (rank
     correlation above .1). Temperatures in degrees Celsius vary five times as much, and are nearly equal (rank
     correlation above .6).
     """
     if len(temperatures) < 30:
-        return
+        return []
     T, F = TypicalColumns(temperatures, "T"), TypicalColumns(frequencies, "f")
     steady = F.variation[F.variation <= 0.15]
     usual = np.median(steady) if len(steady) else np.min(T.variation, initial=0.15)
@@ -222,27 +220,26 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
     is_mode = (T.variation <= 3.0 * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
     is_mode &= T.variation <= 0.15
     if not is_mode.any() and not is_temperature.any():
-        return
+        return []
     ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=30).fillna(0).to_numpy()
     n_sensors = len(T.names)
     among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
     together = across[:, ~is_temperature].mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
     is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), 0.1)
     is_temperature &= ((across > 0.6) & T.nearly(F))[~is_mode].any(axis=0)
+    found = []
     if is_mode.any():
-        yield RecordsWarning(
+        found.append(
             f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
-            "A mode that predicts the others hides damage. Put all modes among the targets, and only temperatures "
-            "beside them",
-            "exchanged-tables",
+            "A mode that predicts the others hides damage"
         )
     if is_temperature.any():
-        yield RecordsWarning(
+        found.append(
             f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
-            "and are nearly equal to other temperatures. A detector would evaluate the weather. Give only frequencies "
-            "as targets",
-            "exchanged-tables",
+            "and are nearly equal to other temperatures. A detector would evaluate the weather"
         )
+    text = f"{', and '.join(found)}. Put all modes, and nothing else, among the targets"
+    return [RecordsWarning(text, "exchanged-tables")] if found else []
 
 
 class TypicalColumns:

@@ -3,7 +3,7 @@ records are named."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Hashable
 from operator import itemgetter
 from typing import Any
 
@@ -13,6 +13,7 @@ import pandas as pd
 from skthermo._core.arrays import check_model
 from skthermo._core.frames import as_stamps
 from skthermo._core.warnings import warn_each
+from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._beside_weather import look_at_both, looks_exchanged
 from skthermo.preprocessing.checks._columns import (
     Reading,
@@ -26,7 +27,6 @@ from skthermo.preprocessing.checks._record_findings import (
     WARNINGS,
     RecordFinding,
     RecordFindings,
-    SetAside,
     findings_table,
     period_of,
 )
@@ -161,7 +161,7 @@ def set_aside(
     exclude: Collection[str] = (),
     needs_all: bool = False,
     is_baseline: bool = True,
-) -> SetAside:
+) -> tuple[RecordFindings, list[RecordsWarning]]:
     """Put NaN in place of values that cannot be measurements.
 
     These are infinite values, numbers that loggers write for a missing value, frequencies that are not positive, values
@@ -191,8 +191,10 @@ def set_aside(
 
     Returns
     -------
-    SetAside
-        The tables, what was set aside, and which columns are left out.
+    RecordFindings
+        The tables, NaN where a value was set aside, and columns that are left out; its ``table`` has these alone.
+    list of RecordsWarning
+        What else is doubtful.
 
     Raises
     ------
@@ -215,7 +217,7 @@ def set_aside(
     >>> year.temperatures.loc["2025-03", "T1"] = 484.667
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore")
-    ...     found = set_aside(year.temperatures, year.frequencies)
+    ...     found, doubts = set_aside(year.temperatures, year.frequencies)
     >>> found.table[["what", "column", "n_rows"]]
                what column  n_rows
     0  placeholders     T1      31
@@ -230,11 +232,9 @@ def set_aside(
     reasons = (ASIDE_REASONS if is_baseline else {"placeholders"}).difference(exclude)
     needs_change = "useless-column" not in exclude
     needs = {"needs_change": needs_change, "needs_values": needs_change or is_baseline}
-    tables, left_out, n_rows = {"temperatures": None, "frequencies": None}, {}, 0
-    for reading in readings:
-        findings += reading.findings
-        n_rows = max(n_rows, len(reading.values))
-    table = findings_table(findings)
+    tables, left_out = dict[str, Any](), dict[Hashable, str]()
+    n_rows = max((len(reading.values) for reading in readings), default=0)
+    table = findings_table([*findings, *(one for reading in readings for one in reading.findings)])
     what, is_meaningless = table["what"], table["severity"] == "meaningless"
     is_useless = is_meaningless & (what == "useless-column")
     is_harmless = what.isin(ASIDE_REASONS) | (is_meaningless & what.isin(list(exclude)))
@@ -250,9 +250,9 @@ def set_aside(
             )
     RecordFindings(table[:0], n_rows, left_out=left_out).refuse_meaningless(needs_all=needs_all)
     aside = table[is_useless | what.isin(reasons)]
-    found = SetAside(**tables, table=aside, left_out=left_out, others=others)
+    found = RecordFindings(aside, n_rows, **tables, left_out=left_out)
     warn_each(found.warnings())
-    return found
+    return found, list(others.warnings())
 
 
 def times_found(index: pd.Index) -> list[RecordFinding]:

@@ -231,48 +231,6 @@ class RecordFindings(SavesFrames):
             raise ValueError(". ".join(texts))
 
 
-@dataclass(frozen=True)
-class SetAside(SavesFrames):
-    """Tables with NaN in place of values that cannot be measurements, and a table of these values.
-
-    Parameters
-    ----------
-    temperatures, frequencies : array-like or DataFrame, or None
-        The tables as they were given, NaN where a value was set aside.
-    table : DataFrame
-        A row for each finding, as in `RecordFindings`: which values count as missing, and why.
-    left_out : dict
-        Columns that cannot be used at all, each with the reason.
-    others : RecordFindings
-        What else was found, which is doubtful.
-
-    Examples
-    --------
-    >>> from skthermo.datasets import make_truss_campaign
-    >>> from skthermo.preprocessing.checks import set_aside
-    >>> year = make_truss_campaign(random_state=0)
-    >>> found = set_aside(year.temperatures, year.frequencies)
-    >>> len(found.table), found.left_out
-    (0, {})
-    """
-
-    temperatures: Table | None
-    frequencies: Table | None
-    table: pd.DataFrame
-    left_out: dict[Hashable, str]
-    others: RecordFindings
-
-    def warnings(self) -> Iterator[RecordsWarning]:
-        """One warning that counts and names the values, and one that names the columns that are left out.
-
-        Returns
-        -------
-        iterator of RecordsWarning
-            Of kind "set-aside" or "useless-column".
-        """
-        return RecordFindings(self.table, 0, left_out=self.left_out).warnings()
-
-
 def listed_details(details: Any) -> str:
     """Details of at most a dozen findings one after the other."""
     rest = len(details) - 12

@@ -526,9 +526,9 @@ def _baseline(fem: DataInformedFEM, baseline: Table | None) -> tuple[pd.DataFram
     is_sensor = table.columns.isin(sensors_of(fem))
     T, F = (table.loc[:, chosen] if chosen.any() else None for chosen in (is_sensor, ~is_sensor))
     is_whole = table.shape[1] == len(sensors_of(fem)) + len(fem.mode_names_)
-    found = set_aside(T, F, model=fem.model if is_whole else None, needs_all=True)
+    found, doubts = set_aside(T, F, model=fem.model if is_whole else None, needs_all=True)
     tables = [one for one in (found.temperatures, found.frequencies) if one is not None]
-    return pd.concat(tables, axis=1)[list(table)], found.others.warnings()
+    return pd.concat(tables, axis=1)[list(table)], [*doubts]
 
 
 def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:

@@ -178,7 +178,8 @@ def _checked(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
     kinds = {"few-records", "useless-column"}
-    return as_floats(set_aside(T, F, model=fem.model, exclude=kinds, needs_all=True, is_baseline=False).frequencies)
+    found, _ = set_aside(T, F, model=fem.model, exclude=kinds, needs_all=True, is_baseline=False)
+    return as_floats(found.frequencies)
 
 
 @dataclass(frozen=True)
