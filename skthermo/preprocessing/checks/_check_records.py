@@ -320,9 +320,8 @@ def rows_found(tables: list[Reading]) -> list[RecordFinding]:
     is_known = ~np.isnan(first.values[:n_rows]).all(axis=1) & ~np.isnan(last.values[:n_rows]).all(axis=1)
     known = np.flatnonzero(is_known)
     if len(known) < 50 and (len(known) or not n_findings):
-        detail = f"{len(known)} of {n_rows} rows have values"
-        is_one = len(known) <= 1
-        found.append(RecordFinding.in_rows(first.index, "few-records", "", known, detail, meaningless=is_one))
+        detail, is_error = f"{len(known)} of {n_rows} rows have values", len(known) < 2
+        found.append(RecordFinding.in_rows(first.index, "few-records", "", known, detail, meaningless=is_error))
     return found
 
 

@@ -114,7 +114,7 @@ class Reading:
         share = f"{n_rows} rows" if n_found == n_rows else f"{n_found} of {n_rows} rows"
         self.found(what, name, rows, f"{name!r} {detail} in {share}", meaningless=meaningless)
 
-    def put_aside(self, what: str, place: int, wrong: NDArray[np.bool_], *, meaningless: bool = False) -> bool:
+    def put_aside(self, what: str, place: int, wrong: NDArray[np.bool_], *, is_kelvin: bool = False) -> bool:
         """Add a finding where values of a column are wrong; these, and single values between them, become NaN."""
         column = self.values[:, place]
         wrong = wrong & ~np.isnan(column)
@@ -122,7 +122,8 @@ class Reading:
             return False
         levels = np.unique(column[wrong])
         named = texts_of(levels) if len(levels) <= 3 else f"{levels[0]:.6g} to {levels[-1]:.6g}"
-        self.found_in(what, place, f"is {named}{self.unit}", wrong, meaningless=meaningless)
+        unit = ", as in kelvin," if is_kelvin else self.unit
+        self.found_in(what, place, f"is {named}{unit}", wrong, meaningless=is_kelvin)
         wrong[1:-1] |= wrong[:-2] & wrong[2:]
         self._aside.append((what, place, wrong))
         column[wrong] = np.nan
@@ -178,8 +179,8 @@ def look_at_temperatures(T: Reading) -> None:
             T.found_in("wrong-unit", place, detail, meaningless=True)
             continue
         wrong = np.isin(column, marker_levels(known, 30.0, COLDEST, HOTTEST))
-        is_kelvin = wrong & (column > COLDEST + 273.15) & (column < HOTTEST + 273.15)
-        is_changed = T.put_aside("wrong-unit", place, is_kelvin, meaningless=True)
+        kelvin = wrong & (column > COLDEST + 273.15) & (column < HOTTEST + 273.15)
+        is_changed = T.put_aside("wrong-unit", place, kelvin, is_kelvin=True)
         if T.put_aside("placeholders", place, wrong) or is_changed:
             known = np.sort(column[~np.isnan(column)])
         low, high = usual_range(known, 10.0)  # a structure passes gaps while records are left out
@@ -370,7 +371,7 @@ def compare_with_model(F: Reading, model: Any) -> None:
     nominal = np.ravel(model.frequencies(np.ones((1, len(model.parameter_names)))))
     everywhere = np.ones(len(F.values), dtype=bool)
     if len(nominal) != len(F.columns):
-        detail = f"{len(F.columns)} columns for {len(nominal)} modes"
+        detail = f"{len(F.columns)} columns for {len(nominal)} modes of the model"
         F.found("mode-order", "", everywhere, detail, meaningless=True)
         return
     middles = median(F.values)

@@ -24,15 +24,15 @@ WARNINGS = {
     "learned. Join the tables by their times",
     "wrong-stamps": "times are missing, wrong, repeated or not in order: {}. Lags, means and folds take rows for "
     "periods of time. Read times by pandas.to_datetime with format= or unit=, keep one row for each, and sort_index()",
-    "useless-column": "columns say nothing, or repeat another: {}. Nothing can be learned from them, and a spread of "
-    "zero makes any change infinite. Repair the sensors, or leave the columns out",
+    "useless-column": "columns say nothing, or repeat another: {}. They carry no information, or carry it twice. "
+    "Repair the sensors, or leave the columns out",
     "set-aside": "values cannot be measurements: {}. They count as missing. Put NaN there",
     "wrong-unit": "columns have another unit or sign: {}. They are read as degrees Celsius and Hz. Convert them, or "
     "order modes as the model does",
     "exchanged-tables": "temperatures and frequencies look exchanged: {}. Frequencies would be predicted from "
     "frequencies, which hides all damage. Give temperatures in the first table only, and frequencies in the second",
     "mode-order": "columns do not have one mode of the model each: {}. One mode would be read as another. Track modes "
-    "by shape, or order columns as the model does (match_modes finds how)",
+    "by shape, order columns as the model does, or give it the same modes by with_modes (match_modes finds them)",
     "doubtful-values": "frequencies are far from their neighbours in time and from a regression on the weather: {}. "
     "Impossible values are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
     "HampelFilter does",
