@@ -221,15 +221,15 @@ class LagFeatures(PastFeatures):
         begins = values[: reach + 1]
         if not reach or np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True):
             return []
-        done = "the first record stands for them" if self.padding == "edge" else "lags are missing"
-        return no_earlier_records(f"lags reach {reach} rows back, beyond the first row, where {done}", f"{reach} rows")
+        done = "are padded with the first record" if self.padding == "edge" else "lack lags"
+        return no_earlier_records(f"lags reach {reach} rows back, and the first rows {done}", f"{reach} rows")
 
     def _doubts_of_history(self, unknown: NDArray[np.bool_]) -> list[FewRecordsWarning]:
         """A finding where more than half of the rows have lags that reach before the first of them and find nothing."""
         if 2 * unknown.sum() <= len(unknown):
             return []
         reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
-        return no_earlier_records(f"lags reach {reach} back, and most rows have no records there", reach)
+        return no_earlier_records(f"lags reach {reach} back, and most rows lack lags", reach)
 
     def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
         n_rows, sensors = len(values), np.ascontiguousarray(values.T)
