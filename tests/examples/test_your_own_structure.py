@@ -15,7 +15,7 @@ SAID = {
     "a thermometer that died": "faulty-sensor",
     "a thermometer that got stuck": "'T1' is 10 °C in 250 of 400 rows",
     "30 records": "few-records",
-    "kelvin in fit": "look like kelvin",
+    "kelvin in fit": "as in kelvin",
     "kelvin in predict": "other-weather",
     "Fahrenheit in predict": "other-weather",
 }

@@ -270,7 +270,7 @@ def has_levels(table: Reading, place: int, known: Array) -> bool:
         rows = np.ones(len(table.values), dtype=bool)
         table.found("useless-column", name, rows, f"{name!r} is NaN in all {len(rows)} rows", meaningless=True)
     elif len(levels) == 1 < n_known:
-        table.found_in("useless-column", place, f"is constant, {levels[0]:.6g}{table.unit}", meaningless=True)
+        table.found_in("useless-column", place, f"is {levels[0]:.6g}{table.unit}, constant,", meaningless=True)
     elif n_known and is_coarse:
         table.found_in("useless-column", place, f"has only the values {texts_of(levels)}{table.unit}")
     if len(levels) < 2 or is_coarse:

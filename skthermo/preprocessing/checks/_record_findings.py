@@ -20,8 +20,8 @@ WARNINGS = {
     "two-dimensional array of numbers, a row for each record, and each column a name of its own, one text each",
     "few-records": "there are few records: {}. Nothing can be learned from them but chance. Give the records of a "
     "year, or at least of weeks",
-    "different-rows": "rows of both tables do not seem to belong together: {}. The weather of other times would be "
-    "learned. Join the tables by their times",
+    "different-rows": "the tables have different rows, or rows of different times: {}. The weather of other times "
+    "would be learned. Join the tables by their times",
     "wrong-stamps": "times are missing, wrong, repeated or not in order: {}. Lags, means and folds take rows for "
     "periods of time. Read times by pandas.to_datetime with format= or unit=, keep one row for each, and sort_index()",
     "useless-column": "columns say nothing, or repeat another: {}. They carry no information, or carry it twice. "
