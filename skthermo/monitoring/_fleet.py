@@ -799,12 +799,13 @@ class Discoveries:
         str
             One sentence a line.
         """
-        n_open = self.table.loc[self.table["end"].isna(), "bridge"].nunique()
-        names = f": {listed(self.bridges)}" if self.bridges else ""
+        names, n_open = self.bridges, self.table.loc[self.table["end"].isna(), "bridge"].nunique()
         alarms = counted_number(float(significant(self.false_alarms_per_year, 2)), "false alarm")
+        found = f"{len(names)} of them significantly after correction for many bridges{': ' if names else ''}"
         lines = [
-            f"{n_open} of {self.n_evaluated} evaluated bridges in alarm, {len(self.bridges)} of them significantly "
-            f"after correction for many bridges{names}.",
+            f"{n_open} of {self.n_evaluated} evaluated bridges are in alarm, {found}{listed(names)}."
+            if n_open
+            else f"None of the {self.n_evaluated} evaluated bridges is in alarm.",
             f"Expected if all bridges are healthy: {alarms} a year over all bridges, "
             f"{significant(self.false_discoveries_per_year, 2)} of them significant.",
             f"False discovery rate: {percent(self.fdr)} of the significant bridges are healthy on average.",
