@@ -70,7 +70,7 @@ def weather_columns(T: Array, half_lives: Sequence[float] = (5.0, 30.0)) -> Arra
 
 
 def lasting_covariance(rest: Array, n_columns: int, lags: int = 10, n_waves: int = 12) -> tuple[Array, float]:
-    """Covariance of a day's residuals times the days for which they last, and as how many independent days all count.
+    """Covariance of a day's residuals times the days for which they last, and its degrees of freedom.
 
     ``rest`` has a row a day, NaN where a mode is missing, from a regression on so many columns. What is left of them
     by the day before is summed with its products up to some lags apart (Newey and West). What lasts for months, such
@@ -93,7 +93,8 @@ def lasting_covariance(rest: Array, n_columns: int, lags: int = 10, n_waves: int
         total *= np.outer(larger, larger)
     left = max(n_days.max() - n_columns, 1)
     total *= n_days.max() / left / np.sqrt(np.outer(n_days, n_days)).clip(1)
-    return total + 1e-16 * np.eye(len(total)), max(left * (1 - kept) / (1 + kept), 3.0)
+    n_independent = min(left * (1 - kept) / (1 + kept), 1.5 * len(rest) / (lags + 1))  # of a sum over so many lags
+    return total + 1e-16 * np.eye(len(total)), max(n_independent, 3.0)
 
 
 @dataclass(frozen=True)
