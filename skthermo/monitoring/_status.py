@@ -229,7 +229,7 @@ def status_of(monitor: Any) -> MonitorStatus:
     """The status of a fitted monitor by its records alone, whatever the time is."""
     evaluations, events, baseline = monitor.evaluations_, monitor.events_, monitor.baseline_.index
     known, faults = evaluations[evaluations["state"] != "not evaluated"], monitor.faults_
-    opened = events[events["end"].isna()].reset_index().rename(columns={"start": "since"})
+    opened = events[events["end"].isna()].rename_axis("event").reset_index().rename(columns={"start": "since"})
     for name in ("modes", "groups"):
         opened[name] = pd.Series([[one for one in text.split(", ") if one] for text in opened[name]], dtype=object)
     shown = ["event", "kind", "since", "peak", "modes", "groups", "acknowledged"]
