@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._core.arrays import as_random_state, is_real, positive_integer, real_array
 from skthermo.datasets._results import TrussCampaign
 from skthermo.fem import AffineModel, Bar, Structure, add_noise
+from skthermo.fem.damage import Kind
 
 TRUSS_GROUPS = ("bottom", "top", "diagonal", "vertical")
 TRUSS_ZONES = ("T1", "T2", "T3")
@@ -128,6 +129,7 @@ def make_truss_campaign(
     correlation: float = 0.0,
     drift: Mapping[str, float] | None = None,
     damage: Mapping[str, float] | None = None,
+    kind: Kind = "stiffness",
     damage_from: Stamp = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> TrussCampaign:
@@ -155,6 +157,8 @@ def make_truss_campaign(
     damage : mapping of str to float, optional
         Severity by group ("bottom", "top", "diagonal", "vertical"), as in ``model.damaged``, of the stiffness that the
         drift leaves.
+    kind : {"stiffness", "section"}, default="stiffness"
+        What damage and drift take, as in ``model.damaged``: the paper reduces cross-sections.
     damage_from : str, Timestamp or datetime, optional
         When the damage begins; by default with the first record.
     random_state : int, RandomState or None, default=None
@@ -217,10 +221,10 @@ def make_truss_campaign(
     model = truss_of_zones()
     theta = steel_modulus(temperatures)
     if drift is None and damage_from is None:
-        clean = model.damaged({} if damage is None else damage).frequencies(theta)
+        clean = model.damaged({} if damage is None else damage, kind=kind).frequencies(theta)
     else:
         factors = stiffness_factors(index, samples_per_year, TRUSS_GROUPS, drift, damage, damage_from)
-        clean = model.with_damage_parameters(list(factors)).frequencies(np.hstack([theta, factors]))
+        clean = model.with_damage_parameters(list(factors), kind=kind).frequencies(np.hstack([theta, factors]))
     noisy = add_noise(clean, noise, correlation=correlation, random_state=random)
     modes = [f"f{i + 1}" for i in range(model.n_modes)]
     return TrussCampaign(

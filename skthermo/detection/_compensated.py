@@ -258,13 +258,15 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         return self._by_regime(X, lambda detector, Z: detector.explained(Z))
 
     @available_if(_detector_has("pod"))
-    def pod(self, severities: ArrayLike) -> pd.DataFrame:
+    def pod(self, severities: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Probability of detection of records, or of full windows all of whose records have the loss.
 
         Parameters
         ----------
         severities : array-like of shape (n_severities,)
             Amounts of each direction, as `DirectionalDetector.pod` has them.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
@@ -272,16 +274,22 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             Share of records above the threshold, in the regimes as often as in the baseline.
         """
         check_is_fitted(self)
-        return sum(share * one.pod(severities) for share, one in zip(self.shares_, self.detectors_, strict=True))
+        options = {} if kind == "stiffness" else {"kind": kind}  # a detector of your own may have no kinds
+        rates = (one.pod(severities, **options) for one in self.detectors_)
+        return sum(share * rate for share, rate in zip(self.shares_, rates, strict=True))
 
     @available_if(_detector_has("minimum_detectable_damage"))
-    def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
+    def minimum_detectable_damage(
+        self, level: float = 0.9, *, kind: Literal["stiffness", "section"] = "stiffness"
+    ) -> pd.Series:
         """Smallest amount of each direction alone that is found in a share of the records or full windows.
 
         Parameters
         ----------
         level : float, default=0.9
             That share, between 0 and 1.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
@@ -289,16 +297,16 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             As `DirectionalDetector.minimum_detectable_damage`, in the regimes as often as in the baseline.
         """
         check_is_fitted(self)
-        level, alone = (
-            check_probability(level, "level"),
-            [one.minimum_detectable_damage(level) for one in self.detectors_],
-        )
+        level, options = check_probability(level, "level"), {} if kind == "stiffness" else {"kind": kind}
+        alone = [one.minimum_detectable_damage(level, **options) for one in self.detectors_]
         if len(alone) == 1:
             return alone[0]
         highest = pd.concat(alone, axis=1).max(axis=1)
         found = {
             name: smallest_amount(
-                lambda sizes, k=name: self.pod(sizes)[k].to_numpy(), most if np.isfinite(most) else 1.0, level
+                lambda sizes, k=name: self.pod(sizes, kind=kind)[k].to_numpy(),
+                most if np.isfinite(most) else 1.0,
+                level,
             )
             for name, most in highest.items()
         }

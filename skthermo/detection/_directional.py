@@ -30,9 +30,10 @@ class DirectionalDetector(MahalanobisDetector):
     directions : "softening", FE model, fitted chain, DataFrame or array, default="softening"
         Relative changes of the frequencies:
 
-        - ``"softening"``: each frequency can only fall.
+        - ``"softening"``: each frequency only falls, as by any loss of stiffness; a loss of section raises some.
         - An FE model, or a fitted `~skthermo.surrogate.DataInformedFEM`: those by a loss of stiffness of each of its
-          damage groups.
+          damage groups and, where it knows their mass, by a loss of section, named as in "bottom, section". Nobody
+          knows beforehand which comes.
         - (n_directions, n_modes): relative changes by one unit of each direction, in any unit. The columns of a frame
           are matched by name where both have names, and its index names the directions.
     contamination : float, default=0.02
@@ -188,9 +189,9 @@ class DirectionalDetector(MahalanobisDetector):
         -------
         DataFrame of shape (n_samples, n_directions)
             The amounts of the directions, none of them negative, that are most likely: with an FE model the loss of
-            stiffness of each group, with "softening" the fall of each frequency, from 0 to 1, by effects in proportion
-            to it; else in the unit of the given directions. NaN where a record has no mode. Directions of
-            ``indistinguishable_`` share what either could explain.
+            stiffness, and of section, of each group, with "softening" the fall of each frequency, from 0 to 1, by
+            effects in proportion to it; else in the unit of the given directions. NaN where a record has no mode.
+            Directions of ``indistinguishable_`` share what either could explain.
         """
         check_is_fitted(self)
         amounts = project(normal_of(self.covariance_), self.directions_.to_numpy(), self._relative(X))[0]
@@ -217,14 +218,16 @@ class DirectionalDetector(MahalanobisDetector):
         shares = np.full(len(F), np.nan)
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
 
-    def pod(self, severities: ArrayLike) -> pd.DataFrame:
+    def pod(self, severities: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Probability of detection of single records, by drawing normal ones from the learned covariance.
 
         Parameters
         ----------
         severities : array-like of shape (n_severities,)
-            Amounts of each direction: losses of stiffness of each group, or falls of each frequency, from 0 to 1, or
-            amounts in the unit of the given directions.
+            Amounts of each direction: losses of each group, or falls of each frequency, from 0 to 1, or amounts in the
+            unit of the given directions.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions: losses of section, named as in "bottom, section", or all others.
 
         Returns
         -------
@@ -234,7 +237,7 @@ class DirectionalDetector(MahalanobisDetector):
         Raises
         ------
         ValueError
-            If a severity is negative, or a loss larger than 1.
+            If a severity is negative, a loss larger than 1, or there is no direction of the kind.
         """
         check_is_fitted(self)
         amounts = np.ravel(real_array(severities, "severities"))
@@ -242,31 +245,52 @@ class DirectionalDetector(MahalanobisDetector):
             expected = "losses from 0 to 1" if self._largest == 1 else "amounts that are not negative"
             raise ValueError(f"severities is {severities!r:.200}; expected {expected}")
         white = self._white_effects()
-        rates = {name: self._rates(white, n, amounts) for n, name in enumerate(self.directions_.index)}
+        rates = {name: self._rates(white, n, amounts) for name, n in self._directions_of(kind).items()}
         return pd.DataFrame(rates, pd.Index(amounts, name="severity"))
 
-    def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
+    def minimum_detectable_damage(
+        self, level: float = 0.9, *, kind: Literal["stiffness", "section"] = "stiffness"
+    ) -> pd.Series:
         """Smallest amount of each direction alone that is found in a share of the records.
 
         Parameters
         ----------
         level : float, default=0.9
             That share, between 0 and 1.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `pod`.
 
         Returns
         -------
         Series of shape (n_directions,)
-            Loss of stiffness by group, or fall of each frequency, infinite where not even a whole loss is found; else
+            Loss by group, or fall of each frequency, infinite where not even a whole loss is found; else
             in the unit of the given directions.
         """
         check_is_fitted(self)
         level, white = check_probability(level, "level"), self._white_effects()
-        found = []
-        for direction, length in enumerate(np.linalg.norm(white, axis=0)):
+        lengths, found = np.linalg.norm(white, axis=0), {}
+        for name, direction in self._directions_of(kind).items():
             # five standard deviations above the threshold, every record is found
-            highest = min((self.threshold_ + 5) / max(length, np.finfo(float).tiny), self._largest)
-            found.append(smallest_amount(lambda sizes, k=direction: self._rates(white, k, sizes), highest, level))
-        return pd.Series(found, pd.Index(self.directions_.index, name="direction"), dtype=float)
+            highest = min((self.threshold_ + 5) / max(lengths[direction], np.finfo(float).tiny), self._largest)
+            found[name] = smallest_amount(lambda sizes, k=direction: self._rates(white, k, sizes), highest, level)
+        return pd.Series(found, dtype=float).rename_axis("direction")
+
+    def _directions_of(self, kind: str) -> dict[str, int]:
+        """Names and numbers of the directions of one kind of loss."""
+        if kind not in ("stiffness", "section"):
+            raise ValueError(f"kind is {kind!r}; expected 'stiffness' or 'section'")
+        are_section = self.directions_.index.str.endswith(", section")
+        chosen = {
+            name: number
+            for number, (name, is_section) in enumerate(zip(self.directions_.index, are_section, strict=True))
+            if is_section == (kind == "section")
+        }
+        if not chosen:
+            raise ValueError(
+                f"directions are {list(self.directions_.index)}, none of a loss of {kind}; expected an FE model that "
+                "knows the mass of its groups, as Structure.assemble or group_mass gives it"
+            )
+        return chosen
 
     def _rates(self, white: Array, direction: int, amounts: Array, n_draws: int = 2000) -> Array:
         """Shares of normal records with each amount of a direction above the threshold."""

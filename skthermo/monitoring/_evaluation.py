@@ -75,19 +75,21 @@ def directions_of(detector: Any) -> DirectionalDetector | None:
 
 
 def losses_of(detector: Any) -> pd.DataFrame | None:
-    """Loss of each damage group that moves a record by one standard deviation, and the relative changes by it."""
+    """Loss of stiffness of each damage group that moves a record by one standard deviation, and the relative changes
+    by it."""
     directional = directions_of(detector)
     if directional is None:
         return None
-    seen = directional.sensitivities_[directional.sensitivities_ > 0]
+    of_stiffness = directional.sensitivities_[~directional.directions_.index.str.endswith(", section")]
+    seen = of_stiffness[of_stiffness > 0]
     return directional.directions_.loc[seen.index].div(seen, axis=0).assign(loss=1 / seen)
 
 
 def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
     """Losses of the damage groups, as in column "loss top", and their effects in standard deviations, "effect top".
 
-    NaN where they explain less than half of a record. Groups that cannot be distinguished are one, such as "top or
-    bottom"; no columns without such directions.
+    Losses of stiffness and of section of a group add up. NaN where they explain less than half of a record. Groups that
+    cannot be distinguished are one, such as "top or bottom"; no columns without such directions.
     """
     directional = directions_of(detector)
     if directional is None:
@@ -101,7 +103,8 @@ def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
     for one, other in directional.indistinguishable_:
         alike.loc[one, other] = 1.0
     together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
-    joined = {name: " or ".join(names[together == together[name]]) for name in names}
+    groups = pd.Series(names.str.removesuffix(", section"), names)
+    joined = {name: " or ".join(groups[together == together[name]].unique()) for name in names}
     losses, effects = (
         one.T.groupby(joined).sum().T for one in (losses, (losses * directional.sensitivities_).round(2))
     )
