@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from skthermo._core.arrays import as_random_state, is_real, positive_integer, real_array
 from skthermo.datasets._results import TrussCampaign
 from skthermo.fem import AffineModel, Bar, Structure, add_noise
-from skthermo.fem.damage import Kind
+from skthermo.fem.damage import LossKind
 
 TRUSS_GROUPS = ("bottom", "top", "diagonal", "vertical")
 TRUSS_ZONES = ("T1", "T2", "T3")
@@ -129,7 +129,7 @@ def make_truss_campaign(
     correlation: float = 0.0,
     drift: Mapping[str, float] | None = None,
     damage: Mapping[str, float] | None = None,
-    kind: Kind = "stiffness",
+    kind: LossKind = "stiffness",
     damage_from: Stamp = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> TrussCampaign:

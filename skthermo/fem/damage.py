@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ALL_GROUPS = "all groups"  # the name of an even change of all of them
-Kind = Literal["stiffness", "section"]  # of what damage groups lose
+LossKind = Literal["stiffness", "section"]  # of what damage groups lose
 
 
 def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:
@@ -49,11 +49,11 @@ def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
 
 def check_kind(kind: Any) -> None:
     """Raise an error for what is no kind of loss."""
-    if not isinstance(kind, str) or kind not in get_args(Kind):
+    if not isinstance(kind, str) or kind not in get_args(LossKind):
         raise ValueError(f"kind is {kind!r:.200}; expected 'stiffness' or 'section'")
 
 
-def kind_option(model: Any, kind: Kind) -> dict[str, Kind]:
+def kind_option(model: Any, kind: LossKind) -> dict[str, LossKind]:
     """The argument of a model's methods for a kind of loss; none for stiffness, which every model can lose."""
     check_kind(kind)
     if kind == "section" and not hasattr(model, "group_mass"):
@@ -64,12 +64,12 @@ def kind_option(model: Any, kind: Kind) -> dict[str, Kind]:
     return {} if kind == "stiffness" else {"kind": kind}
 
 
-def direction_name(group: str, kind: Kind) -> str:
+def direction_name(group: str, kind: LossKind) -> str:
     """The name of the loss of a group among directions and parameters."""
     return group if kind == "stiffness" else f"{group}, section"
 
 
-def damage_directions(model: Any, groups: Sequence[str] | None = None, kind: Kind | None = None) -> pd.DataFrame:
+def damage_directions(model: Any, groups: Sequence[str] | None = None, kind: LossKind | None = None) -> pd.DataFrame:
     """Directions of a model at its nominal state, exact where the model can have parameters for damage."""
     slopes, names = [], []
     for one, own in losses(model, groups, kind).items():
@@ -83,7 +83,7 @@ def damage_directions(model: Any, groups: Sequence[str] | None = None, kind: Kin
     return as_directions(np.array(slopes), names, range(model.n_modes))
 
 
-def losses(model: Any, groups: Sequence[str] | None, kind: Kind | None) -> dict[Kind, list[str]]:
+def losses(model: Any, groups: Sequence[str] | None, kind: LossKind | None) -> dict[LossKind, list[str]]:
     """Damage groups of each kind of loss; by default those that have mass are of both."""
     names = names_of_groups(model, groups)
     if kind is not None:
@@ -99,7 +99,7 @@ def names_of_groups(model: Any, groups: Sequence[str] | None) -> list[str]:
     return list(read_groups(model, None if groups is None else check_names(groups, "groups")))
 
 
-def _difference(model: Any, group: str, kind: Kind, step: float = 1e-3) -> Array:
+def _difference(model: Any, group: str, kind: LossKind, step: float = 1e-3) -> Array:
     """Central difference of the logarithms of the frequencies by the severity of a group."""
     nominal = np.ones((1, len(model.parameter_names)))
     changed = (model.damaged({group: loss}, **kind_option(model, kind)) for loss in (step, -step))

@@ -16,7 +16,7 @@ from skthermo._core.arrays import HUGE, as_mapping, check_names, is_real, real_a
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import Table, row_times, time_of
 from skthermo.fem import FEModel
-from skthermo.fem.damage import Kind, check_kind, direction_name
+from skthermo.fem.damage import LossKind, check_kind, direction_name
 from skthermo.surrogate import DataInformedFEM
 
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
@@ -33,7 +33,7 @@ class BaseScenario(ABC):
     damage: Mapping[str, float] | None
     family: str | None
     severity: float | None
-    kind: Kind = "stiffness"
+    kind: LossKind = "stiffness"
     onset: Any = None
     n_draws: int = 1
 
@@ -108,7 +108,7 @@ def check_groups(groups: Sequence[str], known: Any) -> None:
         raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
 
 
-def check_name(name: Any, kind: Kind) -> None:
+def check_name(name: Any, kind: LossKind) -> None:
     """Raise an error if a scenario's name is not a text, or what damage takes is no kind of loss."""
     if not isinstance(name, str) or not name:
         raise ValueError(f"name is {name!r}; expected a text, such as 'bottom 20 %'")
@@ -149,7 +149,7 @@ def mapping_of(values: object, what: str, expected: str) -> Mapping[str, Any]:
     return mapping
 
 
-def only_group(damage: Mapping[str, float], kind: Kind) -> tuple[str | None, float]:
+def only_group(damage: Mapping[str, float], kind: LossKind) -> tuple[str | None, float]:
     """The family of a loss of a single damage group and its severity, else None and NaN."""
     if len(damage) != 1:
         return None, np.nan
@@ -204,7 +204,7 @@ class Scenario(BaseScenario):
     mass: Any = field(default=None, kw_only=True)
     family: str | None = field(default=None, kw_only=True)
     severity: float | None = field(default=None, kw_only=True)
-    kind: Kind = field(default="stiffness", kw_only=True)
+    kind: LossKind = field(default="stiffness", kw_only=True)
 
     def __post_init__(self) -> None:
         check_name(self.name, self.kind)
@@ -284,7 +284,7 @@ def sweep(
     severities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5),
     groups: Sequence[str] | None = None,
     *,
-    kind: Kind = "stiffness",
+    kind: LossKind = "stiffness",
 ) -> list[Scenario]:
     """The healthy structure, and damage of every group at every severity.
 
@@ -392,7 +392,7 @@ class ProgressiveDamage(BaseScenario):
     end: Any = None
     family: str | None = field(init=False)
     severity: float = field(init=False)
-    kind: Kind = field(default="stiffness", kw_only=True)
+    kind: LossKind = field(default="stiffness", kw_only=True)
 
     def __post_init__(self) -> None:
         check_name(self.name, self.kind)
@@ -454,7 +454,7 @@ class UncertainDamage(BaseScenario):
     draws: pd.DataFrame
     family: None = field(init=False, default=None)
     severity: float = field(init=False)
-    kind: Kind = field(default="stiffness", kw_only=True)
+    kind: LossKind = field(default="stiffness", kw_only=True)
 
     def __post_init__(self) -> None:
         check_name(self.name, self.kind)

@@ -63,7 +63,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
-from skthermo.fem.damage import Kind
+from skthermo.fem.damage import LossKind
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, check_records
 from skthermo.preprocessing.checks import misplaced_columns
@@ -518,7 +518,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         X: ArrayLike,
         *,
         damage: Mapping[str, float | ArrayLike] | None = None,
-        kind: Kind = "stiffness",
+        kind: LossKind = "stiffness",
         parameters: Mapping[str, float] | None = None,
         stiffness: MatrixLike | None = None,
         mass: MatrixLike | None = None,
@@ -604,7 +604,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_is_fitted(self)
         return self.thermal_.weather(X, validate_data(self, X, dtype=np.float64, reset=False))
 
-    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: Kind | None = None) -> pd.DataFrame:
+    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
         """Relative change of each frequency per loss of each damage group, for small losses.
 
         Parameters

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skthermo._core.arrays import Array, Reduce, is_auto, tolerance
 from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, FrequencySurface, evaluate, linearise, linearise_modes
-from skthermo.fem.damage import Kind, kind_option
+from skthermo.fem.damage import LossKind, kind_option
 
 NO_BASIS = "no reduced model is accurate where the parameters of the records are"
 
@@ -115,12 +115,12 @@ class Simulator:
         models = [None if one is None else getattr(one, method)(*args, **options) for one in (self.model, self.reduced)]
         return replace(self, model=models[0], reduced=models[1])
 
-    def damaged(self, damage: Mapping[str, float] | None, kind: Kind = "stiffness") -> Simulator:
+    def damaged(self, damage: Mapping[str, float] | None, kind: LossKind = "stiffness") -> Simulator:
         """The simulator of the damaged structure; itself without damage."""
         options = kind_option(self.model, kind)
         return self.changed("damaged", damage, **options) if damage else self
 
-    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float, kind: Kind) -> Simulator:
+    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float, kind: LossKind) -> Simulator:
         """The simulator whose rows of theta end with 1 - severity of each group.
 
         A reduced model is accurate for severities from the lowest to the highest, with a margin.
@@ -134,7 +134,7 @@ class Simulator:
         return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]), self.tol)
 
     def with_columns(
-        self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None, kind: Kind = "stiffness"
+        self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None, kind: LossKind = "stiffness"
     ) -> Simulator:
         """The simulator whose rows of theta end with 1 - severity of each group and 1 + amount of each mass.
 

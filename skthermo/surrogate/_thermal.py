@@ -33,7 +33,7 @@ from skthermo._core.frames import Table, check_same_rows, column_names, frame_li
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
-from skthermo.fem.damage import Kind
+from skthermo.fem.damage import LossKind
 from skthermo.residuals.sensors import SensorRegression, filled_text
 from skthermo.residuals.weather import TrainingRange, unpredicted_text
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
@@ -209,7 +209,7 @@ class ThermalModel(SavesFrames):
         modes: Sequence[int] | None = None,
         *,
         damage: Mapping[str, float | ArrayLike] | None = None,
-        kind: Kind = "stiffness",
+        kind: LossKind = "stiffness",
         parameters: Mapping[str, float] | None = None,
         stiffness: MatrixLike | None = None,
         mass: MatrixLike | None = None,
@@ -237,7 +237,7 @@ class ThermalModel(SavesFrames):
         """Frequencies of a model in the measured domain, times the discrepancy."""
         return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(weather.delta)
 
-    def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]], kind: Kind) -> list[Array]:
+    def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]], kind: LossKind) -> list[Array]:
         """Frequencies with one damage of the same groups after the other, solved together by one model."""
         groups, theta = list(draws[0]), np.tile(weather.theta, (len(draws), 1))
         severities = np.array([[draw[group] for group in groups] for draw in draws])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import check_is_fitted
-from skthermo.fem.damage import Kind, as_directions, direction_name, losses
+from skthermo.fem.damage import LossKind, as_directions, direction_name, losses
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 
@@ -30,10 +30,10 @@ class StructuralChanges:
     directions: Array
     bounds: Array
     near_share: float = 1 / 3  # of the bounds, up to which amounts have a reduced model; one for all would be large
-    kind: Kind = "stiffness"
+    kind: LossKind = "stiffness"
 
     @classmethod
-    def of_damage(cls, model: Any, groups: Sequence[str], kind: Kind = "stiffness") -> "StructuralChanges":
+    def of_damage(cls, model: Any, groups: Sequence[str], kind: LossKind = "stiffness") -> "StructuralChanges":
         """Severities of some groups of a model."""
         directions = np.hstack([np.zeros((len(groups), len(model.parameter_names))), -np.eye(len(groups))])
         return cls(groups, directions, np.tile([0.0, HIGHEST_SEVERITY], (len(groups), 1)), kind=kind)
@@ -245,7 +245,7 @@ def amount_slopes(function: Callable[[Array], Array], amounts: Array, step: floa
     return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * step) for h in steps], axis=-1)
 
 
-def damage_directions(fem: Any, groups: Sequence[str] | None = None, kind: Kind | None = None) -> pd.DataFrame:
+def damage_directions(fem: Any, groups: Sequence[str] | None = None, kind: LossKind | None = None) -> pd.DataFrame:
     """Directions of a fitted chain, at the mean of its parameters, in the measured domain."""
     check_is_fitted(fem)
     mean = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)

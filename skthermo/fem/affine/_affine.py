@@ -46,7 +46,7 @@ from skthermo.fem._terms import (
     read_terms,
 )
 from skthermo.fem.affine._basis import Basis, grow_basis
-from skthermo.fem.damage import Kind, check_kind, damage_directions, direction_name
+from skthermo.fem.damage import LossKind, check_kind, damage_directions, direction_name
 from skthermo.fem.modal import AffineCore, LocalModes, check_supported, count_modes
 
 if TYPE_CHECKING:
@@ -413,7 +413,7 @@ class AffineModel:
         stiffness, mass = (scipy.sparse.csc_array(terms.assemble(row)[0]) for terms in (core.stiffness, core.mass))
         return stiffness, mass
 
-    def damaged(self, damage: Mapping[str, float], *, kind: Kind = "stiffness") -> Self:
+    def damaged(self, damage: Mapping[str, float], *, kind: LossKind = "stiffness") -> Self:
         """A new model with less stiffness (or more) in some groups, and with the same mass or less.
 
         Parameters
@@ -448,7 +448,7 @@ class AffineModel:
             factors[list(self._groups[group])] *= 1 - severity
         return self._with_core(core.with_scaled_stiffness(factors))
 
-    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: Kind | None = None) -> pd.DataFrame:
+    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
         """Relative change of each frequency per loss of each damage group, for small losses.
 
         Parameters
@@ -544,7 +544,7 @@ class AffineModel:
         groups: Sequence[str] | None = None,
         *,
         severities: tuple[float, float] = (-0.1, 0.6),
-        kind: Kind = "stiffness",
+        kind: LossKind = "stiffness",
     ) -> Self:
         """A new model with one more parameter for each damage group: the factor 1 - severity of what it loses.
 
@@ -821,7 +821,7 @@ class AffineModel:
         """A model like this one with another core, these parameter names, bounds of the new ones, and changes."""
         return self._twin(_core=core, _whole=core, parameter_names=names or self.parameter_names, **changes)
 
-    def _lost_parts(self, groups: Iterable[str], kind: Kind) -> AffineTerms | None:
+    def _lost_parts(self, groups: Iterable[str], kind: LossKind) -> AffineTerms | None:
         """Parts of the mass, where a loss of groups takes some; None where it takes none."""
         check_kind(kind)
         unknown = [group for group in groups if group not in self._mass_groups]

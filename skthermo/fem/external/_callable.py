@@ -23,7 +23,7 @@ from skthermo.fem._terms import (
     failures,
     failures_named,
 )
-from skthermo.fem.damage import Kind, damage_directions, kind_option
+from skthermo.fem.damage import LossKind, damage_directions, kind_option
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -243,7 +243,7 @@ class CallableModel:
             for row in np.flatnonzero(wrong.any(axis=1))
         }
 
-    def damaged(self, damage: Mapping[str, float], *, kind: Kind = "stiffness") -> CallableModel:
+    def damaged(self, damage: Mapping[str, float], *, kind: LossKind = "stiffness") -> CallableModel:
         """A new model with damage: the parameters of each group are multiplied by 1 - severity.
 
         Parameters
@@ -272,7 +272,7 @@ class CallableModel:
             twin._factors[[self.parameter_names.index(name) for name in self.groups[group]]] *= 1 - severity
         return twin
 
-    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: Kind | None = None) -> pd.DataFrame:
+    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
         """Relative change of each frequency per loss of each damage group, for small losses.
 
         Parameters

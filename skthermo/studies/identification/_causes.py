@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from skthermo._core.arrays import Array, MatrixLike, check_names, is_real, real_array
 from skthermo.fem import Structure
-from skthermo.fem.damage import ALL_GROUPS, Kind, kind_option, read_groups
+from skthermo.fem.damage import ALL_GROUPS, LossKind, kind_option, read_groups
 
 SOMETHING_ELSE, NO_DAMAGE = "something else", "no damage"
 MemberLine = list[Hashable]
@@ -165,7 +165,7 @@ def _read_masses(model: Any, added_mass: Any) -> dict[str, Any]:
 
 
 def changed(
-    model: Any, theta: Array, causes: Sequence[Cause], amounts: Sequence[float], kind: Kind
+    model: Any, theta: Array, causes: Sequence[Cause], amounts: Sequence[float], kind: LossKind
 ) -> tuple[Any, Array]:
     """The model, and its parameters theta (1, n_parameters), after some amounts of causes, damage of one kind."""
     factors: dict[str, float] = {}

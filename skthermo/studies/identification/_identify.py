@@ -20,7 +20,7 @@ from skthermo._core.text import SPACE, Sentences, chance_text, counted, listed, 
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
-from skthermo.fem.damage import Kind, check_kind
+from skthermo.fem.damage import LossKind, check_kind
 from skthermo.studies._scenarios import UncertainDamage, check_chain, checked_models
 from skthermo.studies.identification._causes import (
     NO_DAMAGE,
@@ -45,7 +45,7 @@ def identify_damage(
     groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
     *,
     structure: Structure | None = None,
-    kind: Kind = "stiffness",
+    kind: LossKind = "stiffness",
     noise: ArrayLike | Literal["fitted"] = "fitted",
     prior: DamagePrior | None = None,
     stiffening: bool | Sequence[str] | None = None,
@@ -454,7 +454,7 @@ class IdentifiedDamage(Sentences):
     similarity: pd.DataFrame = field(repr=False)
     records: pd.Series = field(repr=False)
     explained: Sequence[DamageExplanation] = field(repr=False)
-    kind: Kind = "stiffness"
+    kind: LossKind = "stiffness"
 
     @cached_property
     def explanations(self) -> pd.DataFrame:

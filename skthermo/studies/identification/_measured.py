@@ -15,7 +15,7 @@ from skthermo._core.arrays import Array, as_floats, check_dofs, check_noise, mea
 from skthermo._core.estimators import check_array
 from skthermo._core.text import counted, listed
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
-from skthermo.fem.damage import Kind
+from skthermo.fem.damage import LossKind
 from skthermo.preprocessing import set_aside
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.numbers import independent_records
@@ -193,7 +193,7 @@ class ObservedChange:
 
 
 def observed(
-    fem: Any, model: Any, shift: FrequencyShift, kind: Kind, shapes: Any, dofs: Any, shape_noise: Any
+    fem: Any, model: Any, shift: FrequencyShift, kind: LossKind, shapes: Any, dofs: Any, shape_noise: Any
 ) -> ObservedChange:
     """Shifts of the measured frequencies, and of mode shapes if there are any; ``model`` may be a divided one."""
     known = ~np.isnan(shift.mean)
