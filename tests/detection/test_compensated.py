@@ -133,7 +133,8 @@ def test_severities_are_those_of_the_record_and_nan_in_gaps():
     detector = whole(DirectionalDetector(make_truss())).fit(YEAR)
     losses = detector.severities(truss(3, damage={"diagonal": 0.2}))
     assert losses["diagonal"].median() == pytest.approx(0.2, abs=0.05)
-    assert list(losses.columns) == ["bottom", "top", "diagonal", "vertical"]
+    groups = ["bottom", "top", "diagonal", "vertical"]
+    assert list(losses.columns) == [*groups, *(f"{group}, section" for group in groups)]
     holed = LATER.copy()
     holed.loc[holed.index[:3], MODES] = np.nan
     with pytest.warns(UserWarning, match="not-evaluated"):
