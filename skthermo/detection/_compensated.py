@@ -107,7 +107,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
     >>> from skthermo.detection import CompensatedDetector, DirectionalDetector
     >>> year, damaged = (make_truss_campaign(damage=damage, random_state=0) for damage in (None, {"bottom": 0.05}))
     >>> baseline, later = (campaign.temperatures.join(campaign.frequencies) for campaign in (year, damaged))
-    >>> directional = DirectionalDetector(make_truss())
+    >>> directional = DirectionalDetector(make_truss().damage_directions(kind="stiffness"))
     >>> for window in (None, 7):
     ...     detector = CompensatedDetector(directional, targets=list(year.frequencies), window=window)
     ...     print(f"{(detector.fit(baseline).score_samples(later) < detector.offset_).mean():.0%}")

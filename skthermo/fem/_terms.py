@@ -38,7 +38,7 @@ class PartsOfMass(NamedTuple):
     --------
     >>> from skthermo.datasets import make_truss
     >>> make_truss().parts_of_mass.groups["top"]
-    (1,)
+    (3,)
     """
 
     terms: Sequence[tuple[Key, Matrix]]
