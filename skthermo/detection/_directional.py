@@ -23,7 +23,8 @@ class DirectionalDetector(MahalanobisDetector):
 
     The one-sided likelihood-ratio test against the cone of all non-negative combinations of the directions [Kud63]_,
     [Per69]_. The damage index is the length of the projection of a whitened record on that cone, in standard
-    deviations, or the *unsquared* Mahalanobis distance (omnibus) times ``omnibus_scale_``, whichever is larger.
+    deviations, or the *unsquared* Mahalanobis distance (omnibus) times ``omnibus_scale_``, whichever is larger. Losses
+    of section have a cone of their own, and its length counts times ``section_scale_``.
 
     Parameters
     ----------
@@ -55,9 +56,10 @@ class DirectionalDetector(MahalanobisDetector):
         alarm by one may be by the other.
     sensitivities_ : Series of shape (n_directions,)
         By how many standard deviations one unit of each direction moves a record that has all modes.
-    omnibus_scale_ : float
-        Factor of the Mahalanobis distance beside the length in the cone: with it, both tests share the false alarms as
-        ``omnibus`` says.
+    omnibus_scale_, section_scale_ : float
+        Factors of the Mahalanobis distance, and of the length in the cone of losses of section, beside the length in
+        the cone of the other directions: with them, the tests share the false alarms as ``omnibus`` says, and both
+        cones alike. 0 without the test, and 1 for the only one.
     covariance_ : estimator
         Fitted: mean (``location_``) and covariance of the baseline.
     baseline_index_ : ndarray of shape (n_samples,)
@@ -155,32 +157,54 @@ class DirectionalDetector(MahalanobisDetector):
         self.sensitivities_ = pd.Series(np.linalg.norm(white, axis=0), self.directions_.index)
         self.indistinguishable_ = alike(white, self.directions_.index)
         is_conformal = self.threshold == "conformal"
-        indices = self._by_others(self._both, F, times) if is_conformal else self._both(normal_of(self.covariance_), F)
-        self.omnibus_scale_ = self._scale_of_omnibus(*indices.T)
-        return self._joined(*indices.T)
+        tests = self._by_others(self._tests, F, times) if is_conformal else self._tests(normal_of(self.covariance_), F)
+        self._scales = self._learned_scales(tests)
+        self.omnibus_scale_, self.section_scale_ = float(self._scales[0]), float(np.append(self._scales, 0.0)[2])
+        return self._joined(tests)
 
     def _index(self, F: Array) -> Array:
-        return self._joined(*self._both(normal_of(self.covariance_), F).T)
+        return self._joined(self._tests(normal_of(self.covariance_), F))
 
-    def _joined(self, omnibus: Array, cone: Array) -> Array:
-        if self.omnibus in (0, 1):
-            return omnibus if self.omnibus else cone
-        return np.maximum(cone, self.omnibus_scale_ * omnibus)
+    def _joined(self, tests: Array) -> Array:
+        return (tests * self._scales).max(axis=1)
 
-    def _scale_of_omnibus(self, omnibus: Array, cone: Array) -> float:
-        """Ratio of the thresholds that each index would have by itself, with its share of the false alarms."""
-        if self.omnibus in (0, 1):
-            return 1.0
-        rates = (1 - self.omnibus) * self.contamination, self.omnibus * self.contamination
-        return rare_level(cone, rates[0]) / rare_level(omnibus, rates[1])
+    def _learned_scales(self, tests: Array) -> Array:
+        """Ratios of the thresholds that each test would have by itself, with its share of the false alarms."""
+        n_cones = tests.shape[1] - 1
+        shares = np.array([self.omnibus, *n_cones * [(1 - self.omnibus) / n_cones]])
+        used = np.flatnonzero(shares)
+        levels = np.array([rare_level(tests[:, test], shares[test] * self.contamination) for test in used])
+        scales = np.zeros(len(shares))
+        scales[used] = levels[min(1, len(levels) - 1 if self.omnibus else 0)] / levels
+        return scales
 
-    def _both(self, normal: Gaussian, F: Array) -> Array:
-        """Mahalanobis distance and length in the cone of each row, as if no mode were missing, (n_rows, 2)."""
-        lengths = project(normal, self.directions_.to_numpy(), F)[1]
+    def _tests(self, normal: Gaussian, F: Array) -> Array:
+        """Mahalanobis distance of each row and its length in each cone, as if no mode were missing."""
         present = ~np.isnan(F)
+        lengths = np.column_stack([project(normal, self.directions_.to_numpy()[c], F)[1] for c in self._cones])
         lengths[~present.any(axis=1)] = np.nan
-        lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))
+        lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))[:, np.newaxis]
         return np.column_stack([self._indices(normal, F), lengths])
+
+    @property
+    def _cones(self) -> list[NDArray[np.intp]]:
+        """Numbers of the directions of each kind of loss, those of section last."""
+        are_section = self.directions_.index.str.endswith(", section")
+        return [np.flatnonzero(some) for some in (~are_section, are_section) if some.any()]
+
+    def _explanations(self, F: Array) -> tuple[Array, Array]:
+        """Amounts of the directions that explain each row, of one kind of loss, and the length of its projection."""
+        normal, cones, directions = normal_of(self.covariance_), self._cones, self.directions_.to_numpy()
+        each = [project(normal, directions[cone], F) for cone in cones]
+        lengths = np.array([length for _, length in each])
+        chosen = (lengths * (self._scales[1:] if self.omnibus < 1 else np.ones(len(cones)))[:, np.newaxis]).argmax(
+            axis=0
+        )
+        amounts = np.zeros((len(F), len(directions)))
+        for number, (cone, (own, _)) in enumerate(zip(cones, each, strict=True)):
+            amounts[np.ix_(chosen == number, cone)] = own[chosen == number]
+        amounts[np.isnan(F).all(axis=1)] = np.nan
+        return amounts, lengths[chosen, np.arange(len(F))]
 
     def severities(self, X: ArrayLike) -> pd.DataFrame:
         """Losses by which the test explains each record.
@@ -195,11 +219,12 @@ class DirectionalDetector(MahalanobisDetector):
         DataFrame of shape (n_samples, n_directions)
             The amounts of the directions, none of them negative, that are most likely: with an FE model the loss of
             stiffness, and of section, of each group, with "softening" the fall of each frequency, from 0 to 1, by
-            effects in proportion to it; else in the unit of the given directions. NaN where a record has no mode.
+            effects in proportion to it; else in the unit of the given directions. Losses of one kind explain a record,
+            those whose test is nearer to an alarm; the others are 0. NaN where a record has no mode.
             Directions of ``indistinguishable_`` share what either could explain.
         """
         check_is_fitted(self)
-        amounts = project(normal_of(self.covariance_), self.directions_.to_numpy(), self._relative(X))[0]
+        amounts = self._explanations(self._relative(X))[0]
         index = X.index if isinstance(X, pd.DataFrame) else None
         return pd.DataFrame(np.minimum(amounts, self._largest), index, self.directions_.index)
 
@@ -218,7 +243,7 @@ class DirectionalDetector(MahalanobisDetector):
             groups has happened, such as of a bearing or a mass. NaN where a record has no mode.
         """
         F = self._relative(X)
-        lengths = project(normal_of(self.covariance_), self.directions_.to_numpy(), F)[1]
+        lengths = self._explanations(F)[1]
         distances = normal_of(self.covariance_).distances(F)
         shares = np.full(len(F), np.nan)
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
@@ -274,9 +299,10 @@ class DirectionalDetector(MahalanobisDetector):
         check_is_fitted(self)
         level, white = check_probability(level, "level"), self._white_effects()
         lengths, found = np.linalg.norm(white, axis=0), {}
+        threshold = self.threshold_ / ((kind == "section" and self.section_scale_) or 1.0)
         for name, direction in self._directions_of(kind).items():
             # five standard deviations above the threshold, every record is found
-            highest = min((self.threshold_ + 5) / max(lengths[direction], np.finfo(float).tiny), self._largest)
+            highest = min((threshold + 5) / max(lengths[direction], np.finfo(float).tiny), self._largest)
             found[name] = smallest_amount(lambda sizes, k=direction: self._rates(white, k, sizes), highest, level)
         return pd.Series(found, dtype=float).rename_axis("direction")
 
@@ -301,8 +327,10 @@ class DirectionalDetector(MahalanobisDetector):
         """Shares of normal records with each amount of a direction above the threshold."""
         draws = np.random.RandomState(0).standard_normal((n_draws, len(white)))
         moved = (draws + np.outer(amounts, white[:, direction])[:, np.newaxis]).reshape(-1, len(white))
-        cone = project_on_cones((white.T @ white)[np.newaxis], moved @ white, np.zeros(len(moved), dtype=np.intp))[1]
-        above = self._joined(np.linalg.norm(moved, axis=1), cone) > self.threshold_
+        tests = [np.linalg.norm(moved, axis=1)]
+        for own in (white[:, cone] for cone in self._cones):
+            tests.append(project_on_cones((own.T @ own)[np.newaxis], moved @ own, np.zeros(len(moved), dtype=int))[1])
+        above = self._joined(np.column_stack(tests)) > self.threshold_
         return above.reshape(len(amounts), -1).mean(axis=1)
 
     def _white_effects(self) -> Array:

@@ -6,7 +6,6 @@ It uses NumPy and SciPy alone. Start with ``_protocol.py``, the interface of a m
 from skthermo.fem._evaluate import add_noise, evaluate, evaluate_modes, linearise, linearise_modes, sample
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._structure import ImportedStructure, Structure
-from skthermo.fem._terms import PartsOfMass
 from skthermo.fem.affine import AffineModel, FrequencySurface, ReducedModel
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, difference_terms, load_affine, probe, read_triplets
@@ -22,7 +21,6 @@ __all__ = [
     "FrequencySurface",
     "ImportedStructure",
     "Membrane",
-    "PartsOfMass",
     "PointMass",
     "ReducedModel",
     "Spring",

@@ -322,7 +322,7 @@ class Structure:
                 f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {self.n_dof}; expected a "
                 "model that this structure has assembled"
             )
-        masses = model.parts_of_mass
+        masses = model._parts_of_mass
         parts: dict[str, dict[int, MatrixLike]] = {}
         lighter: dict[str, dict[int, MatrixLike]] = {}
         for group, named in groups.items():

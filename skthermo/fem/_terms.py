@@ -23,22 +23,10 @@ ROWS_PER_CHUNK = 256  # largest number of samples solved together
 
 
 class PartsOfMass(NamedTuple):
-    """Masses of damage groups, parts of a model's mass, of which groups with common members share some.
+    """Masses of damage groups, parts of a model's mass; groups with common members share some.
 
-    Parameters
-    ----------
-    terms : sequence of (tuple of str, matrix)
-        Parameters of the model that multiply each part, and the part in kg.
-    groups : dict of str to tuple of int
-        Damage group -> positions of its parts.
-    contents : sequence of sequence of (member, properties), optional
-        Members of a `Structure`, and their properties, whose masses each part sums.
-
-    Examples
-    --------
-    >>> from skthermo.datasets import make_truss
-    >>> make_truss().parts_of_mass.groups["top"]
-    (3,)
+    ``terms`` are the parts in kg with the parameters that multiply them, ``groups`` gives the positions of the parts of
+    each group, and ``contents`` the members of a structure, and their properties, whose masses each part sums.
     """
 
     terms: Sequence[tuple[Key, Matrix]]

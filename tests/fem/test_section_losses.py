@@ -146,7 +146,7 @@ def test_directions_are_slopes_of_both_kinds():
 
 
 def test_a_loss_of_stiffness_is_what_it_was():
-    masses = truss_structure().assemble(NAMES, n_modes=6).parts_of_mass
+    masses = truss_structure().assemble(NAMES, n_modes=6)._parts_of_mass
     of_parameters = {places: (name,) for name, places in TRUSS.parameter_terms.items()}
     terms = [(of_parameters.get((place,), ()), matrix) for place, matrix in enumerate(TRUSS.stiffness_terms)]
     for kind in ({}, {"kind": "stiffness"}):

@@ -79,8 +79,7 @@ class AffineModel:
         group: all stiffness terms that it multiplies.
     group_mass : mapping of str to matrix, mapping or sequence of pairs, optional
         Damage group -> its mass in kg, which ``mass`` includes and a loss of the group's section takes away, as
-        ``mass``: a single matrix is constant, and a key names the parameters of the mass that multiply it. Groups that
-        share members share `PartsOfMass`, as `Structure.assemble` gives them.
+        ``mass``: a single matrix is constant, and a key names the parameters of the mass that multiply it.
     track : bool, default=False
         True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes swap. False: column j is
         the j-th lowest mode.
@@ -239,12 +238,12 @@ class AffineModel:
         """Damage groups and their mass in kg at theta = 1, where it is known; a loss of section takes a share of it."""
         parts, nominal = self._whole.parts, np.ones((1, len(self.parameter_names)))
         factors = [] if parts is None else parts.coefficients(nominal)[0]
-        each = [factor * matrix for factor, (_, matrix) in zip(factors, self.parts_of_mass.terms, strict=True)]
+        each = [factor * matrix for factor, (_, matrix) in zip(factors, self._parts_of_mass.terms, strict=True)]
         none = scipy.sparse.csc_array((self.n_dof, self.n_dof))
         return {name: sum((each[place] for place in own), none) for name, own in self._mass_groups.items()}
 
     @property
-    def parts_of_mass(self) -> PartsOfMass:
+    def _parts_of_mass(self) -> PartsOfMass:
         """Masses of damage groups in kg, without the parameters and severities that multiply them."""
         parts = self._whole.parts
         keys = [] if parts is None else [np.repeat(self.parameter_names, row).tolist() for row in parts.exponents]
@@ -676,8 +675,8 @@ class AffineModel:
             Damage group -> position of a stiffness term -> the matrix (n_dof, n_dof), a part of that term, which the
             group scales. The remainder of a term still belongs to the term's groups, and so do its parts.
         masses : mapping of str to mapping of int to matrix, optional
-            The same for masses: damage group -> position in ``parts_of_mass`` -> the mass of the group there. The mass
-            of a group that is not named is not known.
+            The same for parts of the mass that groups lose with their section: damage group -> position of a part ->
+            the mass of the group there. The mass of a group that is not named is not known.
 
         Returns
         -------
@@ -704,7 +703,7 @@ class AffineModel:
             own = parts[wrong[0]]
             raise ValueError(f"part {wrong[0]!r} is {own!r:.200}; expected a new name, and matrices by position")
         groups, stiffness = divided(parts, self._groups, len(self._whole.stiffness.factors), self.n_dof)
-        n_masses = len(self.parts_of_mass.terms)
+        n_masses = len(self._parts_of_mass.terms)
         mass_groups, mass = divided(masses or {}, self._mass_groups, n_masses, self.n_dof)
         whole = self._whole.with_divided_terms(stiffness, mass)
         changes: dict[str, Any] = {"_groups": groups, "_mass_groups": mass_groups}

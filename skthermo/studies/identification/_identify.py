@@ -14,7 +14,7 @@ from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from skthermo._core.arrays import Array, MatrixLike, as_random_state, check_jobs, check_probability
+from skthermo._core.arrays import Array, MatrixLike, RandomState, as_random_state, check_jobs, check_probability
 from skthermo._core.parallel import run_jobs
 from skthermo._core.text import SPACE, Sentences, chance_text, counted, listed, percent, probability_text, significant
 from skthermo._core.warnings import collected, warn_each
@@ -56,7 +56,7 @@ def identify_damage(
     shape_noise: ArrayLike | Literal["fitted"] = 0.01,
     models: Sequence[Any] | None = None,
     n_jobs: int | None = None,
-    random_state: int | np.random.RandomState | None = None,
+    random_state: RandomState = None,
 ) -> IdentifiedDamage:
     """Which causes explain how measured frequencies have shifted, how probably, and by how much.
 
