@@ -179,7 +179,7 @@ def frequencies(options):
 
 def main():
     parts = [*STRUCTURES, "rates", "frequencies"]
-    options = arguments(__doc__, parts=dict.fromkeys(parts), seeds=3, draws=400)
+    options = arguments(__doc__, parts=dict.fromkeys(parts), seeds=3, draws=200)
     missed = [found(part, options) for part in options.parts if part in STRUCTURES]
     for part in (rates, frequencies):
         if part.__name__ in options.parts:
