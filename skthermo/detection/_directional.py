@@ -159,7 +159,8 @@ class DirectionalDetector(MahalanobisDetector):
         is_conformal = self.threshold == "conformal"
         tests = self._by_others(self._tests, F, times) if is_conformal else self._tests(normal_of(self.covariance_), F)
         self._scales = self._learned_scales(tests)
-        self.omnibus_scale_, self.section_scale_ = float(self._scales[0]), float(np.append(self._scales, 0.0)[2])
+        has_section = self.directions_.index.str.endswith(", section").any()
+        self.omnibus_scale_, self.section_scale_ = float(self._scales[0]), float(self._scales[-1] * has_section)
         return self._joined(tests)
 
     def _index(self, F: Array) -> Array:
@@ -172,11 +173,9 @@ class DirectionalDetector(MahalanobisDetector):
         """Ratios of the thresholds that each test would have by itself, with its share of the false alarms."""
         n_cones = tests.shape[1] - 1
         shares = np.array([self.omnibus, *n_cones * [(1 - self.omnibus) / n_cones]])
-        used = np.flatnonzero(shares)
-        levels = np.array([rare_level(tests[:, test], shares[test] * self.contamination) for test in used])
-        scales = np.zeros(len(shares))
-        scales[used] = levels[min(1, len(levels) - 1 if self.omnibus else 0)] / levels
-        return scales
+        rates = shares * self.contamination
+        levels = [rare_level(own, rate) if rate else np.inf for own, rate in zip(tests.T, rates, strict=True)]
+        return (levels[0] if self.omnibus == 1 else levels[1]) / np.array(levels)
 
     def _tests(self, normal: Gaussian, F: Array) -> Array:
         """Mahalanobis distance of each row and its length in each cone, as if no mode were missing."""
@@ -197,9 +196,7 @@ class DirectionalDetector(MahalanobisDetector):
         normal, cones, directions = normal_of(self.covariance_), self._cones, self.directions_.to_numpy()
         each = [project(normal, directions[cone], F) for cone in cones]
         lengths = np.array([length for _, length in each])
-        chosen = (lengths * (self._scales[1:] if self.omnibus < 1 else np.ones(len(cones)))[:, np.newaxis]).argmax(
-            axis=0
-        )
+        chosen = (lengths * self._scales[1:, np.newaxis]).argmax(axis=0)
         amounts = np.zeros((len(F), len(directions)))
         for number, (cone, (own, _)) in enumerate(zip(cones, each, strict=True)):
             amounts[np.ix_(chosen == number, cone)] = own[chosen == number]
@@ -239,8 +236,8 @@ class DirectionalDetector(MahalanobisDetector):
         Returns
         -------
         ndarray of shape (n_samples,)
-            Of the squared Mahalanobis distance, from 0 to 1; small where another change than a loss of stiffness of the
-            groups has happened, such as of a bearing or a mass. NaN where a record has no mode.
+            Of the squared Mahalanobis distance, from 0 to 1; small where another change than a loss of the groups has
+            happened, such as of a bearing or a mass. NaN where a record has no mode.
         """
         F = self._relative(X)
         lengths = self._explanations(F)[1]
@@ -299,7 +296,7 @@ class DirectionalDetector(MahalanobisDetector):
         check_is_fitted(self)
         level, white = check_probability(level, "level"), self._white_effects()
         lengths, found = np.linalg.norm(white, axis=0), {}
-        threshold = self.threshold_ / ((kind == "section" and self.section_scale_) or 1.0)
+        threshold = self.threshold_ / (self.section_scale_ or 1.0 if kind == "section" else 1.0)
         for name, direction in self._directions_of(kind).items():
             # five standard deviations above the threshold, every record is found
             highest = min((threshold + 5) / max(lengths[direction], np.finfo(float).tiny), self._largest)
