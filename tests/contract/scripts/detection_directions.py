@@ -1,4 +1,7 @@
-"""What the directions of a model find, how large it is, and which groups look alike."""
+"""What the directions of a model find, how large it is, and which groups look alike.
+
+What is found is of 0.3, which looks for losses of section too, and so finds those of stiffness less often.
+"""
 
 from sklearn.pipeline import make_pipeline
 
