@@ -224,38 +224,45 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         return Z if isinstance(X, pd.DataFrame) else Z.to_numpy()
 
     @available_if(_detector_has("severities"))
-    def severities(self, X: ArrayLike) -> pd.DataFrame:
+    def severities(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Amounts of the directions by which the test explains each record, as `DirectionalDetector.severities`.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_features)
             Temperatures and frequencies, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
         DataFrame of shape (n_samples, n_directions)
             NaN where a record, or its window, has no mode.
         """
-        amounts = self._by_regime(X, lambda detector, Z: detector.severities(Z).to_numpy())
+        options = {} if kind == "stiffness" else {"kind": kind}  # a detector of your own may have no kinds
+        amounts = self._by_regime(X, lambda detector, Z: detector.severities(Z, **options).to_numpy())
         index = X.index if isinstance(X, pd.DataFrame) else None
-        return pd.DataFrame(amounts, index, self.detectors_[0].directions_.index)
+        names = self.detectors_[0].directions_.index
+        return pd.DataFrame(amounts, index, names[names.str.endswith(", section") == (kind == "section")])
 
     @available_if(_detector_has("explained"))
-    def explained(self, X: ArrayLike) -> Array:
+    def explained(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> Array:
         """Share of the departure of each record that the directions explain, as `DirectionalDetector.explained`.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_features)
             Temperatures and frequencies, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
         ndarray of shape (n_samples,)
             From 0 to 1; NaN where a record, or its window, has no mode.
         """
-        return self._by_regime(X, lambda detector, Z: detector.explained(Z))
+        options = {} if kind == "stiffness" else {"kind": kind}
+        return self._by_regime(X, lambda detector, Z: detector.explained(Z, **options))
 
     @available_if(_detector_has("pod"))
     def pod(self, severities: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:

@@ -191,47 +191,39 @@ class DirectionalDetector(MahalanobisDetector):
         are_section = self.directions_.index.str.endswith(", section")
         return [np.flatnonzero(some) for some in (~are_section, are_section) if some.any()]
 
-    def _explanations(self, F: Array) -> tuple[Array, Array]:
-        """Amounts of the directions that explain each row, of one kind of loss, and the length of its projection."""
-        normal, cones, directions = normal_of(self.covariance_), self._cones, self.directions_.to_numpy()
-        each = [project(normal, directions[cone], F) for cone in cones]
-        lengths = np.array([length for _, length in each])
-        chosen = (lengths * self._scales[1:, np.newaxis]).argmax(axis=0)
-        amounts = np.zeros((len(F), len(directions)))
-        for number, (cone, (own, _)) in enumerate(zip(cones, each, strict=True)):
-            amounts[np.ix_(chosen == number, cone)] = own[chosen == number]
-        amounts[np.isnan(F).all(axis=1)] = np.nan
-        return amounts, lengths[chosen, np.arange(len(F))]
-
-    def severities(self, X: ArrayLike) -> pd.DataFrame:
+    def severities(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Losses by which the test explains each record.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
             Frequencies in Hz, or residuals, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `pod`.
 
         Returns
         -------
         DataFrame of shape (n_samples, n_directions)
             The amounts of the directions, none of them negative, that are most likely: with an FE model the loss of
-            stiffness, and of section, of each group, with "softening" the fall of each frequency, from 0 to 1, by
-            effects in proportion to it; else in the unit of the given directions. Losses of one kind explain a record,
-            those whose test is nearer to an alarm; the others are 0. NaN where a record has no mode.
-            Directions of ``indistinguishable_`` share what either could explain.
+            each group, with "softening" the fall of each frequency, from 0 to 1, by effects in proportion to it; else
+            in the unit of the given directions. NaN where a record has no mode. Directions of ``indistinguishable_``
+            share what either could explain.
         """
         check_is_fitted(self)
-        amounts = self._explanations(self._relative(X))[0]
+        directions = self.directions_.loc[[*self._directions_of(kind)]]
+        amounts = project(normal_of(self.covariance_), directions.to_numpy(), self._relative(X))[0]
         index = X.index if isinstance(X, pd.DataFrame) else None
-        return pd.DataFrame(np.minimum(amounts, self._largest), index, self.directions_.index)
+        return pd.DataFrame(np.minimum(amounts, self._largest), index, directions.index)
 
-    def explained(self, X: ArrayLike) -> Array:
+    def explained(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> Array:
         """Share of the departure of each record from the baseline that the directions explain.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
             Frequencies in Hz, or residuals, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `pod`.
 
         Returns
         -------
@@ -240,7 +232,8 @@ class DirectionalDetector(MahalanobisDetector):
             happened, such as of a bearing or a mass. NaN where a record has no mode.
         """
         F = self._relative(X)
-        lengths = self._explanations(F)[1]
+        directions = self.directions_.to_numpy()[[*self._directions_of(kind).values()]]
+        lengths = project(normal_of(self.covariance_), directions, F)[1]
         distances = normal_of(self.covariance_).distances(F)
         shares = np.full(len(F), np.nan)
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
@@ -315,8 +308,8 @@ class DirectionalDetector(MahalanobisDetector):
         }
         if not chosen:
             raise ValueError(
-                f"directions are {list(self.directions_.index)}, none of a loss of {kind}; expected an FE model that "
-                "knows the mass of its groups, as Structure.assemble or group_mass gives it"
+                f"directions are {list(self.directions_.index)}, none of a loss of {kind}; expected the other kind, or "
+                "an FE model that knows the mass of its groups, as Structure.assemble or group_mass gives it"
             )
         return chosen
 

@@ -243,9 +243,13 @@ def test_losses_that_explain_records_are_those_that_have_moved_them():
     level = make_truss().frequencies(np.ones((1, 4)))[0]
     random = np.random.RandomState(0)
     baseline = level * (1 + 0.01 * random.standard_normal((2000, 6)))
-    single = DirectionalDetector(make_truss().damage_directions(kind="stiffness")).fit(baseline)
-    losses = np.array([0.08, 0.0, 0.05, 0.0])
-    moved = np.tile(baseline.mean(axis=0) + level * (losses @ single.directions_.to_numpy()), (7, 1))
+    single = DirectionalDetector(make_truss()).fit(baseline)
+    losses, effects = np.array([0.08, 0.0, 0.05, 0.0]), single.directions_.to_numpy()
+    moved = np.tile(baseline.mean(axis=0) + level * (losses @ effects[:4]), (7, 1))
+    lighter = np.tile(baseline.mean(axis=0) + level * (losses @ effects[4:]), (7, 1))
+    np.testing.assert_allclose(single.severities(lighter, kind="section").iloc[-1], losses, atol=2e-3)
+    assert single.explained(lighter, kind="section")[-1] == pytest.approx(1, abs=1e-3)
+    assert single.explained(lighter)[-1] < 0.9
     raised = np.tile(baseline.mean(axis=0) * 1.02, (7, 1))
     np.testing.assert_allclose(single.severities(moved).iloc[-1], losses, atol=2e-3)
     assert single.explained(moved)[-1] == pytest.approx(1, abs=1e-3)
