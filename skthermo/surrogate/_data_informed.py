@@ -268,8 +268,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             inverse with ``dofs``, whose order the sensors have.
         sample_weight : array-like of shape (n_samples,), optional
             Weight of each record in the fits of M2 and of the discrepancy; those of a series are matched to the rows of
-            a frame by index. Records of weight 0 do not train them and have no residuals; imputer, aligner and M1 see
-            all alike.
+            a frame by index. Their scale does not count. Records of weight 0 do not train them and have no residuals;
+            imputer, aligner and M1 see all alike.
 
         Returns
         -------
@@ -297,12 +297,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         F, self.y_is_vector_ = frequency_table(y)
         gate = check_records(T, frame_like(F, check_array(F, **options)), model=self.model)
         gate.refuse_meaningless(needs_all=True)
-        T, F, far, weights = (
-            gate.temperatures,
-            gate.frequencies,
-            gate.outliers.to_numpy(),
-            row_weights(sample_weight, X),
-        )
+        T, F, far = gate.temperatures, gate.frequencies, gate.outliers.to_numpy()
+        weights = row_weights(sample_weight, X)
+        if weights is not None:
+            weights = weights / weights[weights > 0].mean()  # penalties do not depend on their scale
         usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))  # outliers train nothing
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
         self._clone_parts(has_shapes=shapes is not None)
@@ -331,13 +329,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             fit_checked(mapper, filled, named(filled, found.theta, self.parameter_names_), weights)
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
-            findings += [
-                *found.findings,
-                *of_mapper,
-                *of_model,
-                *([] if is_auto(self.reduce) else self.simulator_.doubts()),
-            ]
-            few_outliers = {"frequency-outliers"} if far.mean() <= 0.05 else ()
+            findings += [*found.findings, *of_mapper, *of_model]
+            few_outliers = {"doubtful-values"} if far.mean() <= 0.05 else ()
             of_records = [
                 *gate.warnings(exclude=few_outliers),
                 *misplaced_columns(T, F),
@@ -676,7 +669,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
             text = "the score leaves out most rows, which have gaps. Compare scores of the same rows only"
-            warn_each([UnevaluatedRowsWarning(text, "rows-not-scored")])
+            warn_each([UnevaluatedRowsWarning(text, "not-evaluated")])
         return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):
