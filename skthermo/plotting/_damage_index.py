@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
+from datetime import tzinfo
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -15,35 +16,13 @@ from skthermo._core.arrays import is_real
 from skthermo._core.estimators import last_step
 from skthermo._core.frames import midnights_between
 from skthermo.detection import MahalanobisDetector
-from skthermo.plotting._display import (
-    AMBER,
-    BLACK,
-    DAMAGE_INDEX,
-    GREY,
-    ORANGE,
-    PURPLE,
-    Display,
-    as_table,
-    date_axis,
-    figure_legend,
-    hold_outliers,
-    in_time,
-    mark_not_evaluated,
-    marker_style,
-    on_axis,
-    panels,
-    plain,
-    shortened,
-)
+from skthermo.plotting import _display as shared
+from skthermo.plotting._display import AMBER, BLACK, GREY, ORANGE, PURPLE, Display
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
-
-SHADES = {"damage": (ORANGE, ""), "watch": (AMBER, "\\\\"), "drift": (PURPLE, "//"), "harmless": (GREY, "..")}
-"""Colour and hatching of an event by its kind; others are grey with crosses."""
-
 
 Time = str | pd.Timestamp | None
 
@@ -102,7 +81,7 @@ class DamageIndexDisplay(Display):
     thresholds: Mapping[str, float]
     _: KW_ONLY
     onset: object = None
-    label: str = DAMAGE_INDEX
+    label: str = "damage index (Mahalanobis, unsquared)"
     events: pd.DataFrame | None = None
     watch: float | None = None
 
@@ -151,8 +130,13 @@ class DamageIndexDisplay(Display):
         if threshold is None:
             threshold = -getattr(last, "offset_", float("nan"))
         tables = X if isinstance(X, Mapping) else {"records": X}
-        indices = {label: index_of(estimator, records) for label, records in tables.items()}
-        name = DAMAGE_INDEX if isinstance(last, MahalanobisDetector) else "damage index"
+        indices = {}
+        for label, records in tables.items():
+            if hasattr(estimator, "damage_index"):
+                indices[label] = estimator.damage_index(records)
+            else:
+                indices[label] = pd.Series(-estimator.score_samples(records), getattr(records, "index", None))
+        name = "damage index (Mahalanobis, unsquared)" if isinstance(last, MahalanobisDetector) else "damage index"
         return cls.from_predictions(indices, threshold, **{"label": name, **options})
 
     @classmethod
@@ -184,11 +168,21 @@ class DamageIndexDisplay(Display):
             If an index is not a column of numbers, or a threshold missing or not a number.
         """
         has_panels = isinstance(index, Mapping) and any(isinstance(one, Mapping) for one in index.values())
-        panels = index if has_panels else {"": index if isinstance(index, Mapping) else {"records": index}}
-        tables = {title: columns_of(by_label) for title, by_label in panels.items()}
-        given = threshold if isinstance(threshold, Mapping) else dict.fromkeys(panels, threshold)
-        thresholds = {title: as_threshold(given.get(title), title) for title in panels}
-        return cls._drawn(tables, thresholds, **options)
+        by_title = index if has_panels else {"": index if isinstance(index, Mapping) else {"records": index}}
+        given = threshold if isinstance(threshold, Mapping) else dict.fromkeys(by_title, threshold)
+        tables: dict[str, dict[str, pd.DataFrame]] = {}
+        for title, by_label in by_title.items():
+            if not isinstance(by_label, Mapping) or not by_label:
+                raise ValueError(f"damage index is {by_label!r:.200}; expected one or more by label")
+            own = {str(label): shared.as_table(one, f"damage index {label!r}") for label, one in by_label.items()}
+            if several := [label for label, table in own.items() if table.shape[1] > 1]:
+                raise ValueError(f"damage index {several[0]!r} has several columns; expected one")
+            tables[title] = own
+            value = given.get(title)
+            is_known = is_real(value) or (isinstance(value, pd.Series) and len(value) > 0)
+            if not is_known or not np.isfinite(np.asarray(value, dtype=float)).all():
+                raise ValueError(f"threshold{f' of {title!r}' if title else ''} is {value!r}; expected a number")
+        return cls._drawn(tables, {title: given[title] for title in tables}, **options)
 
     def plot(
         self,
@@ -218,43 +212,47 @@ class DamageIndexDisplay(Display):
         ValueError
             If the onset or an event is not on the axis.
         """
-        titles = list(self.scenarios)
-        width = 9.0 if n_columns == 1 else 4.6
+        titles, is_own_figure = list(self.scenarios), ax is None
+        labels = list(dict.fromkeys(label for by_label in self.scenarios.values() for label in by_label))
         height = 3.4 if len(titles) == 1 else 2.6
-        self.axes_ = panels(ax, titles, (width, height), n_columns=n_columns, share_x=True)
+        size = (9.0 if n_columns == 1 else 4.6), height
+        self.axes_ = shared.panels(ax, titles, size, n_columns, share_x=True)
         self.points_: dict[str, list[Line2D]] = {}
         self.threshold_lines_: list[Line2D] = []
         self.event_spans_: list[Polygon] = []
         for number, (one, title) in enumerate(zip(self.axes_, titles, strict=True)):
-            self._draw_events(one, next(iter(self.scenarios[title].values())).index)
-            self.points_[title] = self._draw_points(one, self.scenarios[title], colours or {})
-            drawn = {shortened(label): in_time(table) for label, table in self.scenarios[title].items()}
-            mark_not_evaluated(one, {label: x[np.isnan(values[:, 0])] for label, (x, values) in drawn.items()})
+            index = next(iter(self.scenarios[title].values())).index
+            self._draw_events(one, index)
+            self.points_[title], unknown = [], {}
+            for label, table in self.scenarios[title].items():
+                x, values = shared.in_time(table)
+                style = shared.marker_style(labels.index(label), len(x)) | {"label": shared.shortened(label)}
+                style["color"] = (colours or {}).get(label, style["color"])
+                self.points_[title] += one.plot(x, values[:, 0], **style)
+                unknown[style["label"]] = x[np.isnan(values[:, 0])]
+            shared.mark_not_evaluated(one, unknown)
             highest = self._draw_threshold(one, self.thresholds[title])
             if self.onset is not None:
-                first = next(iter(self.scenarios[title].values()))
-                one.axvline(
-                    on_axis(self.onset, first.index), color=GREY, linestyle="-", linewidth=1.2, label="onset of damage"
-                )
-            one.set_title(shortened(title))
+                at = shared.on_axis(self.onset, index)
+                one.axvline(at, color=GREY, linewidth=1.2, label="onset of damage")
+            one.set_title(shared.shortened(title))
             one.set_ylim(bottom=0)
-            hold_outliers(one, keep=(0.0, highest))
-            if ax is not None or number % n_columns == 0:
-                one.set_ylabel(plain(self.label if height > 3 else self.label.replace(" (", "\n(")))
-        for one, title in list(zip(self.axes_, titles, strict=True))[-n_columns if ax is None else 0 :]:
-            date_axis(one, next(iter(self.scenarios[title].values())).index)
-        figure_legend(self.axes_, ax is None, n_columns=5)
+            shared.hold_outliers(one, keep=(0.0, highest))
+            if not is_own_figure or number % n_columns == 0:
+                one.set_ylabel(shared.plain(self.label if height > 3 else self.label.replace(" (", "\n(")))
+            if not is_own_figure or number >= len(titles) - n_columns:
+                shared.date_axis(one, index)
+        shared.legend(self.axes_, is_own_figure, n_columns=5)
         return self
 
     def _draw_threshold(self, ax: Axes, threshold: float | pd.Series) -> float:
         """A line, in steps where the threshold changes, and that of a watch; the highest value."""
         style = {"color": BLACK, "linestyle": "--", "linewidth": 1, "label": "threshold"}
+        highest = float(np.max(threshold))
         if isinstance(threshold, pd.Series) and threshold.nunique() > 1:
-            x, values = in_time(threshold.to_frame())
+            x, values = shared.in_time(threshold.to_frame())
             self.threshold_lines_ += ax.plot(x, values[:, 0], drawstyle="steps-post", **style)
-            highest = float(threshold.max())
         else:
-            highest = float(np.max(threshold))
             self.threshold_lines_.append(ax.axhline(highest, **style))
         if self.watch is not None:
             ax.axhline(self.watch, color=GREY, linestyle=":", linewidth=1, label="threshold of a watch")
@@ -262,44 +260,15 @@ class DamageIndexDisplay(Display):
 
     def _draw_events(self, ax: Axes, index: pd.Index) -> None:
         """Shades from the start of each event to its end or, of an open one, to the last record."""
-        events = pd.DataFrame() if self.events is None else self.events
-        for _, event in events.iterrows():
-            is_harmless = bool(event.get("harmless", False))
-            ends = index.max() if pd.isna(event["end"]) else event["end"]
-            colour, hatch = SHADES.get("harmless" if is_harmless else event["kind"], (GREY, "xx"))
+        shades = {"damage": (ORANGE, ""), "watch": (AMBER, "\\\\"), "drift": (PURPLE, "//"), "harmless": (GREY, "..")}
+        for event in () if self.events is None else self.events.to_dict("records"):
+            kind = "harmless" if event.get("harmless", False) else event["kind"]
+            colour, hatch = shades.get(kind, (GREY, "xx"))
             style = {"facecolor": (colour, 0.2), "edgecolor": (colour, 0.5), "hatch": hatch, "linewidth": 1}
-            label = "event marked as harmless" if is_harmless else f"{event['kind']} event"
-            places = on_axis(event["start"], index), on_axis(ends, index)
+            label = "event marked as harmless" if kind == "harmless" else f"{kind} event"
+            ends = event["start"], index.max() if pd.isna(event["end"]) else event["end"]
+            places = (shared.on_axis(one, index) for one in ends)
             self.event_spans_.append(ax.axvspan(*places, label=label, **style))
-
-    def _draw_points(self, ax: Axes, tables: Mapping[str, pd.DataFrame], colours: Mapping[str, str]) -> list[Line2D]:
-        """Points in the colour and marker that their label has in every panel."""
-        drawn, labels = [], list(dict.fromkeys(label for by_label in self.scenarios.values() for label in by_label))
-        for label, table in tables.items():
-            x, values = in_time(table)
-            style = marker_style(labels.index(label), len(x))
-            style |= {"color": colours.get(label, style["color"]), "label": shortened(label)}
-            drawn += ax.plot(x, values[:, 0], **style)
-        return drawn
-
-
-def columns_of(by_label: Mapping[str, ArrayLike]) -> dict[str, pd.DataFrame]:
-    """Damage indices of one panel as frames of one column."""
-    if not isinstance(by_label, Mapping) or not by_label:
-        raise ValueError(f"damage index is {by_label!r:.200}; expected one or more by label")
-    tables = {str(label): as_table(values, f"damage index {label!r}", "index") for label, values in by_label.items()}
-    for label, table in tables.items():
-        if table.shape[1] != 1:
-            raise ValueError(f"damage index {label!r} has {table.shape[1]} columns; expected one")
-    return tables
-
-
-def index_of(estimator: BaseEstimator, records: ArrayLike) -> ArrayLike:
-    """Damage index of records: a detector's own, or minus its score."""
-    if hasattr(estimator, "damage_index"):
-        return estimator.damage_index(records)
-    index = -estimator.score_samples(records)
-    return pd.Series(index, records.index) if isinstance(records, pd.DataFrame) else index
 
 
 def monitored(monitor: Any, start: Time, end: Time, by: str) -> dict[str, Any]:
@@ -309,48 +278,34 @@ def monitored(monitor: Any, start: Time, end: Time, by: str) -> dict[str, Any]:
         raise ValueError(f"{monitor!r:.200} has no {missing}; expected a fitted Monitor, or records for a detector")
     if by not in ("day", "record"):
         raise ValueError(f"by is {by!r}; expected 'day' or 'record'")
-    evaluated = monitor.evaluations_
-    start, end = (in_zone(time, evaluated.index) for time in (start, end))
-    if by == "record":
-        table, is_alarm = evaluated["index"].loc[start:end], (evaluated["state"] == "alarm").loc[start:end]
+    evaluated, is_daily = monitor.evaluations_, by == "day"
+    shown = slice(*(in_zone(time, evaluated.index.tz) for time in (start, end)))
+    if is_daily:
+        table = monitor.days_.loc[shown]
+        table = table.reindex(midnights_between(table.index[0], table.index[-1])) if len(table) else table
+        index, is_alarm = table["index_max"], table["n_alarms"].fillna(0) > 0
     else:
-        days = monitor.days_.loc[start:end]
-        days = days.reindex(midnights_between(days.index[0], days.index[-1])) if len(days) else days
-        table, is_alarm = days["index_max"], days["n_alarms"].fillna(0) > 0
-    if not len(table):
-        raise ValueError(
-            f"there is no {by} between {start or 'the first'} and {end or 'the last'}; expected a time with records"
-        )
-    first, last = table.index[0], table.index[-1] + pd.Timedelta("1D" if by == "day" else "0s")
-    events = monitor.events_
-    events = events[(events["start"] <= last) & (events["end"].isna() | (events["end"] >= first))]
-    names = ("highest of the day", "day with an alarm") if by == "day" else ("record", "record in alarm")
-    parts = {name: table[rows].astype(float) for name, rows in zip(names, (~is_alarm, is_alarm), strict=True)}
-    threshold = evaluated["threshold"].loc[first:last].astype(float)
+        index, is_alarm = evaluated.loc[shown, "index"], evaluated.loc[shown, "state"] == "alarm"
+    if not len(index):
+        ends = f"{shown.start or 'the first'} and {shown.stop or 'the last'}"
+        raise ValueError(f"there is no {by} between {ends}; expected a time with records")
+    names = ("highest of the day", "day with an alarm") if is_daily else ("record", "record in alarm")
+    parts = {name: index[rows].astype(float) for name, rows in zip(names, (~is_alarm, is_alarm), strict=True)}
+    first, last = index.index[0], index.index[-1] + pd.Timedelta("1D" if is_daily else "0s")
+    events, threshold = monitor.events_, evaluated["threshold"].loc[first:last].astype(float)
+    events = events.assign(start=events["start"].clip(lower=first), end=events["end"].fillna(last).clip(upper=last))
     return {
         "index": {name: part for name, part in parts.items() if len(part)},
         "threshold": threshold if len(threshold) else float(monitor.threshold_),
-        "events": events.assign(
-            start=events["start"].clip(lower=first), end=events["end"].fillna(last).clip(upper=last)
-        ),
+        "events": events[events["start"] <= events["end"]],
         "watch": getattr(monitor, "watch_threshold_", None),
         "label": "damage index",
     }
 
 
-def in_zone(time: Time, index: pd.DatetimeIndex) -> pd.Timestamp | None:
-    """A time in the zone of an index."""
+def in_zone(time: Time, zone: tzinfo | None) -> pd.Timestamp | None:
+    """A time in the zone of the records."""
     if time is None:
         return None
     stamp = pd.Timestamp(time)
-    return stamp.tz_localize(index.tz) if stamp.tz is None else stamp
-
-
-def as_threshold(value: object, title: str) -> float | pd.Series:
-    """A threshold as a number, or as numbers in time."""
-    if isinstance(value, pd.Series) and np.isfinite(value.astype(float)).all() and len(value):
-        return value
-    threshold = float(value) if is_real(value) else np.nan
-    if not np.isfinite(threshold):
-        raise ValueError(f"threshold{f' of {title!r}' if title else ''} is {value!r}; expected a number")
-    return threshold
+    return stamp.tz_localize(zone) if stamp.tz is None else stamp

@@ -9,22 +9,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pandas as pd
 
-from skthermo._core.arrays import Array, check_names
+from skthermo._core.arrays import check_names
 from skthermo._core.text import chance_text, percent, printable, share_text
-from skthermo.plotting._display import (
-    BLACK,
-    BLUE,
-    GREY,
-    LETTER,
-    ORANGE,
-    Display,
-    check_study,
-    figure_legend,
-    label_of,
-    panels,
-    plain,
-    shortened,
-)
+from skthermo.plotting import _display as shared
+from skthermo.plotting._display import BLACK, BLUE, GREY, ORANGE, Display
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,10 +21,8 @@ if TYPE_CHECKING:
 
     from skthermo.studies import DetectabilityStudy
 
-BEST, ONE_REPEAT = "not significantly worse", "order uncertain: one repeat"
-WORSE, BROKEN = "significantly lower POD", "failed"
-
 RATES = ["low", "high", "value", "mark"]
+BLANK = ("", "", "", "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +150,7 @@ class DetectorsDisplay(Display):
         ValueError
             If ``what`` is something else, or the study has no healthy scenario to rank by, or no measured records.
         """
-        check_study(study)
+        shared.check_study(study)
         if what not in ("ranking", "agreement"):
             raise ValueError(f"what is {what!r}; expected 'ranking' or 'agreement'")
         if what == "agreement":
@@ -216,29 +202,24 @@ class DetectorsDisplay(Display):
         """
         if isinstance(table, pd.Series) and len(table):
             return cls(**of_changes(table)).plot(**options)
-        columns = list(table.columns) if isinstance(table, pd.DataFrame) else []
+        columns = set(table.columns) if isinstance(table, pd.DataFrame) and len(table) else set()
         identified = {
             of_causes: {"probability", "severity", "ci_low", "ci_high"},
             of_shifts: {"measured", "explained", "standard_error"},
             of_explanations: {"probability"},
         }
         for made, needed in identified.items():
-            if columns and len(table) and needed <= set(columns) and "rate" not in columns:
+            if needed <= columns and "rate" not in columns:
                 return cls(**made(table)).plot(**options)
-        results = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
-        bounded = [
-            f"{name}{end}" for name in ("false_alarms", "pod", "pod_deficit") for end in ("", "_ci_low", "_ci_high")
-        ]
-        ranking = [*bounded, "within_limit", "pod_at_equal_pfa", "significantly_worse"]
-        is_ranking = "within_limit" in columns
-        needed = ranking if is_ranking else results
-        missing = [name for name in needed if name not in columns]
-        if missing or not len(table):
-            got = f"lacks the columns {missing}" if columns and missing else f"is {table!r:.200}"
-            raise ValueError(f"table {got}; expected a ranking, or results with {results}, and one row or more")
-        if is_ranking:
-            return cls(**of_ranking(table, max_false_alarms, by)).plot(**options)
-        return cls(**of_results(table, scenarios, groups or {})).plot(**options)
+        needed = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
+        if is_ranking := "within_limit" in columns:
+            bounds = [f"{name}{end}" for name in ("pod", "pod_deficit") for end in ("", "_ci_low", "_ci_high")]
+            needed = ["false_alarms", *bounds, "pod_at_equal_pfa", "significantly_worse"]
+        if missing := [name for name in needed if name not in columns]:
+            got = f"lacks the columns {missing}" if columns else f"is {table!r:.200}"
+            raise ValueError(f"table {got}; expected a ranking, or results with {needed}, and one row or more")
+        made = of_ranking(table, max_false_alarms, by) if is_ranking else of_results(table, scenarios, groups or {})
+        return cls(**made).plot(**options)
 
     def plot(self, ax: Axes | np.ndarray | None = None) -> DetectorsDisplay:
         """Draw into axes.
@@ -254,38 +235,55 @@ class DetectorsDisplay(Display):
             Itself.
         """
         n_columns = min(2 if len(self.panels) == 4 else 3, len(self.panels))
-        n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
-        width = 3.6 if n_columns > 1 else 5.0
-        size = width + LETTER * n_letters / n_columns, max(0.26 * len(self.places) + 1.5, 2.4)  # inches
-        self.axes_ = panels(ax, list(self.panels), size, n_columns=n_columns)
+        n_letters = max(len(shared.label_of(name)) for _, name in self.places if name is not None)
+        width = (3.6 if n_columns > 1 else 5.0) + shared.LETTER * n_letters / n_columns
+        size = width, max(0.26 * len(self.places) + 1.5, 2.4)  # inches
+        self.axes_ = shared.panels(ax, list(self.panels), size, n_columns)
         self.bars_: dict[str, BarContainer] = {}
         self.values_: dict[str, PathCollection] = {}
         self.marks_: dict[str, list[PathCollection]] = {}
         for one, (name, panel) in zip(self.axes_, self.panels.items(), strict=True):
-            name_rows(one, self.places)
+            one.set_title(panel.title, fontsize="medium")
+            one.set_xlabel(panel.label)
+            self._name_rows(one)
             self._draw_rates(one, name, panel)
             self._write_notes(one, panel)
-        figure_legend(self.axes_, ax is None)
+        shared.legend(self.axes_, ax is None)
         return self
+
+    def _name_rows(self, ax: Axes) -> None:
+        """Names of the detectors left of the panels, headings of groups in bold type, and an empty frame."""
+        ax.set_yticks(
+            list(self.places.values()), [shared.label_of(row[0 if row[1] is None else 1]) for row in self.places]
+        )
+        for text, (_, name) in zip(ax.get_yticklabels(), self.places, strict=True):
+            text.set_fontweight("bold" if name is None else "normal")
+        ax.set_ylim(len(self.places) - 0.4, -0.6)
+        cell = ax.get_subplotspec()
+        ax.tick_params(axis="y", length=0, labelleft=cell is None or cell.is_first_col())
+        ax.spines[["top", "right", "left"]].set_visible(False)
+        ax.grid(axis="x", color="#DDDDDD", linewidth=0.6)
+        ax.set_axisbelow(True)
 
     def _draw_rates(self, ax: Axes, name: str, panel: RatesPanel) -> None:
         heights = {detector: height for (_, detector), height in self.places.items() if detector is not None}
         y = panel.rates.index.map(heights).to_numpy(dtype=float)
         low, high, value, mark = panel.rates[RATES].to_numpy(dtype=float).T
         colours = [self.colours[detector] for detector in panel.rates.index]
-        if panel.axis == "small":
-            small_rates(ax, np.append(np.r_[high, value, mark], panel.limit or 0.0))
+        if panel.axis == "small":  # a square-root scale spreads small rates
+            largest = float(np.clip(1.08 * np.nanmax([*high, *value, *mark, panel.limit or 0.0]), 2.0, 101.0))
+            ax.set_xscale("function", functions=(lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda x: x * np.abs(x)))
+            ax.set_xlim(-0.0004 * largest, largest)
+            ticks = [tick for tick in (0, 0.5, 2, 5, 10, 20, 40, 60, 80, 100) if tick <= largest]
+            ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         elif panel.axis == "shares":
             ax.set_xlim(-1, 101)
-        ax.set_title(panel.title, fontsize="medium")
-        ax.set_xlabel(panel.label)
         if panel.limit is not None:
             ax.axvline(panel.limit, color=BLACK, linestyle="--", linewidth=1, label="limit of the false-alarm rate")
-        bounds, mean, filled, empty = self.labels
-        has_bounds, has_values = (np.isfinite(one).any() for one in (high - low, value))
-        style = {"color": colours, "alpha": 0.35, "label": bounds if has_bounds else None}
-        self.bars_[name] = ax.barh(y, high - low, 0.62, low, **style)
-        label = mean if has_values else None
+        bounds, mean, filled, empty = (text or None for text in self.labels)
+        label = bounds if np.isfinite(high - low).any() else None
+        self.bars_[name] = ax.barh(y, high - low, 0.62, low, color=colours, alpha=0.35, label=label)
+        label = mean if np.isfinite(value).any() else None
         style = {"marker": "|", "s": 100, "linewidths": 2, "color": colours, "zorder": 3, "label": label}
         self.values_[name] = ax.scatter(value, y, **style)
         self.marks_[name] = []
@@ -297,33 +295,32 @@ class DetectorsDisplay(Display):
 
     def _write_notes(self, ax: Axes, panel: RatesPanel) -> None:
         """Small texts at that end of their rows where there is more room."""
+        left, right = ax.get_xlim()
         for (_, detector), height in self.places.items():
             text = printable(panel.notes.get(detector, ""))
-            if not text:
-                continue
-            text = text if len(text) <= 45 else f"{text[:45].rstrip()} ..."
-            is_right = False
-            if detector in panel.rates.index:
-                drawn, (left, right) = panel.rates.loc[detector, RATES].astype(float), ax.get_xlim()
-                is_right = bool(right - drawn.max() > drawn.min() - left)
+            drawn = panel.rates[RATES].astype(float).T.get(detector, pd.Series(np.inf))
+            is_right = bool(right - drawn.max() > drawn.min() - left)
             place = {"x": 0.99 if is_right else 0.01, "ha": "right" if is_right else "left"}
             style = {"fontsize": "x-small", "color": GREY, "va": "center", "clip_on": True, "in_layout": False}
-            ax.text(y=height, s=plain(text), transform=ax.get_yaxis_transform(), **place, **style)
+            text = shared.plain(text if len(text) <= 45 else f"{text[:45].rstrip()} ...")
+            if text:
+                ax.text(y=height, s=text, transform=ax.get_yaxis_transform(), **place, **style)
 
 
 def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object]:
-    """What a display of a ranking is made of."""
-    level = BEST if ranking["pod_deficit_ci_low"].notna().any() else ONE_REPEAT
-    loud = f"more than {percent(limit)} false alarms"
+    """Contents of a display of a ranking."""
+    has_bounds = ranking["pod_deficit_ci_low"].notna().any()
+    level = "not significantly worse" if has_bounds else "order uncertain: one repeat"
+    worse, loud, broken = "significantly lower POD", f"more than {percent(limit)} false alarms", "failed"
     is_tested = np.isfinite(ranking["false_alarms"].astype(float))
-    kinds = ranking["significantly_worse"].astype(bool).map({True: WORSE, False: level})
-    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, BROKEN)
-    kinds = kinds.sort_values(key=lambda names: names.map([level, WORSE, loud, BROKEN].index), kind="stable")
+    kinds = ranking["significantly_worse"].astype(bool).map({True: worse, False: level})
+    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, broken)
+    kinds = kinds.sort_values(key=lambda names: names.map([level, worse, loud, broken].index), kind="stable")
     tested = ranking[is_tested]
 
-    def rates(name: str, mark: pd.Series | None = None) -> pd.DataFrame:
-        table = tested[[f"{name}_ci_low", f"{name}_ci_high", name]].set_axis(RATES[:3], axis=1)
-        return (100 * table.assign(mark=np.nan if mark is None else mark).astype(float)).assign(is_open=True)
+    def rates(name: str, mark: object = np.nan) -> pd.DataFrame:
+        ends = {side: tested.get(f"{name}_ci_{side}", np.nan) for side in ("low", "high")}
+        return in_percent(tested.index, is_open=True, value=tested[name], mark=mark, **ends)
 
     errors = ranking.loc[~is_tested, "error"].to_dict() if "error" in ranking else {}
     unknown = tested.get("not_evaluated", pd.Series(dtype=float))
@@ -335,7 +332,7 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
         "pod": RatesPanel("probability of detection", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
         "pod_deficit": RatesPanel("POD below that of the best", label, rates("pod_deficit"), axis="free"),
     }
-    colours = {name: {BEST: BLUE, ONE_REPEAT: BLUE, WORSE: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
+    colours = {name: {level: BLUE, worse: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
     labels = ["confidence interval", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]
     places = places_of(list(ranking.index), kinds.to_dict())
     return {"panels": panels, "places": places, "colours": colours, "labels": labels}
@@ -389,7 +386,7 @@ def of_explanations(table: pd.DataFrame) -> dict[str, object]:
     notes = {name: chance_text(share) for name, share in shown.items()}
     rates = in_percent(shown.index, low=0.0, high=shown)
     panels = {"probability": RatesPanel("explanations of the shifts", "probability (%)", rates, notes)}
-    return drawn_by_row(panels, ORANGE, ["", "", "", ""])
+    return drawn_by_row(panels, ORANGE, BLANK)
 
 
 def of_changes(changes: pd.Series) -> dict[str, object]:
@@ -398,14 +395,14 @@ def of_changes(changes: pd.Series) -> dict[str, object]:
     notes = dict.fromkeys(changes.index[known.isna()], "not found")
     rates = in_percent(changes.index, low=0.0, high=known, value=known)
     panels = {"smallest": RatesPanel("smallest change found", "loss of stiffness (%)", rates, notes, "free")}
-    return drawn_by_row(panels, BLUE, ["", "", "", ""])
+    return drawn_by_row(panels, BLUE, BLANK)
 
 
 def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: Mapping[str, str]) -> dict[str, object]:
-    """What a display of measured rates beside simulated ones is made of."""
-    failed = results["scenario"].isna()
-    errors = {row["detector"]: f"failed: {row.get('error', '')}" for _, row in results[failed].iterrows()}
-    table = both_rates(results[~failed])
+    """Contents of a display of measured rates beside simulated ones."""
+    failed = results[results["scenario"].isna()].set_index("detector")
+    errors = {name: f"failed: {text}" for name, text in failed.get("error", pd.Series("", failed.index)).items()}
+    table = both_rates(results[results["scenario"].notna()])
     measures = table.groupby("scenario", sort=False)["measure"].first()
     known = measures.sort_values(key=lambda measure: measure != "PFA", kind="stable").index
     names = check_names(known if scenarios is None else scenarios, "scenarios", known)
@@ -419,12 +416,12 @@ def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: M
         lacking = [one for one in order if one not in rates.index and (number == 0 or one in set(table["detector"]))]
         notes = rates["note"].to_dict() | {one: errors.get(one, "no measured records") for one in lacking}
         is_healthy, inside = measures[name] == "PFA", rates["inside"].dropna()
-        title = f"{'false alarms' if is_healthy else 'POD'}: {shortened(name)}"
+        title = f"{'false alarms' if is_healthy else 'POD'}: {shared.shortened(name)}"
         title += f"\n{inside.sum():.0f} of {len(inside)} within the prediction interval" if len(inside) else ""
-        rates = rates.assign(is_open=(rates["mark"] < rates["low"]) | (rates["mark"] > rates["high"]))
-        rates[RATES] *= 100
+        is_open = (rates["mark"] < rates["low"]) | (rates["mark"] > rates["high"])
+        shown = in_percent(rates.index, is_open=is_open, **rates[RATES])
         label = f"records in alarm (%{', square-root scale' if is_healthy else ''})"
-        panels[name] = RatesPanel(title, label, rates, notes, "small" if is_healthy else "shares")
+        panels[name] = RatesPanel(title, label, shown, notes, "small" if is_healthy else "shares")
     labels = ["prediction interval of one campaign", "simulated mean", "measured", "measured, outside the interval"]
     colours = dict.fromkeys(order, ORANGE)
     return {"panels": panels, "places": places_of(order, groups), "colours": colours, "labels": labels}
@@ -433,39 +430,32 @@ def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: M
 def both_rates(results: pd.DataFrame) -> pd.DataFrame:
     """Simulated rates with their bands (value, low, high) and measured ones (mark), of scenarios that have both."""
     keys = ["detector", "scenario"]
-    counts = results.value_counts([*keys, "source"])
-    if counts.max() > 1:
-        (detector, scenario, source), n_rows = counts.index[0], counts.iloc[0]
+    if (twice := results.duplicated([*keys, "source"])).any():
+        row = results[twice].iloc[0]
         raise ValueError(
-            f"detector {detector!r} has {n_rows} rows of scenario {scenario!r}, source {source!r}; expected one: of "
-            "each study, keep the scenarios that are to be compared"
+            f"detector {row['detector']!r} has several rates of scenario {row['scenario']!r}; expected one: of each "
+            "study, keep the scenarios that are to be compared"
         )
     n_unknown = results.get("n_not_evaluated", pd.Series(0, results.index))
     results = results.assign(unknown=n_unknown / (results.get("n_records", 0) + n_unknown))
-    simulated, measured = (
-        results[results["source"] == source].set_index(keys) for source in ("simulated", "reference")
-    )
+    simulated, measured = (results[results["source"] == source] for source in ("simulated", "reference"))
+    measured = measured.reindex(columns=[*keys, "rate", "unknown", "n_repeats"])
+    simulated = simulated[simulated["scenario"].isin(measured["scenario"])].drop(columns="n_repeats", errors="ignore")
+    if not len(simulated):
+        known = results["scenario"].unique().tolist()
+        raise ValueError(f"no scenario of {known} has both simulated and measured records; expected a run with both")
     table = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
-    measured = measured.rename(columns={"rate": "mark", "unknown": "unknown_measured", "n_repeats": "n_campaigns"})
-    scenarios = measured.index.get_level_values("scenario")
-    table = table[table.index.get_level_values("scenario").isin(scenarios)]
-    if not len(table):
-        raise ValueError(
-            f"no scenario of {results['scenario'].unique().tolist()} has both simulated and measured records; expected "
-            "the results of a run with a reference"
-        )
-    table = table.join(measured.reindex(columns=["mark", "unknown_measured", "n_campaigns"])).reset_index()
-    can_compare = table[["low", "high", "mark"]].notna().all(axis=1) & (table["n_campaigns"].fillna(1) == 1)
-    inside = table["mark"].between(table["low"], table["high"]).astype(float).where(can_compare)
-    shares = table[["unknown_measured", "unknown"]].itertuples(index=False)
-    return table.assign(inside=inside, note=[_not_evaluated(*both) for both in shares])
-
-
-def _not_evaluated(measured: float, simulated: float) -> str:
-    """What share of the measured and of the simulated records is not evaluated; nothing if all are."""
-    if measured > 0:
-        return f"{share_text(measured)} not evaluated{f' (simulated {share_text(simulated)})' if simulated > 0 else ''}"
-    return f"{share_text(simulated)} of simulated not evaluated" if simulated > 0 else ""
+    table = table.merge(measured.rename(columns={"rate": "mark"}), "left", on=keys, suffixes=("", "_measured"))
+    is_single = table[["low", "high", "mark"]].notna().all(axis=1) & (table["n_repeats"].fillna(1) == 1)
+    inside = table["mark"].between(table["low"], table["high"]).astype(float).where(is_single)
+    shares = {"unknown_measured": "", "unknown": " of simulated"}
+    notes = table[list(shares)].apply(
+        lambda row: ", ".join(
+            f"{share_text(row[name])}{of} not evaluated" for name, of in shares.items() if row[name] > 0
+        ),
+        axis=1,
+    )
+    return table.assign(inside=inside, note=notes)
 
 
 def places_of(names: Sequence[Hashable], groups: Mapping[Hashable, Hashable]) -> dict[tuple[Hashable, Hashable], int]:
@@ -480,30 +470,3 @@ def places_of(names: Sequence[Hashable], groups: Mapping[Hashable, Hashable]) ->
     for group in dict.fromkeys(groups.values()):
         rows += [(group, None), *((group, name) for name in names if groups.get(name) == group)]
     return {row: height for height, row in enumerate(rows)}
-
-
-def name_rows(ax: Axes, places: Mapping[tuple[Hashable, Hashable], int]) -> None:
-    """Names of the detectors, headings of groups in bold type, and an empty frame; names stand left of the panels."""
-    texts = [label_of(group) if name is None else label_of(name) for group, name in places]
-    ax.set_yticks(list(places.values()), texts)
-    for text, (_, name) in zip(ax.get_yticklabels(), places, strict=True):
-        text.set_fontweight("bold" if name is None else "normal")
-    ax.set_ylim(len(places) - 0.4, -0.6)
-    cell = ax.get_subplotspec()
-    ax.tick_params(axis="y", length=0, labelleft=cell is None or cell.is_first_col())
-    ax.spines[["top", "right", "left"]].set_visible(False)
-    ax.grid(axis="x", color="#DDDDDD", linewidth=0.6)
-    ax.set_axisbelow(True)
-
-
-def small_rates(ax: Axes, drawn: Array) -> None:
-    """An axis from 0 to the largest of some rates in percent, on a square-root scale, which spreads small ones."""
-    largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
-    functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
-    ticks: list[float] = []
-    for value in (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100):
-        if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > 0.07 * np.sqrt(largest)):
-            ticks.append(value)
-    ax.set_xscale("function", functions=functions)
-    ax.set_xlim(-0.0004 * largest, largest)  # 2 % of the axis
-    ax.set_xticks(ticks, [f"{value:g}" for value in ticks])

@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from skthermo._core.arrays import Array
-from skthermo.plotting._display import (
-    COLOURS,
-    GREY,
-    LINES,
-    MARKERS,
-    Display,
-    check_study,
-    panels,
-    shortened,
-)
+from skthermo.plotting import _display as shared
+from skthermo.plotting._display import COLOURS, GREY, LINES, MARKERS, Display
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
 
     from skthermo.studies import DetectabilityStudy, PODCurve
 
@@ -124,7 +115,7 @@ class PODCurveDisplay(Display):
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
-        check_study(study)
+        shared.check_study(study)
         curve = study.pod_curve(family, source, detector=detector)
         return cls.from_predictions(curve, label=label or detector or family, **options)
 
@@ -169,73 +160,53 @@ class PODCurveDisplay(Display):
         PODCurveDisplay
             Itself.
         """
-        self.axes_ = panels(ax, ["one display"], (6.5, 4.2))
-        number = sum(line.get_gid() == "POD" for line in self.ax_.lines)
-        colour = COLOURS[number % len(COLOURS)]
-        marker, dashes = MARKERS[number % len(MARKERS)], LINES[number % len(LINES)]
-        severities = np.asarray(self.curve.severities, dtype=float)
-        self._draw_shares(severities, colour, marker, number > 0)
-        drawn = np.linspace(severities.min(), severities.max(), 200)
-        pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in self.curve.predict(drawn))
-        style = {"color": colour, "linestyle": dashes, "label": shortened(self.label or "fitted curve"), "gid": "POD"}
-        self.line_ = self.ax_.plot(100 * drawn, pod, **style)[0]
-        label = None if number else f"its {100 * getattr(self.curve, 'confidence', 0.95):g} % interval"
-        band = {"color": colour, "alpha": 0.15, "linewidth": 0, "label": label}
-        self.band_ = self.ax_.fill_between(100 * drawn, lowest, highest, **band)
-        self.replicates_ = self._draw_campaigns(drawn, colour)
-        self.marks_ = self._draw_marks(colour) if marks else {}
-        self.ax_.set(xlabel="severity: loss of stiffness (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
-        self.ax_.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
-        return self
-
-    def _draw_campaigns(self, drawn: Array, colour: str) -> PolyCollection | None:
-        if not getattr(self.curve, "replicates", ()):
-            return None
-        low, high = (100 * np.asarray(values) for values in self.curve.prediction_interval(drawn))
-        style = {"facecolor": colour, "edgecolor": colour, "alpha": 0.12, "linestyle": "--", "linewidth": 0.8}
-        return self.ax_.fill_between(
-            100 * drawn, low, high, label="prediction interval of one campaign", zorder=0, **style
-        )
-
-    def _draw_shares(self, severities: Array, colour: str, marker: str, is_later: bool) -> None:
-        """Observed shares; the legend names those of the first curve."""
-        n_detected, n_records, severities = np.broadcast_arrays(
-            np.asarray(self.curve.n_detected, dtype=float), np.asarray(self.curve.n_records, dtype=float), severities
+        self.axes_ = shared.panels(ax, ["one display"], (6.5, 4.2))
+        ax, curve = self.ax_, self.curve
+        number = sum(line.get_gid() == "POD" for line in ax.lines)
+        marker, line, colour = (styles[number % len(styles)] for styles in (MARKERS, LINES, COLOURS))
+        severities, n_detected, n_records = np.broadcast_arrays(
+            *(np.asarray(values, dtype=float) for values in (curve.severities, curve.n_detected, curve.n_records))
         )
         share = n_detected / n_records
-        ends = wilson(n_detected, n_records)
-        errors = 100 * np.abs(np.array(ends) - share)
-        self.errorbar_ = self.ax_.errorbar(
-            *(100 * severities, 100 * share, errors),
-            linestyle="",
-            marker=marker,
-            markersize=5,
-            color=colour,
-            capsize=2,
-            elinewidth=0.8,
-            label=None if is_later else "tested, with 95 % interval",
-        )
+        errors = 100 * np.abs(np.array(wilson(n_detected, n_records)) - share)
+        label = None if number else "tested, with 95 % interval"
+        style = {"linestyle": "", "markersize": 5, "capsize": 2, "elinewidth": 0.8, "color": colour, "label": label}
+        self.errorbar_ = ax.errorbar(100 * severities, 100 * share, errors, marker=marker, **style)
+        drawn = np.linspace(severities.min(), severities.max(), 200)
+        pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in curve.predict(drawn))
+        style = {"color": colour, "linestyle": line, "label": shared.shortened(self.label or "fitted curve")}
+        self.line_ = ax.plot(100 * drawn, pod, gid="POD", **style)[0]
+        label = None if number else f"its {100 * getattr(curve, 'confidence', 0.95):g} % interval"
+        style = {"color": colour, "alpha": 0.15, "linewidth": 0, "label": label}
+        self.band_ = ax.fill_between(100 * drawn, lowest, highest, **style)
+        self.replicates_ = None
+        if getattr(curve, "replicates", ()):
+            ends = (100 * np.asarray(values) for values in curve.prediction_interval(drawn))
+            style = {"color": colour, "alpha": 0.12, "linestyle": "--", "linewidth": 0.8, "zorder": 0}
+            label = "prediction interval of one campaign"
+            self.replicates_ = ax.fill_between(100 * drawn, *ends, label=label, **style)
+        self.marks_ = self._draw_marks(colour) if marks else {}
+        ax.set(xlabel="severity: loss of stiffness (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
+        ax.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
+        return self
 
     def _draw_marks(self, colour: str) -> dict[str, Artist]:
-        """Vertical lines from the axis up to 90 %."""
-        drawn = {}
+        """Vertical lines from the axis up to 90 %, or the bracket of a curve that the records do not determine."""
+        drawn: dict[str, Any] = {}
         for name, text, dashes in (("a90", "$a_{90}$", ":"), ("a90_95", "$a_{90/95}$", "-.")):
             value = getattr(self.curve, name)
             if value is not None and np.isfinite(value):
-                style = {"color": colour, "linestyle": dashes, "linewidth": 1}
-                label = f"{text} = {100 * value:.1f} %"
-                drawn[name] = self.ax_.plot([100 * value] * 2, [-3, 90], **style, label=label)[0]
-        ends = np.array(getattr(self.curve, "bracket", (np.nan, np.nan)), dtype=float)
-        if not drawn and np.isnan(self.curve.a90) and np.isfinite(ends).all():
-            low, high = np.sort(100 * ends * np.sign(np.asarray(self.curve.severities)[-1]))
-            style = {"facecolor": colour, "alpha": 0.15, "hatch": "//"}
-            label = f"$a_{{90}}$ between {low:.1f} and {high:.1f} %"
-            drawn["bracket"] = self.ax_.axvspan(low, high, **style, label=label)
-        elif not drawn and np.isnan(self.curve.a90) and np.isfinite(ends[0]):
-            above = 100 * ends[0] * np.sign(np.asarray(self.curve.severities)[-1])
-            drawn["bracket"] = self.ax_.plot([], [], " ", label=f"$a_{{90}}$ beyond {above:.1f} %")[0]
-        if drawn and not any(line.get_gid() == "90" for line in self.ax_.lines):
-            self.ax_.axhline(90, color=GREY, linewidth=0.6, linestyle=":", gid="90")
+                style = {"color": colour, "linestyle": dashes, "linewidth": 1, "label": f"{text} = {100 * value:.1f} %"}
+                drawn[name] = self.ax_.plot([100 * value] * 2, [-3, 90], **style)[0]
+        sign = np.sign(np.asarray(self.curve.severities)[-1])
+        low, high = 100 * sign * np.array(getattr(self.curve, "bracket", (np.nan, np.nan)), dtype=float)
+        if drawn:
+            self.ax_.axhline(90, color=GREY, linewidth=0.6, linestyle=":")
+        elif np.isnan(self.curve.a90) and np.isfinite([low, high]).all():
+            label = f"$a_{{90}}$ between {min(low, high):.1f} and {max(low, high):.1f} %"
+            drawn["bracket"] = self.ax_.axvspan(low, high, facecolor=colour, alpha=0.15, hatch="//", label=label)
+        elif np.isnan(self.curve.a90) and np.isfinite(low):
+            drawn["bracket"] = self.ax_.plot([], [], " ", label=f"$a_{{90}}$ beyond {low:.1f} %")[0]
         return drawn
 
 

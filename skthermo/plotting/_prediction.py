@@ -8,34 +8,14 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
-from skthermo._core.arrays import Array, as_columns
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import check_same_rows
 from skthermo._core.warnings import collected, warn_each
-from skthermo.plotting._display import (
-    BLACK,
-    BLUE,
-    DENSE,
-    GREY,
-    ORANGE,
-    Display,
-    as_table,
-    date_axis,
-    figure_legend,
-    hold_outliers,
-    in_time,
-    label_of,
-    line_style,
-    marker_style,
-    on_axis,
-    panels,
-    plain,
-    shortened,
-    with_breaks,
-)
+from skthermo.plotting import _display as shared
+from skthermo.plotting._display import BLACK, BLUE, COLOURS, DENSE, GREY, LINES, ORANGE, Display
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -163,30 +143,21 @@ class PredictionDisplay(Display):
         if what not in ("frequencies", "parameters"):
             raise ValueError(f"what is {what!r}; expected 'frequencies' or 'parameters'")
         if sensor is not None:
-            temperatures = as_table(X, "temperatures", "T")
+            temperatures = shared.as_table(X, "temperatures", "T")
             if sensor not in temperatures:
                 raise ValueError(f"sensor is {sensor!r}; expected one of {list(temperatures)}")
             options["temperature"] = temperatures[sensor]
         if what == "parameters":
             tables = (estimator.estimate_parameters(y), estimator.predict_parameters(X))
-            measured, predicted = (pd.DataFrame(table, columns=estimator.parameter_names_) for table in tables)
-            options = {
-                "labels": ("from frequencies", "from temperatures"),
-                "unit": "",
-                "quantity": "multiple of nominal",
-            } | options
-            return cls.from_predictions(measured, predicted, **options)
-        if sensor is not None or options.get("kind") == "scatter":
-            confidence = None
-        if confidence is not None and not hasattr(estimator, "predict_interval"):
-            raise ValueError(
-                f"confidence is {confidence!r}, and {estimator!r:.200} has no method 'predict_interval'; expected an "
-                "estimator with one, such as DataInformedFEM, or confidence=None"
-            )
+            tables = [pd.DataFrame(table, columns=estimator.parameter_names_) for table in tables]
+            words = {"labels": ("from frequencies", "from temperatures"), "quantity": "multiple of nominal", "unit": ""}
+            return cls.from_predictions(*tables, **(words | options))
         ends: Sequence[ArrayLike] = ()
         with collected() as findings:
             predicted = estimator.predict(X)
-            if confidence is not None:
+            if confidence is not None and sensor is None and options.get("kind") != "scatter":
+                if not hasattr(estimator, "predict_interval"):
+                    raise ValueError(f"{estimator!r:.200} has no method 'predict_interval'; expected confidence=None")
                 ends = estimator.predict_interval(X, confidence)
                 options = {"interval_label": f"interval, {100 * confidence:g} %"} | options
         warn_each(findings)
@@ -235,16 +206,24 @@ class PredictionDisplay(Display):
         if (lowest is None) != (highest is None):
             raise ValueError("only one of lowest and highest is given; expected both or none")
         by_label = predicted if isinstance(predicted, Mapping) else {labels[1]: predicted}
-        by_label = {str(label): table for label, table in by_label.items() if table is not None}
-        given = {"predicted" if label == labels[1] else label: table for label, table in by_label.items()}
-        for name, table in {**given, "lowest": lowest, "highest": highest}.items():
+        given = {str(label): table for label, table in by_label.items()} | {"lowest": lowest, "highest": highest}
+        first, tables = shared.as_table(measured, "measured"), {}
+        for name, table in given.items():
             if table is not None:
-                check_like(measured, table, ("measured", name))
-        tables = {label: as_table(table, label) for label, table in by_label.items()}
-        ends = [None if table is None else as_table(table, "interval") for table in (lowest, highest)]
+                check_same_rows(measured, table, ("measured", name))
+                tables[name] = shared.as_table(table, name)
+                if tables[name].shape != first.shape:
+                    n_columns = f"{first.shape[1]} columns and {name} {tables[name].shape[1]}"
+                    raise ValueError(f"measured has {n_columns}; expected the same")
+        ends = tables.pop("lowest", None), tables.pop("highest", None)
         if temperature is not None:
-            options["temperature"] = one_temperature(temperature, measured)
-        return cls._drawn(as_table(measured, "measured"), tables, *ends, label=labels[0], **options)
+            check_same_rows(temperature, measured, ("temperature", "measured"))
+            table = shared.as_table(temperature, "temperature")
+            if table.shape[1] != 1:
+                raise ValueError(f"temperature has {table.shape[1]} columns; expected one sensor")
+            is_named = isinstance(temperature, pd.DataFrame) or getattr(temperature, "name", None) is not None
+            options["temperature"] = table.iloc[:, 0].rename(table.columns[0] if is_named else "temperature")
+        return cls._drawn(first, tables, *ends, label=labels[0], **options)
 
     def plot(
         self,
@@ -286,116 +265,94 @@ class PredictionDisplay(Display):
         columns = list(self.measured.columns)
         if titles is not None and len(titles) != len(columns):
             raise ValueError(f"titles is {list(titles)}; expected {len(columns)}, for {columns}")
-        names = [label_of(name) for name in (columns if titles is None else titles)]
-        is_square = kind == "scatter" or self.temperature is not None
-        n_columns = n_columns or (1 if not is_square else 3 if kind == "scatter" or len(names) == 6 else 4)
+        names = [shared.label_of(name) for name in (columns if titles is None else titles)]
+        in_time = kind != "scatter" and self.temperature is None
+        n_columns = n_columns or (1 if in_time else 3 if kind == "scatter" or len(names) == 6 else 4)
         n_rows = -(-len(names) // n_columns)  # panels over time are wide, and taller if there are few
-        wide = (9.0 if n_columns == 1 else 5.5), (3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
-        size = (3.3, 3.2) if is_square else wide
-        self.axes_ = panels(ax, names, size, n_columns=n_columns, share_x=not is_square)
+        size = (9.0 if n_columns == 1 else 5.5, 3.4 if n_rows == 1 else 2.5 if n_rows == 2 else 1.9)
+        self.axes_ = shared.panels(ax, names, size if in_time else (3.3, 3.2), n_columns, share_x=in_time)
         self.lines_: dict[str, list[Line2D]] = {}
         self.bands_: list[PolyCollection] = []
         if kind == "scatter":
-            self._draw_scatter(names)
-            return self
-        if self.temperature is not None:
-            self._draw_over_temperature(names, n_columns)
+            self._draw_scatter()
+        elif not in_time:
+            self._draw_over_temperature(n_columns)
         else:
-            self._draw_in_time(names, kind)
+            self._draw_in_time(kind, names)
             for one in self.axes_[-n_columns:] if ax is None else self.axes_:
-                date_axis(one, self.measured.index)
-            draw_marks(self.axes_, marks, self.measured.index)
+                shared.date_axis(one, self.measured.index)
+            for text, place in (marks or {}).items():
+                at = shared.on_axis(place, self.measured.index)
+                for one in self.axes_:
+                    one.axvline(at, color=GREY, linestyle="--", linewidth=1)
+                transform = self.axes_[0].get_xaxis_transform()
+                self.axes_[0].text(at, 1.03, f" {shared.shortened(text)}", transform=transform, fontsize="small")
+        if not in_time:
+            for one, name in zip(self.axes_, names, strict=True):
+                one.set_title(name)
+                shared.hold_outliers(one, "x")
+                shared.hold_outliers(one)
         if len(self.lines_) > 1 or self.bands_:
-            figure_legend(self.axes_, ax is None)
+            shared.legend(self.axes_, ax is None)
         return self
 
-    @property
-    def _tables(self) -> dict[str, pd.DataFrame]:
-        """What is measured and what is predicted, by label."""
-        return {self.label: self.measured, **(self.predicted or {})}
-
-    def _draw_lines(self, label: str, x: Array, values: Array, style: Mapping[str, object]) -> None:
-        style = {**style, "label": shortened(label)}
+    def _draw_each(self, label: str, x: NDArray, values: NDArray, style: Mapping[str, object]) -> None:
+        """Points or lines of each column in its panel."""
+        style = {**style, "label": shared.shortened(label)}
         self.lines_[label] = [one.plot(x, column, **style)[0] for one, column in zip(self.axes_, values.T, strict=True)]
 
-    def _draw_in_time(self, names: Sequence[str], kind: str) -> None:
-        for number, (label, table) in enumerate(self._tables.items()):
-            x, values = in_time(table)
+    def _with_unit(self, quantity: str) -> str:
+        """Label of an axis."""
+        return shared.plain(f"{quantity} ({self.unit})" if self.unit else quantity)
+
+    def _draw_in_time(self, kind: str, names: Sequence[str]) -> None:
+        tables = {self.label: self.measured, **(self.predicted or {})}
+        for number, (label, table) in enumerate(tables.items()):
+            x, values = shared.in_time(table)
             if kind == "points" or (kind == "time" and number == 0):
-                self._draw_lines(label, x, values, marker_style(number, len(x)))
+                self._draw_each(label, x, values, shared.marker_style(number, len(x)))
             else:
-                style = line_style(number, number - (kind == "time"), len(x))
-                self._draw_lines(label, *with_breaks(x, values), style)
-        ends: list[Array] = []
+                style = {"linestyle": LINES[(number - (kind == "time")) % len(LINES)], "linewidth": 1.0}
+                style |= {"color": COLOURS[number % len(COLOURS)], "rasterized": len(x) > DENSE}
+                self._draw_each(label, *with_breaks(x, values), style)
+        ends: list[NDArray] = []
         if self.lowest is not None and self.highest is not None:
-            x = with_breaks(*in_time(self.lowest))[0]
-            ends = [with_breaks(*in_time(table))[1] for table in (self.lowest, self.highest)]
-            is_known = np.isfinite(ends).all(axis=0)
+            x = with_breaks(*shared.in_time(self.lowest))[0]
+            ends = [with_breaks(*shared.in_time(table))[1] for table in (self.lowest, self.highest)]
             style = {"color": ORANGE if self.predicted else BLUE, "alpha": 0.25, "linewidth": 0, "zorder": 1}
-            style |= {"label": shortened(self.interval_label), "rasterized": len(x) > DENSE}
-            for column, one in enumerate(self.axes_):
-                both = [end[:, column] for end in ends]
-                self.bands_.append(one.fill_between(x, *both, where=is_known[:, column], **style))
+            style |= {"label": shared.shortened(self.interval_label), "rasterized": len(x) > DENSE}
+            for one, low, high in zip(self.axes_, *(end.T for end in ends), strict=True):
+                self.bands_.append(one.fill_between(x, low, high, where=np.isfinite(low + high), **style))
         for column, (one, name) in enumerate(zip(self.axes_, names, strict=True)):
-            one.set_ylabel(with_unit(f"{name}\n{self.quantity}" if self.quantity else name, self.unit))
-            hold_outliers(one, also=[end[:, column] for end in ends])
+            one.set_ylabel(self._with_unit(f"{name}\n{self.quantity}" if self.quantity else name))
+            shared.hold_outliers(one, also=[end[:, column] for end in ends])
 
-    def _draw_over_temperature(self, names: Sequence[str], n_columns: int) -> None:
-        for number, (label, table) in enumerate(self._tables.items()):
-            style = marker_style(number, len(table)) | {"alpha": 0.7 if number else 1.0}
-            self._draw_lines(label, self.temperature.to_numpy(), table.to_numpy(), style)
-        sensor = "temperature" if self.temperature.name is None else label_of(self.temperature.name)
-        for number, (one, name) in enumerate(zip(self.axes_, names, strict=True)):
-            one.set(title=name, xlabel=with_unit(sensor, "°C"))
-            hold_outliers(one, direction="x")
-            hold_outliers(one)
+    def _draw_over_temperature(self, n_columns: int) -> None:
+        for number, (label, table) in enumerate([(self.label, self.measured), *(self.predicted or {}).items()]):
+            style = shared.marker_style(number, len(table)) | {"alpha": 0.7 if number else 1.0}
+            self._draw_each(label, self.temperature.to_numpy(), table.to_numpy(), style)
+        for number, one in enumerate(self.axes_):
+            one.set_xlabel(f"{shared.label_of(self.temperature.name)} (°C)")
             if number % n_columns == 0:
-                one.set_ylabel(with_unit(self.quantity or "frequency", self.unit))
+                one.set_ylabel(self._with_unit(self.quantity or "frequency"))
 
-    def _draw_scatter(self, names: Sequence[str]) -> None:
+    def _draw_scatter(self) -> None:
         label, predicted = next(iter((self.predicted or {}).items()))
-        points = marker_style(0, len(self.measured)) | {"color": BLUE}
-        self.lines_[label] = []
-        for column, (one, name) in enumerate(zip(self.axes_, names, strict=True)):
-            pair = self.measured.iloc[:, column].to_numpy(), predicted.iloc[:, column].to_numpy()
-            self.lines_[label] += one.plot(*pair, **points)
-            known = np.isfinite(pair).all(axis=0)
-            if known.any():
-                one.axline((np.mean(pair[0][known]),) * 2, slope=1, color=BLACK, linewidth=0.8, linestyle="--")
-            one.set(title=name, xlabel=with_unit(self.label, self.unit), ylabel=with_unit(label, self.unit))
-            for direction in "xy":
-                hold_outliers(one, direction=direction)
+        style = shared.marker_style(0, len(self.measured))
+        pairs = list(zip(self.measured.to_numpy().T, predicted.to_numpy().T, strict=True))
+        self.lines_[label] = [one.plot(*pair, **style)[0] for one, pair in zip(self.axes_, pairs, strict=True)]
+        for one, pair in zip(self.axes_, pairs, strict=True):
+            known = pair[0][np.isfinite(pair).all(axis=0)]
+            if known.size:
+                one.axline((known.mean(),) * 2, slope=1, color=BLACK, linewidth=0.8, linestyle="--")
+            one.set(xlabel=self._with_unit(self.label), ylabel=self._with_unit(label))
 
 
-def one_temperature(temperature: ArrayLike, measured: ArrayLike) -> pd.Series:
-    """One sensor's temperatures on the rows of what is measured, without a name where they have none."""
-    check_same_rows(temperature, measured, ("temperature", "measured"))
-    table = as_table(temperature, "temperature", "T")
-    if table.shape[1] != 1:
-        raise ValueError(f"temperature has {table.shape[1]} columns; expected one sensor")
-    is_named = getattr(temperature, "name", None) is not None or isinstance(temperature, pd.DataFrame)
-    return table.iloc[:, 0].rename(table.columns[0] if is_named else None)
-
-
-def with_unit(quantity: str, unit: str) -> str:
-    """Label of an axis."""
-    return plain(f"{quantity} ({unit})" if unit else quantity)
-
-
-def draw_marks(axes: np.ndarray, marks: Mapping[str, object] | None, index: pd.Index) -> None:
-    """Vertical lines in all panels, with their labels above the first."""
-    for text, place in (marks or {}).items():
-        for ax in axes:
-            ax.axvline(on_axis(place, index), color=GREY, linestyle="--", linewidth=1)
-        above = axes[0].get_xaxis_transform()
-        axes[0].text(on_axis(place, index), 1.03, f" {plain(text)}", transform=above, fontsize="small")
-
-
-def check_like(first: ArrayLike, other: ArrayLike, names: tuple[str, str]) -> None:
-    """Raise an error if two tables differ in shape or index."""
-    check_same_rows(first, other, names)
-    if np.shape(as_columns(first)) != np.shape(as_columns(other)):
-        raise ValueError(
-            f"{names[0]} has {as_columns(first).shape[1]} columns and {names[1]} {as_columns(other).shape[1]}; "
-            "expected the same"
-        )
+def with_breaks(x: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """The same with NaN in gaps of more than ten usual steps of time, so that a line breaks there."""
+    if not np.issubdtype(x.dtype, np.datetime64) or len(x) < 3:
+        return x, values
+    steps = np.diff(x)
+    usual = np.median(steps)
+    before = np.flatnonzero(steps > 10 * usual)
+    return np.insert(x, before + 1, x[before] + usual), np.insert(values, before + 1, np.nan, axis=0)

@@ -1,11 +1,10 @@
-"""Structures with a value for each member, or in their modes, seen in a plane or in space."""
+"""Structures with a value for each member, or in their modes, seen in a plane or from a side."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,35 +12,23 @@ from numpy.typing import ArrayLike
 from skthermo._core.arrays import Array, Label, real_array
 from skthermo._core.estimators import last_step
 from skthermo.fem import FEModel, Structure
-from skthermo.plotting._display import (
-    BLACK,
-    COLOURS,
-    GREY,
-    LIGHT,
-    ORANGE,
-    Display,
-    drawing,
-    legend_columns,
-    panels,
-    plain,
-    pyplot,
-    shortened,
-)
+from skthermo.plotting import _display as shared
+from skthermo.plotting._display import BLACK, COLOURS, GREY, LIGHT, ORANGE, Display
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import Collection
-    from matplotlib.colorbar import Colorbar
-    from matplotlib.lines import Line2D
+
+Places = Mapping[Hashable, Array]
 
 
 @dataclass(eq=False, repr=False)
 class StructureDisplay(Display):
     """Members of a structure, coloured by value or by group, or moved by its modes, and its supports.
 
-    A structure whose nodes and motions lie in one plane is drawn in that plane, any other in space. A triangle marks a
-    node that is held in a direction in which others move: filled where it is held in every such direction.
+    A structure whose nodes and motions lie in one plane is drawn in that plane, any other as it is seen from a side and
+    from above. A triangle marks a node that is held in a direction in which others move: filled where it is held in
+    every such direction.
 
     Springs to the ground and point masses are drawn as diamonds, where they have a value or are in one of the groups.
 
@@ -79,7 +66,7 @@ class StructureDisplay(Display):
     >>> from skthermo.plotting import StructureDisplay
     >>> errors = {"arch": 0.2, "girders": 0.5, "braces": 1.4}
     >>> display = StructureDisplay.from_structure(kw51_structure(), errors, label="error (%)")
-    >>> display.colorbar_.ax.get_ylabel(), display.members_["lines"].get_clim()
+    >>> display.colorbar_.ax.get_xlabel(), display.members_["lines"].get_clim()
     ('error (%)', (0.2, 1.4))
     >>> plt.close(display.figure_)
     >>> display = StructureDisplay.from_structure(kw51_structure(), modes=[0])
@@ -139,7 +126,10 @@ class StructureDisplay(Display):
             If a group, member or mode is unknown, two groups give a member different values, or the number of values is
             not that of the members; if the model has no mode shapes of the structure's degrees of freedom.
         """
-        check_structure(structure, groups)
+        if not isinstance(structure, Structure):
+            raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
+        if unknown := [group for group in groups or () if group not in structure.groups]:
+            raise ValueError(f"unknown group {unknown[0]!r}; expected some of {sorted(structure.groups)}")
         if values is not None and not (groups is None and model is None and modes is None):
             raise ValueError("values are given beside groups or modes; expected one of them")
         if model is not None or modes is not None:
@@ -205,14 +195,14 @@ class StructureDisplay(Display):
         linewidth: float | Mapping[str, float] | None = None,
         amplitude: float = 0.06,
         n_columns: int = 2,
+        view: tuple[float, float] | None = None,
     ) -> StructureDisplay:
         """Draw into axes.
 
         Parameters
         ----------
         ax : matplotlib's Axes or array of Axes, optional
-            One for each mode; three-dimensional for a structure in space, and where a plane one should be drawn there.
-            A new figure by default.
+            One for each mode. A new figure by default.
         cmap : str, default="viridis"
             Colour map of the values.
         limits : tuple of float, optional
@@ -223,133 +213,125 @@ class StructureDisplay(Display):
             Largest displacement of a mode, as a share of the structure's extent.
         n_columns : int, default=2
             Panels of modes beside each other in a new figure.
+        view : tuple of float, optional
+            Elevation and azimuth in degrees from which a structure in space is seen, as matplotlib counts them. By
+            default (22, -60), or along the normal of the plane that its nodes and motions lie in.
 
         Returns
         -------
         StructureDisplay
             Itself.
+
+        Raises
+        ------
+        ValueError
+            If the axes are not plane ones.
         """
-        if self.shapes is not None:
-            return self._draw_modes(ax, amplitude, 1.5 if linewidth is None else linewidth, n_columns)
-        is_own_figure = ax is None
-        linewidth = 2.5 if linewidth is None else linewidth
-        view = Projection.facing(self.structure, ax)
-        nodes = np.array(list(view.nodes.values()))
-        self.axes_ = structure_axes(ax, view, ["one display"], nodes, width=9.0, n_columns=1)
-        self.members_: dict[str, Collection] = {}
-        if self.values is not None:
-            width = 2.5 if isinstance(linewidth, Mapping) else float(linewidth)
-            self._draw_values(view, self.values, cmap, limits, width)
-        else:
-            self._draw_groups(view, linewidth)
-        supports = draw_supports(self.ax_, view)
-        if is_own_figure and view.is_space:
-            room = {"left": 0.03, "right": 0.97 if self.values is None else 0.87, "top": 0.97}
-            self.ax_.get_gridspec().update(bottom=0.9 / self.figure_.get_figheight(), **room)
-        set_view(self.ax_, nodes, is_own_figure)
-        is_low = is_own_figure and not view.is_space and height_of(nodes) < 0.4  # no room beside it
-        is_beside = is_own_figure and view.is_space
-        self.colorbar_ = None if self.values is None else self._draw_colorbar(is_low, is_beside)
-        self._draw_legend(view, supports, is_own_figure)
-        return self
-
-    def _draw_modes(self, ax: Axes | np.ndarray | None, amplitude: float, width: object, n_columns: int) -> Self:
-        """A panel for each mode: moved members over those at rest."""
-        view = Projection.facing(self.structure, ax)
-        rest, moved = view.nodes, [moved_nodes(view, shape, amplitude) for shape in self.shapes.T]
-        points = np.array([place for places in (rest, *moved) for place in places.values()])
-        self.axes_ = structure_axes(ax, view, self.titles, points, width=5.0, n_columns=n_columns)
-        self.members_: dict[object, Collection] = {}
+        axes = axes_of_view(self.structure, view)
+        rest = {node: place @ axes for node, place in self.structure.nodes.items()}
+        shapes = () if self.shapes is None else self.shapes.T
+        moved = [moved_nodes(self.structure, shape, amplitude, axes) for shape in shapes]
+        width, height = np.ptp([place for places in (rest, *moved) for place in places.values()], axis=0)
+        ratio = float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
+        width = (5.0 if moved else 9.0) / max(ratio, 1.0)  # tall structures are as high as others are wide
+        is_low = ax is None and ratio < 0.4  # a colour bar has no room beside it
+        size = width, width * ratio + (1.1 if is_low and self.values is not None else 0.6)
+        self.axes_ = shared.panels(ax, self.titles if moved else ["one display"], size, n_columns)
+        if any(hasattr(one, "get_zlim") for one in self.axes_):
+            raise ValueError("ax is three-dimensional; expected plane axes, and view to look from another side")
+        self.members_: dict[Any, Collection] = {}
         self.colorbar_ = None
-        all_groups = self.structure.groups
-        drawn = self.structure.members if self.groups is None else set().union(*(all_groups[g] for g in self.groups))
-        _, lines, surfaces = sort_members(self.structure, [name for name in self.structure.members if name in drawn])
-        for mode, (one, places, title) in enumerate(zip(self.axes_, moved, self.titles, strict=True)):
-            for nodes, colour in ((rest, LIGHT), (places, ORANGE)) if surfaces else ():
-                add_members(one, self.structure, nodes, "surfaces", surfaces, facecolors=colour, alpha=0.3)
-            if lines:
-                add_members(one, self.structure, rest, "lines", lines, colors=LIGHT, linewidths=0.8, zorder=1)
-                style = {"colors": ORANGE, "linewidths": width, "zorder": 2}
-                self.members_[mode] = add_members(one, self.structure, places, "lines", lines, **style)
-            draw_supports(one, view, size=7)
-            place = one.get_position(original=True)
-            set_view(one, points, is_own=ax is None)
-            one.set_title(title, fontsize="medium")
-            if ax is None and view.is_space:  # the enlarged axes would move the title away from the panel
-                enlarged = one.get_position(original=True)
-                one.set_title(title, fontsize="medium", y=1.0)
-                one.title.set_y((place.y1 - enlarged.y0) / enlarged.height)
+        if moved:
+            self._draw_modes(rest, moved, 1.5 if linewidth is None else linewidth)
+        elif self.values is not None:
+            self._draw_values(rest, cmap, limits, 2.5 if linewidth is None else linewidth)
+            shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
+            place = {"location": "top", "shrink": 0.5, "aspect": 40} if is_low else {"shrink": 0.8, "pad": 0.02}
+            self.colorbar_ = self.figure_.colorbar(shown, ax=self.ax_, label=shared.plain(self.label or ""), **place)
+        else:
+            self._draw_groups(rest, linewidth if isinstance(linewidth, Mapping) else {}, linewidth)
+        for one in self.axes_:
+            draw_supports(one, self.structure, rest, axes, size=7.0 if moved else 11.0)
+            one.set_axis_off()
+            one.set_aspect("equal")
+            one.autoscale_view()
+        if not moved:
+            shared.legend(self.axes_, ax is None, n_columns=5, side="lower")
         return self
 
-    def _draw_values(
-        self, view: Projection, values: Array, cmap: str, limits: tuple[float, float] | None, width: float
-    ) -> None:
+    def _draw_modes(self, rest: Places, moved: Sequence[Places], width: Any) -> None:
+        """A panel for each mode: moved members over those at rest."""
+        members, groups = self.structure.members, self.structure.groups
+        drawn = members if self.groups is None else set().union(*(groups[name] for name in self.groups))
+        by_kind = by_number_of_nodes(self.structure, [name for name in members if name in drawn])
+        for mode, (one, places, title) in enumerate(zip(self.axes_, moved, self.titles, strict=True)):
+            for kind in [kind for kind in by_kind if kind != "points"]:
+                self._add(one, rest, kind, by_kind[kind], LIGHT, width=0.8)
+                self.members_[mode] = self._add(one, places, kind, by_kind[kind], ORANGE, width=width)
+            one.set_title(title, fontsize="medium")
+
+    def _draw_values(self, rest: Places, cmap: str, limits: tuple[float, float] | None, width: Any) -> None:
         """Members in the colours of their values; those without are grey and thin, and surfaces among them left out."""
-        known = values[np.isfinite(values)]
-        low, high = limits or ((known.min(), known.max()) if known.size else (0.0, 1.0))
-        colours = pyplot().get_cmap(cmap).with_extremes(bad=LIGHT)
-        nodes = view.nodes
-        of_member = dict(zip(self.structure.members, values, strict=True))
-        points, lines, surfaces = sort_members(
-            self.structure, sorted(of_member, key=lambda m: np.nan_to_num(of_member[m], nan=-np.inf))
-        )
-        surfaces = [name for name in surfaces if np.isfinite(of_member[name])] or surfaces
-        for kind, names in (("surfaces", surfaces), ("lines", lines)):
-            if names:
-                shown = np.ma.masked_invalid([of_member[name] for name in names])
-                widths = np.where(np.ma.getmaskarray(shown), 0.8, width)
-                style = {"alpha": 0.7} if kind == "surfaces" else {"linewidths": widths}
-                drawn = add_members(self.ax_, self.structure, nodes, kind, names, cmap=colours, **style)
-                drawn.set_array(shown)
-                drawn.set_clim(low, high)
-                self.members_[kind] = drawn
-        points = [name for name in points if np.isfinite(of_member[name])]
-        if points:
-            style = {"c": [of_member[name] for name in points], "cmap": colours, "vmin": low, "vmax": high, "zorder": 4}
-            self.members_["points"] = add_members(self.ax_, self.structure, nodes, "points", points, **style)
+        value = dict(zip(self.structure.members, self.values, strict=True))
+        known = [one for one in self.values if np.isfinite(one)]
+        colours = shared.drawing("matplotlib.pyplot").get_cmap(cmap).with_extremes(bad=LIGHT)
+        highest_on_top = sorted(value, key=lambda name: np.nan_to_num(value[name], nan=-np.inf))
+        for kind, names in by_number_of_nodes(self.structure, highest_on_top).items():
+            valued = [name for name in names if np.isfinite(value[name])]
+            shown = {"lines": names, "surfaces": valued or names, "points": valued}[kind]
+            if shown:
+                array = np.ma.masked_invalid([value[name] for name in shown])
+                widths = np.where(np.ma.getmaskarray(array), 0.8, 2.5 if isinstance(width, Mapping) else width)
+                self.members_[kind] = self._add(self.ax_, rest, kind, shown, None, width=widths, alpha=0.7)
+                clim = limits or ((min(known), max(known)) if known else (0.0, 1.0))
+                self.members_[kind].set(array=array, cmap=colours, clim=clim)
 
-    def _draw_colorbar(self, is_low: bool, is_beside: bool) -> Colorbar:
-        """Colour bar; in a new figure above a low structure, or beside the cell that one in space fills."""
-        shown = next(self.members_[kind] for kind in ("lines", "surfaces", "points") if kind in self.members_)
-        place = {"ax": self.ax_, "shrink": 0.8, "pad": 0.02}
-        if is_low:
-            self.figure_.set_figheight(self.figure_.get_figheight() + 0.5)
-            place = {"ax": self.ax_, "location": "top", "shrink": 0.5, "aspect": 40, "pad": 0.05}
-        if is_beside:
-            place = {"cax": self.figure_.add_axes((0.91, 0.25, 0.015, 0.6))}
-        return self.figure_.colorbar(shown, label=plain(self.label or ""), **place)
+    def _draw_groups(self, rest: Places, widths: Mapping[str, float], width: Any) -> None:
+        """Members of each group in its colour, in the order of the groups, over all others."""
+        names = self.groups or ()
+        others = set(self.structure.members).difference(*(self.structure.groups[name] for name in names))
+        parts = [("other members", others, LIGHT if names else GREY)]
+        parts += [(name, self.structure.groups[name], COLOURS[n % len(COLOURS)]) for n, name in enumerate(names)]
+        for name, members, colour in parts:
+            own = widths.get(name, 2.5 if width is None or width is widths else width)
+            for kind, some in by_number_of_nodes(self.structure, members).items():
+                if kind != "points" or name in names:
+                    label = shared.shortened(name) if names else None
+                    self.members_[name] = self._add(self.ax_, rest, kind, some, colour, width=own, label=label)
 
-    def _draw_groups(self, view: Projection, linewidth: float | Mapping[str, float]) -> None:
-        groups, nodes = self.structure.groups, view.nodes
-        widths = linewidth if isinstance(linewidth, Mapping) else {}
-        width = 2.5 if isinstance(linewidth, Mapping) else float(linewidth)
-        coloured = dict(zip(self.groups or (), itertools.cycle(COLOURS), strict=False))
-        rest = set(self.structure.members).difference(*(groups[group] for group in coloured))
-        parts: dict[str, tuple[Iterable[Hashable], str]] = {"other members": (rest, GREY if not coloured else LIGHT)}
-        parts |= {group: (groups[group], colour) for group, colour in coloured.items()}
-        for name, (members, colour) in parts.items():
-            points, lines, surfaces = sort_members(self.structure, members)
-            drawn = {
-                "points": (points if name in coloured else [], {"c": colour, "zorder": 4}),
-                "surfaces": (surfaces, {"facecolors": colour, "alpha": 0.35}),
-                "lines": (lines, {"colors": colour, "linewidths": widths.get(name, width)}),
-            }
-            for kind, (some, style) in drawn.items():
-                if some:
-                    added = add_members(self.ax_, self.structure, nodes, kind, some, label=name, **style)
-                    self.members_[name] = added
-
-    def _draw_legend(self, view: Projection, supports: Mapping[str, Artist], is_own_figure: bool) -> None:
-        handles = [*(self.members_.values() if self.groups else ()), *supports.values()]
-        if not handles:
-            return
-        labels = [shortened(handle.get_label()) for handle in handles]
-        style = {"ncols": legend_columns(labels, self.figure_, 5), "frameon": False, "fontsize": "small"}
-        if not is_own_figure:
-            self.ax_.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, 0.0), **style)
+    def _add(
+        self,
+        ax: Axes,
+        nodes: Places,
+        kind: str,
+        names: Iterable[Hashable],
+        colour: str | None,
+        *,
+        width: Any,
+        alpha: float = 0.3,
+        label: str | None = None,
+    ) -> Collection:
+        """Add diamonds, lines or surfaces for members with nodes at some places."""
+        places = [np.array([nodes[node] for node in self.structure.members[name].nodes]) for name in names]
+        if kind == "points":
+            style = {"s": 36, "marker": "D", "edgecolors": BLACK, "linewidths": 0.5, "zorder": 4, "label": label}
+            return ax.scatter(*np.vstack(places).T, c=colour, **style)
+        collections = shared.drawing("matplotlib.collections")
+        if kind == "lines":
+            added = collections.LineCollection(places, colors=colour, linewidths=width, capstyle="round", label=label)
         else:
-            place = "lower center" if view.is_space else "outside lower center"
-            self.figure_.legend(handles, labels, loc=place, **style)
+            style = {"facecolors": colour, "edgecolors": "none", "alpha": alpha, "label": label}
+            added = collections.PolyCollection(places, **style)
+        return ax.add_collection(added)
+
+
+def by_number_of_nodes(structure: Structure, names: Iterable[Hashable]) -> dict[str, list[Hashable]]:
+    """Names of members that are surfaces, lines and points; kinds without a member are left out."""
+    found: dict[str, list[Hashable]] = {"surfaces": [], "lines": [], "points": []}
+    for name in names:
+        n_nodes = len(structure.members[name].nodes)
+        found["points" if n_nodes == 1 else "lines" if n_nodes == 2 else "surfaces"].append(name)
+    return {kind: some for kind, some in found.items() if some}
 
 
 def shapes_of(structure: Structure, model: FEModel | None, modes: Sequence[int] | None) -> tuple[Array, list[str]]:
@@ -374,230 +356,71 @@ def shapes_of(structure: Structure, model: FEModel | None, modes: Sequence[int] 
     return shapes[0][:, chosen], titles
 
 
-def moved_nodes(view: Projection, shape: Array, amplitude: float) -> dict[Hashable, Array]:
-    """Places of the nodes in a mode, whose largest displacement is a share of the structure's extent."""
-    nodes, axes = view.nodes, view.directions
-    moves = {node: np.zeros(len(axes)) for node in nodes}
-    for (node, direction), value in zip(dofs_of(view.structure), shape, strict=True):
-        if direction in list(axes) and node in moves:
-            moves[node][axes.index(direction)] = value
-    largest = max(np.linalg.norm(move) for move in moves.values())
-    places = np.array(list(nodes.values()))
-    scale = amplitude * np.linalg.norm(np.ptp(places, axis=0)) / (largest or 1.0)
-    return {node: nodes[node] + scale * move for node, move in moves.items()}
+def moved_nodes(structure: Structure, shape: Array, amplitude: float, axes: Array) -> dict[Hashable, Array]:
+    """Places of the nodes in a mode as they are seen; the largest displacement is a share of the structure's extent."""
+    moves = {node: np.zeros(structure.dimension) for node in structure.nodes}
+    for (node, direction), value in zip(dofs_of(structure), shape, strict=True):
+        if direction in "xyz"[: structure.dimension] and node in moves:
+            moves[node]["xyz".index(direction)] = value
+    extent = np.linalg.norm(np.ptp(list(structure.nodes.values()), axis=0))
+    scale = amplitude * extent / (max(np.linalg.norm(move) for move in moves.values()) or 1.0)
+    return {node: (place + scale * moves[node]) @ axes for node, place in structure.nodes.items()}
 
 
 def values_by_member(structure: Structure, values: Mapping[Hashable, float] | ArrayLike) -> Array:
-    """Value of each member, NaN where there is none."""
-    members, groups = list(structure.members), structure.groups
-    if hasattr(values, "to_dict"):
-        values = values.to_dict()
+    """Value of each member, NaN where there is none; its own comes before that of its group."""
+    members, groups = structure.members, structure.groups
+    values = values.to_dict() if hasattr(values, "to_dict") else values
     if not isinstance(values, Mapping):
         array = real_array(values, "values")
         if array.shape != (len(members),):
             raise ValueError(f"values has shape {array.shape}; expected ({len(members)},), one for each member")
         return array
+    own = {key: value for key, value in values.items() if key not in groups}
+    if unknown := [key for key in own if key not in members]:
+        raise ValueError(f"values names {unknown[0]!r}; expected members, or groups among {sorted(groups)}")
     found: dict[Hashable, float] = {}
-    own = [key for key in values if key not in groups]
-    for key in [key for key in values if key in groups]:
-        for member in groups[key].difference(own):
-            if found.setdefault(member, float(values[key])) != float(values[key]):
+    for group in [key for key in values if key in groups]:
+        for member in groups[group].difference(own):
+            if found.setdefault(member, values[group]) != values[group]:
                 raise ValueError(f"member {member!r} is in several groups with different values; expected one value")
-    for key in own:
-        if key not in structure.members:
-            raise ValueError(f"values names {key!r}; expected members, or groups among {sorted(groups)}")
-        found[key] = float(values[key])
-    return np.array([found.get(member, np.nan) for member in members])
+    return np.array([float((found | own).get(member, np.nan)) for member in members])
 
 
-ELEVATION, AZIMUTH = 22, -60
-
-
-@dataclass(frozen=True)
-class Projection:
-    """A structure seen along the normal of its plane, or in space."""
-
-    structure: Structure
-    directions: str
-    """Those of the horizontal and the vertical axis, such as "xz", or "xyz"."""
-
-    @classmethod
-    def facing(cls, structure: Structure, ax: Axes | np.ndarray | None = None) -> Projection:
-        """In the plane that nodes and motions lie in, if there is one; in space if such axes are given."""
-        if structure.dimension == 2:
-            return cls(structure, "xy")
-        if not any(hasattr(one, "get_zlim") for one in np.ravel(np.asarray(ax, dtype=object))):
-            moving = {direction for _, direction in dofs_of(structure)}
-            extent = np.ptp(list(structure.nodes.values()), axis=0)
-            for normal in "yzx":  # a structure along one line is drawn with z upwards, if it moves there
-                plane = "xyz".replace(normal, "")
-                if extent["xyz".index(normal)] == 0 and moving <= {*plane, f"r{normal}"}:
-                    return cls(structure, plane)
-        return cls(structure, "xyz")
-
-    @property
-    def is_space(self) -> bool:
-        return len(self.directions) == 3
-
-    @property
-    def nodes(self) -> dict[Hashable, Array]:
-        """Coordinates of every node along the directions."""
-        columns = ["xyz".index(direction) for direction in self.directions]
-        return {node: place[columns] for node, place in self.structure.nodes.items()}
-
-    @property
-    def supports(self) -> dict[Hashable, bool]:
-        """Nodes that are held in a direction in which others move, and whether in every such direction."""
-        moving = ({direction for _, direction in dofs_of(self.structure)} or set("xyz")).intersection(self.directions)
-        held = {node: moving.intersection(along) for node, along in self.structure.supports.items()}
-        return {node: fixed == moving for node, fixed in held.items() if fixed}
+def axes_of_view(structure: Structure, view: tuple[float, float] | None) -> Array:
+    """Horizontal and vertical direction of what is seen, as columns: the plane's, or those of a view from a side."""
+    unit, (elevation, azimuth) = np.eye(structure.dimension), np.radians((22, -60) if view is None else view)
+    if structure.dimension == 2:
+        return unit
+    moving = {direction for _, direction in dofs_of(structure)}
+    extent = np.ptp(list(structure.nodes.values()), axis=0)
+    for normal in (
+        "yzx" if view is None else ""
+    ):  # a structure along one line is drawn with z upwards, if it moves there
+        plane = "xyz".replace(normal, "")
+        if extent["xyz".index(normal)] == 0 and moving <= {*plane, f"r{normal}"}:
+            return unit[:, ["xyz".index(direction) for direction in plane]]
+    across = [-np.sin(azimuth), np.cos(azimuth), 0.0]
+    back = np.sin(elevation) * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    return np.column_stack([across, np.cos(elevation) * unit[2] - back])
 
 
 def dofs_of(structure: Structure) -> list[Label]:
     """Nodes and directions of the degrees of freedom, with directions called "x" to "rz" where they are known."""
-    names = ("x", "y", "z", "rx", "ry", "rz")
-    others: dict[object, str] = dict(enumerate(names, start=1))  # by which other programs call them
-    for name in names:
-        rotated, axis = len(name) == 2, name[-1].upper()
-        others |= {f"{'ROT' if rotated else 'U'}{axis}": name, f"{'DR' if rotated else 'D'}{axis}": name}
-    return [(node, others.get(direction, direction)) for node, direction in structure.dofs]
+    known: dict[object, str] = {}  # by which other programs call them
+    for number, name in enumerate(("x", "y", "z", "rx", "ry", "rz"), start=1):
+        known |= {number: name, f"{'ROT' if len(name) == 2 else 'U'}{name[-1].upper()}": name, f"D{name.upper()}": name}
+    return [(node, known.get(direction, direction)) for node, direction in structure.dofs]
 
 
-def check_structure(structure: object, groups: Iterable[str] | None) -> None:
-    """Raise an error for what is not a structure, or for groups that it does not have."""
-    if not isinstance(structure, Structure):
-        raise ValueError(f"structure is a {type(structure).__name__}; expected a skthermo.fem.Structure")
-    for group in groups or ():
-        if group not in structure.groups:
-            raise ValueError(f"unknown group {group!r}; expected some of {sorted(structure.groups)}")
-
-
-def structure_axes(
-    ax: Axes | np.ndarray | None, view: Projection, names: Sequence[object], points: Array, width: float, n_columns: int
-) -> np.ndarray:
-    """Axes of a plane or of space for each name: those that are given, or those of a new figure."""
-    ratio = height_of(points)
-    width /= max(ratio, 1.0)  # tall structures are as high as others are wide
-    height = width * ratio + 0.6
-    if ax is not None or not view.is_space:
-        axes = panels(ax, names, (width, height), n_columns)
-        if view.is_space and not all(hasattr(one, "get_zlim") for one in axes):
-            raise ValueError("ax is two-dimensional; expected axes of projection='3d' for a structure in space")
-        return axes
-    n_columns = min(n_columns, len(names))
-    n_rows = -(-len(names) // n_columns)
-    figure = pyplot().figure(figsize=(width * n_columns, height * n_rows))
-    title = 0.4 / height
-    room = {"left": 0.02, "right": 0.98, "bottom": 0.02, "top": 1 - title / n_rows, "wspace": 0.04, "hspace": title}
-    flat = {"projection": "3d", "proj_type": "ortho", "computed_zorder": False}  # without perspective
-    axes = figure.subplots(n_rows, n_columns, squeeze=False, subplot_kw=flat, gridspec_kw=room).ravel()
-    for unused in axes[len(names) :]:
-        unused.remove()
-    return axes[: len(names)]
-
-
-def height_of(points: Array) -> float:
-    """Height of what is seen of points as a share of its width, kept within reason for a figure."""
-    if points.shape[1] == 3:
-        azimuth, elevation = np.radians([AZIMUTH, ELEVATION])
-        across = points[:, 1] * np.cos(azimuth) - points[:, 0] * np.sin(azimuth)
-        away = points[:, 0] * np.cos(azimuth) + points[:, 1] * np.sin(azimuth)
-        points = np.column_stack([across, points[:, 2] * np.cos(elevation) - away * np.sin(elevation)])
-    width, height = np.ptp(points, axis=0)
-    return float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
-
-
-def set_view(ax: Axes, points: Array, is_own: bool) -> None:
-    """Equal scales around the points; in space, new axes are enlarged until the points fill their place."""
-    ax.set_axis_off()
-    if points.shape[1] == 2:
-        ax.set_aspect("equal")
-        low, high = points.min(axis=0), points.max(axis=0)
-        margin = 0.03 * (high - low).max()
-        ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
-        return
-    low, high = points.min(axis=0), points.max(axis=0)
-    extent = np.maximum(high - low, 0.01 * (high - low).max())
-    middle = (low + high) / 2
-    limits = np.column_stack([middle - extent / 2, middle + extent / 2])
-    ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
-    ax.set_box_aspect(extent)
-    ax.patch.set_visible(False)
-    if is_own:
-        ax.view_init(elev=ELEVATION, azim=AZIMUTH)
-        fill_place(ax, points)
-
-
-def fill_place(ax: Axes, points: Array) -> None:
-    """Enlarge axes so that the projected points fill the place in the figure that these axes had."""
-    left, bottom, width, height = ax.get_position(original=True).bounds
-    size = ax.figure.get_size_inches()
-    ax.set_position((0, 0, *(1 / size)))  # one inch, from the lower left corner
-    ax.apply_aspect()
-    project = drawing("mpl_toolkits.mplot3d.proj3d").proj_transform
-    x, y, _ = project(*points.T, ax.get_proj())
-    inches = ax.transData.transform(np.column_stack([x, y])) / ax.figure.dpi
-    low, high = inches.min(axis=0), inches.max(axis=0)
-    place, room = np.array([left, bottom]) * size, np.array([width, height]) * size
-    scale = (room / np.maximum(high - low, 1e-9)).min()
-    origin = place + room / 2 - scale * (low + high) / 2
-    ax.set_position((*(origin / size), *(scale / size)))
-
-
-def sort_members(structure: Structure, names: Iterable[Hashable]) -> tuple[list[Hashable], ...]:
-    """Names of members that are points, lines and surfaces."""
-    elements = structure.members
-    points: list[Hashable] = []
-    lines: list[Hashable] = []
-    surfaces: list[Hashable] = []
-    for name in names:
-        n_nodes = len(elements[name].nodes)
-        (points if n_nodes == 1 else lines if n_nodes == 2 else surfaces).append(name)
-    return points, lines, surfaces
-
-
-def add_members(
-    ax: Axes,
-    structure: Structure,
-    nodes: Mapping[Hashable, Array],
-    kind: Literal["points", "lines", "surfaces"],
-    names: Iterable[Hashable],
-    **style: object,
-) -> Collection:
-    """Add diamonds, lines or polygons for members with nodes at some places, in two or three dimensions."""
-    places = [np.array([nodes[node] for node in structure.members[name].nodes]) for name in names]
-    if kind == "points":
-        fixed = {"s": 36, "marker": "D", "edgecolors": BLACK, "linewidths": 0.5, "clip_on": False}
-        return ax.scatter(*np.vstack(places).T, **fixed, **style)
-    name, fixed = (
-        ("LineCollection", {"capstyle": "round"}) if kind == "lines" else ("PolyCollection", {"edgecolors": "none"})
-    )
-    is_space = hasattr(ax, "get_zlim")
-    if is_space:
-        factory = getattr(drawing("mpl_toolkits.mplot3d.art3d"), name.replace("Coll", "3DColl"))
-    else:
-        factory = getattr(drawing("matplotlib.collections"), name)
-    collection = factory(places, **fixed, **style)
-    (ax.add_collection3d if is_space else ax.add_collection)(collection)
-    return collection
-
-
-def draw_supports(ax: Axes, view: Projection, size: float = 11.0) -> dict[str, Line2D]:
+def draw_supports(ax: Axes, structure: Structure, nodes: Places, axes: Array, size: float) -> None:
     """Triangles below nodes that are held: filled where they are so in every direction, open where some stay free."""
-    nodes, supports, drawn = view.nodes, view.supports, {}
-    kinds = {True: ("fixed in every direction", BLACK), False: ("free in some direction", "white")}
-    for is_fixed, (label, face) in kinds.items():
-        places = [nodes[node] for node, fixed in supports.items() if fixed == is_fixed]
+    seen = {direction for direction, row in zip("xyz", axes, strict=False) if row.any()}
+    moving = ({direction for _, direction in dofs_of(structure)} or seen) & seen
+    held = {node: moving.intersection(along) for node, along in structure.supports.items()}
+    for label, face in (("fixed in every direction", BLACK), ("free in some direction", "white")):
+        places = [nodes[node] for node, fixed in held.items() if fixed and (fixed == moving) == (face == BLACK)]
+        triangle = [(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)]  # with its tip at the node
+        style = {"linestyle": "", "marker": triangle, "markersize": size, "color": BLACK, "markerfacecolor": face}
         if places:
-            drawn[label] = ax.plot(
-                *np.array(places).T,
-                linestyle="",
-                marker=[(0, 0), (-0.7, -1.2), (0.7, -1.2), (0, 0)],  # a triangle with its tip at the node
-                markersize=size,
-                color=BLACK,
-                markerfacecolor=face,
-                label=label,
-                clip_on=False,
-                zorder=3,
-            )[0]
-    return drawn
+            ax.plot(*np.array(places).T, **style, label=label, clip_on=False, zorder=3)

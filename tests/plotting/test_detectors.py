@@ -118,7 +118,7 @@ def test_scenarios_can_be_chosen_and_those_without_measured_records_are_not_draw
     [
         (BOTH.drop(columns="detector"), r"lacks the columns \['detector'\]"),
         (None, "table is None"),
-        (pd.concat([BOTH, HEALTHY]), r"detector '.*' has 2 rows of scenario 'healthy', source '.*'"),
+        (pd.concat([BOTH, HEALTHY]), r"detector 'raw, a' has several rates of scenario 'healthy'"),
     ],
 )
 def test_what_is_no_result_is_named(table, message):
