@@ -7,25 +7,18 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from skthermo._core.arrays import Array
 from skthermo._core.estimators import import_optional
 from skthermo._core.text import printable
 from skthermo._core.warnings import collected
 from skthermo.fem import Structure
-from skthermo.plotting import (
-    DamageIndexDisplay,
-    DetectorsDisplay,
-    PredictionDisplay,
-    StructureDisplay,
-)
-from skthermo.reporting._page import Html, element
+from skthermo.plotting import DamageIndexDisplay, DetectorsDisplay, PredictionDisplay, StructureDisplay
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,100 +27,89 @@ if TYPE_CHECKING:
     from skthermo.studies import IdentifiedDamage
 
 
-class Values(NamedTuple):
-    """The table behind a drawing: its index is on the horizontal axis.
+class Drawing(NamedTuple):
+    """A picture, what it shows in words, and the table behind it, as addresses of data.
 
-    ``name`` is that of the CSV file. ``is_scatter`` says that a row is a point of the first column, and not a place on
-    the horizontal axis.
+    ``x`` and ``y`` are places of the rows in thousandths of the picture's width and height, from the top left corner.
+    Without a table ``csv`` is empty, without matplotlib ``source`` is.
     """
 
-    name: str
-    table: pd.DataFrame
-    is_scatter: bool = False
+    alt: str
+    source: str = ""
+    name: str = ""
+    csv: str = ""
+    n_rows: int = 0
+    x: str = ""
+    y: str = ""
 
 
-def readable(picture: Html, values: Values, x: Array, y: Array | None = None) -> Html:
-    """A picture with its values; ``x`` and ``y`` are places of the rows as shares of its width and height, from the top
-    left corner. Rows that are out of view are in the CSV alone."""
-    places = {"x": x} if y is None else {"x": x, "y": y}
-    data = {f"data_{name}": " ".join(f"{1000 * share:.0f}" for share in shares) for name, shares in places.items()}
-    ends = {"type": "range", "min": 0, "max": max(len(values.table) - 1, 0), "value": 0}
-    slider = element("input", **ends, hidden="", aria_label=f"Values: {values.name}")
-    mark = element("span", class_="mark" if y is None else "mark point", hidden="", aria_hidden="true")
-    below = element("div", slider, element("output", aria_live="off"), csv_link(values), class_="values")
-    return element("div", element("div", picture, mark, class_="picture"), below, class_="readable", **data)
-
-
-def csv_link(values: Values, text: str = "CSV") -> Html:
-    """A link that saves the table behind a drawing."""
-    table = values.table.rename(columns=printable)
-    if isinstance(table.index, pd.DatetimeIndex):
-        times = table.index.tz_localize(None)
-        has_hours = (times != times.normalize()).any()
-        table = table.set_axis(times.strftime("%Y-%m-%d %H:%M" if has_hours else "%Y-%m-%d"))
-    elif not is_numeric_dtype(table.index):
-        table = table.set_axis([printable(name) for name in table.index])
-    content = table.to_csv(
-        float_format="%.6g", index_label=printable(values.table.index.name or "record"), lineterminator="\n"
-    )
-    address = f"data:text/csv;charset=utf-8,{quote(content, safe=',:;+/')}"
-    name = f"{values.name.replace(' ', '_')}.csv"
-    return element("a", text, href=address, download=name, aria_label=f"{text}: {values.name}")
-
-
-class HasFigure(Protocol):
-    """What is drawn has a figure."""
-
-    figure_: Figure
+def csv_address(table: pd.DataFrame) -> str:
+    """A table as CSV, within an address."""
+    index = table.index
+    if isinstance(index, pd.DatetimeIndex):
+        times = index.tz_localize(None)
+        index = times.strftime("%Y-%m-%d %H:%M" if (times != times.normalize()).any() else "%Y-%m-%d")
+    elif not is_numeric_dtype(index):
+        index = index.map(printable)
+    shown = table.rename(columns=printable).set_axis(index)
+    label = printable(table.index.name or "record")
+    content = shown.to_csv(float_format="%.6g", index_label=label, lineterminator="\n")
+    return f"data:text/csv;charset=utf-8,{quote(content, safe=',:;+/')}"
 
 
 def draw(
-    make: Callable[[], HasFigure],
+    make: Callable[..., Any],
     alt: str,
     title: str = "",
     *,
     height: float | None = 2.8,
     width: float = 4.2,
-    values: Values | None = None,
-) -> Html:
+    name: str = "",
+    table: pd.DataFrame | None = None,
+    is_scatter: bool = False,
+    legend: str | None = "outside upper center",
+) -> Drawing:
     """A display as an image of fixed width, in matplotlib's own style and on white; its values can be read.
 
     Width and height are in inches, so that a telephone shows it at nearly full size; without a height, the drawing
-    keeps its proportions. The index of the values is in the unit of the horizontal axis. Without matplotlib, what the
-    image shows is said, and its values can be saved.
+    keeps its proportions, with room for a legend. The index of the table is in the unit of the horizontal axis; in a
+    scatter plot, a row is a point of its first column. Without matplotlib, what the image shows is said, and its values
+    can be saved.
     """
+    drawn = Drawing(alt)
+    if table is not None:
+        drawn = drawn._replace(name=name, csv=csv_address(table), n_rows=len(table))
     try:
         plt = import_optional("matplotlib.pyplot", extra="plot")
     except ImportError:
-        return element("p", alt, " ", "" if values is None else csv_link(values))
+        return drawn
     others = set(plt.get_fignums())
     settings = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
     try:
         with plt.style.context("default"), plt.rc_context(settings):
             figure = make().figure_
             own_width, own_height = figure.get_size_inches()
-            figure.set_size_inches(width, own_height / own_width * width if height is None else height)
+            figure.set_size_inches(width, own_height / own_width * width + 0.5 if height is None else height)
+            _fold_legend(figure, legend)
             if title:
                 text = textwrap.shorten(printable(title), 50, placeholder=" ...")
                 figure.axes[0].set_title(text, fontsize="medium", parse_math=False)
-            source = f"data:image/svg+xml;base64,{b64encode(_svg(figure)).decode()}"
-            picture = element("img", src=source, alt=alt)
-            return picture if values is None else readable(picture, values, *_places(figure.axes[0], values))
+            drawn = drawn._replace(source=f"data:image/svg+xml;base64,{b64encode(_svg(figure)).decode()}")
+            return drawn if table is None else drawn._replace(**_places(figure.axes[0], table, is_scatter))
     finally:
         for number in set(plt.get_fignums()) - others:
             plt.close(number)
 
 
-def fold_legend(figure: Figure, place: str) -> None:
+def _fold_legend(figure: Figure, place: str | None) -> None:
     """Put the legends of a figure into one place and at most two columns, so that they fit a narrow drawing."""
-    for legend in [*figure.legends, *(ax.get_legend() for ax in figure.axes)]:
-        if legend is None:
-            continue
-        labels = [text.get_text() for text in legend.get_texts()]
-        legend.remove()
-        n_columns = 2 if max(map(len, labels)) <= 28 else 1  # letters, of which two labels fit beside each other
-        style = {"ncols": n_columns, "frameon": False, "fontsize": "medium" if n_columns == 2 else "small"}
-        figure.legend(legend.legend_handles, labels, loc=place, **style)
+    for one in [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]:
+        labels = [text.get_text() for text in one.get_texts()]
+        one.remove()
+        is_wide = max(map(len, labels)) > 28  # letters, of which two labels fit beside each other
+        style = {"ncols": 1 if is_wide else 2, "frameon": False, "fontsize": "small" if is_wide else "medium"}
+        if place is not None:
+            figure.legend(one.legend_handles, labels, loc=place, **style)
 
 
 def _svg(figure: Figure) -> bytes:
@@ -144,90 +126,57 @@ def _svg(figure: Figure) -> bytes:
     return drawn.getvalue()
 
 
-def _places(ax: Axes, values: Values) -> tuple[Array, Array | None]:
-    """Where the rows of values are drawn, as shares of the figure from its top left corner."""
-    index = values.table.index
-    if isinstance(index, pd.DatetimeIndex):
-        index = index.tz_localize(None)
-    across = index if isinstance(index, pd.DatetimeIndex) or is_numeric_dtype(index) else np.arange(len(index))
-    up = values.table.iloc[:, 0].to_numpy(dtype=float) if values.is_scatter else np.zeros(len(index))
-    pixels = ax.transData.transform(np.column_stack([ax.convert_xunits(np.asarray(across)), up]))
-    x, y = ax.figure.transFigure.inverted().transform(pixels).T
-    return x, np.clip(1 - y, 0, 1) if values.is_scatter else None
+def _places(ax: Axes, table: pd.DataFrame, is_scatter: bool) -> dict[str, str]:
+    """Where the rows of a table are drawn."""
+    index = table.index.tz_localize(None) if isinstance(table.index, pd.DatetimeIndex) else table.index
+    is_placed = isinstance(index, pd.DatetimeIndex) or is_numeric_dtype(index)
+    across = ax.convert_xunits(np.asarray(index if is_placed else range(len(index))))
+    up = table.iloc[:, 0].to_numpy(dtype=float) if is_scatter else np.zeros(len(table))
+    pixels = ax.transData.transform(np.column_stack([across, up]))
+    x, y = 1000 * ax.figure.transFigure.inverted().transform(pixels).T
+    shares = {"x": x, "y": np.clip(1000 - y, 0, 1000)} if is_scatter else {"x": x}
+    return {name: " ".join(f"{share:.0f}" for share in places) for name, places in shares.items()}
 
 
 def draw_mode(
     measured: pd.Series, alt: str, predicted: pd.Series | None = None, temperature: pd.Series | None = None
-) -> Html:
+) -> Drawing:
     """A measured frequency over time, or a measured and a predicted one over a temperature."""
     name, tables = str(measured.name), [None if one is None else one.to_frame() for one in (measured, predicted)]
     make = partial(PredictionDisplay.from_predictions, *tables, temperature=temperature)
     if predicted is None or temperature is None:
         table = measured.to_frame(f"{name} (Hz)").rename_axis(measured.index.name or "date")
-        return draw(make, alt, height=2.2, values=Values(f"frequency {name} over time", table))
+        return draw(make, alt, height=2.2, name=f"frequency {name} over time", table=table)
     both = pd.DataFrame({f"{name} measured (Hz)": measured, f"{name} predicted (Hz)": predicted})
     both = both.set_axis(pd.Index(temperature, name=f"{temperature.name} (°C)"))
-    return draw(make, alt, values=Values(f"frequency {name} over temperature", both, is_scatter=True))
+    return draw(make, alt, name=f"frequency {name} over temperature", table=both, is_scatter=True)
 
 
-def draw_damage_indices(shown: Mapping[str, pd.Series], threshold: float, onset: object, alt: str) -> Html:
+def draw_damage_indices(shown: Mapping[str, pd.Series], threshold: float, onset: object, alt: str) -> Drawing:
     """Damage index of some scenarios over time, and the threshold of the alarm."""
-
-    def make() -> DamageIndexDisplay:
-        display = DamageIndexDisplay.from_predictions(shown, threshold, onset=onset, label="damage index")
-        fold_legend(display.figure_, "outside upper center")
-        return display
-
-    table = pd.DataFrame(dict(shown)).assign(threshold=threshold)
-    values = Values(f"damage index {list(shown)[-1]}", table.rename_axis("date"))
-    return draw(make, alt, height=3.2, values=values)
+    make = partial(DamageIndexDisplay.from_predictions, shown, threshold, onset=onset, label="damage index")
+    table = pd.DataFrame(dict(shown)).assign(threshold=threshold).rename_axis("date")
+    return draw(make, alt, height=3.2, name=f"damage index {list(shown)[-1]}", table=table)
 
 
-def draw_groups(structure: Structure, groups: Sequence[str], alt: str) -> Html:
-    """Where the damage groups are."""
-    return _draw_structure(structure, alt, 5.2, groups=groups)
+def draw_structure(
+    structure: Structure, alt: str, groups: Sequence[str] | None = None, losses: Mapping[str, float] | None = None
+) -> Drawing:
+    """Where damage groups are, or the smallest loss of stiffness of each member's group that raises an alarm."""
+    values = None if losses is None else {name: 100 * loss for name, loss in losses.items()}
+    make = partial(StructureDisplay.from_structure, structure, values, groups=groups, label="smallest loss (%)")
+    return draw(make, alt, height=None, width=5.2 if losses is None else 6.2, legend="outside lower center")
 
 
-def draw_detectable(structure: Structure, losses: Mapping[str, float], alt: str) -> Html:
-    """The smallest loss of stiffness of each member's group that raises an alarm."""
-    percents = {name: 100 * loss for name, loss in losses.items()}
-    return _draw_structure(structure, alt, 6.2, values=percents, label="smallest loss (%)")
-
-
-def _draw_structure(structure: Structure, alt: str, width: float, **options: Any) -> Html:
-    def make() -> StructureDisplay:
-        display = StructureDisplay.from_structure(structure, **options)
-        fold_legend(display.figure_, "lower center" if structure.dimension == 3 else "outside lower center")
-        return display
-
-    return draw(make, alt, height=None, width=width)
-
-
-def losses_on(structure: Structure | None, losses: Mapping[str, float]) -> dict[str, float]:
-    """Losses that raise an alarm, of groups that can be drawn."""
-    groups = [] if structure is None else structure.groups
-    return {name: loss for name, loss in losses.items() if name in groups and np.isfinite(loss)}
-
-
-def draw_identified_damage(identified: IdentifiedDamage, alt: str) -> Html:
-    """Probabilities and severities, one below the other."""
+def identified_facts(identified: IdentifiedDamage) -> dict[str, Any]:
+    """What the template of the section on identified damage is given: probabilities and severities are drawn one below
+    the other."""
     height = 2.6 + 0.6 * len(identified.table)
 
     def make() -> DetectorsDisplay:
         plt = import_optional("matplotlib.pyplot", extra="plot")
         axes = plt.subplots(2, 1, figsize=(4.2, height), layout="constrained")[1]
-        display = DetectorsDisplay.from_predictions(identified.table, ax=axes)
-        fold_legend(display.figure_, "outside upper center")
-        return display
+        return DetectorsDisplay.from_predictions(identified.table, ax=axes)
 
-    return draw(make, alt, height=height)
-
-
-def identified_facts(identified: IdentifiedDamage) -> dict[str, Any]:
-    """What the template of the section is given."""
-    groups = Values("identified damage", identified.table.rename_axis("group"))
-    return {
-        "found": identified,
-        "draw": draw_identified_damage,
-        "saved": csv_link(groups, "Table of all groups (CSV)"),
-    }
+    saved = Drawing("", name="identified damage", csv=csv_address(identified.table.rename_axis("group")))
+    return {"found": identified, "draw": partial(draw, make, height=height), "saved": saved}

@@ -8,17 +8,18 @@ import re
 import traceback
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from contextlib import suppress
+from functools import lru_cache, partial
 from hashlib import sha256
-from html import escape
-from importlib import import_module
+from importlib import metadata
 from importlib.resources import files
-from importlib.util import find_spec
+from inspect import isfunction
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
+import skthermo
 from skthermo._core import text
 from skthermo._core.arrays import check_path
 from skthermo._core.estimators import import_optional
@@ -32,30 +33,8 @@ if TYPE_CHECKING:
 Row: TypeAlias = dict[str, Any]
 
 
-class Html(str):
-    """Text that is HTML already; any other text is escaped when it becomes part of an element."""
-
-    __slots__ = ()
-
-    def __html__(self) -> Html:
-        """By which templates know it."""
-        return self
-
-
-def element(tag: str, *content: object, **attributes: object) -> Html:
-    """An element with its content; an underscore at the end of an attribute's name is left out, others are hyphens."""
-    named = "".join(f' {name.rstrip("_").replace("_", "-")}="{_escaped(one)}"' for name, one in attributes.items())
-    inner = "".join(_escaped(part) for part in content)
-    return Html(f"<{tag}{named}>" if tag in ("img", "input") else f"<{tag}{named}>{inner}</{tag}>")
-
-
-def _escaped(value: object) -> str:
-    return str(value) if hasattr(value, "__html__") else escape(text.printable(value))
-
-
 STYLE, SCRIPT = (
-    Html("\n" + files("skthermo.reporting").joinpath(name).read_text(encoding="utf-8"))
-    for name in ("page.css", "page.js")
+    "\n" + files("skthermo.reporting").joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
 )
 POLICY = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
@@ -116,12 +95,9 @@ def environment_of(folder: str = "") -> Environment:
     )
     environment.globals |= {"policy": POLICY, "style": STYLE, "script": SCRIPT}
     environment.tests["finite"] = np.isfinite
-    filters = [
-        *(text.bounds_text, text.capital, text.chance_text, text.counted, text.counted_number, text.duration_text),
-        *(text.listed, text.percent, text.period_text, text.probability_text, text.share_text, text.significant),
-        *(moment, day, rows_of, sections_of),
-    ]
-    environment.filters |= {one.__name__: one for one in filters} | {"grouped": "{:,}".format}
+    environment.filters |= {name: one for name, one in vars(text).items() if isfunction(one)}
+    environment.filters |= {"moment": moment, "rows_of": rows_of, "sections_of": sections_of}
+    environment.filters |= {"grouped": "{:,}".format, "day": partial(moment, is_short=True)}
     return environment
 
 
@@ -134,10 +110,9 @@ def rows_of(table: pd.DataFrame) -> list[Row]:
     ]
 
 
-def sections_of(page: str) -> list[tuple[str, Html]]:
-    """Anchors and headings of the sections of a page."""
-    found = re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
-    return [(anchor, Html(title)) for anchor, title in found]
+def sections_of(page: str) -> list[tuple[str, str]]:
+    """Anchors and headings of the sections of a page, as HTML."""
+    return re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
 
 
 def moment(time: str | datetime | None, *, is_short: bool = False) -> str:
@@ -145,14 +120,8 @@ def moment(time: str | datetime | None, *, is_short: bool = False) -> str:
     if pd.isna(time):
         return ""
     stamp = pd.Timestamp(time)
-    month = stamp.month_name()[: 3 if is_short else None]
-    day = text.SPACE.join([str(stamp.day), month, str(stamp.year)])
+    day = f"{stamp.day} {stamp.month_name()[: 3 if is_short else None]} {stamp.year}".replace(" ", text.SPACE)
     return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"
-
-
-def day(time: str | datetime | None) -> str:
-    """A time as text with the month's name cut to three letters."""
-    return moment(time, is_short=True)
 
 
 def _printable(value: Any) -> Any:
@@ -171,19 +140,19 @@ def _place(error: Exception, folder: str = "") -> str:
 
 def versions() -> list[tuple[str, str]]:
     """Versions of the programs by name."""
-    packages = {name: name for name in ("skthermo", "numpy", "scipy", "pandas")}
-    packages |= {"sklearn": "scikit-learn", "matplotlib": "matplotlib"}
-    installed = {name: shown for name, shown in packages.items() if find_spec(name) is not None}
-    found = [(shown, str(import_module(name).__version__)) for name, shown in installed.items()]
-    return [("Python", platform.python_version()), *found]
+    found = {"Python": platform.python_version(), "skthermo": skthermo.__version__}
+    for name in ("numpy", "scipy", "pandas", "scikit-learn", "matplotlib"):
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return list(found.items())
 
 
 def settings_of(estimators: Mapping[str, object], but: Sequence[str] = ()) -> list[tuple[str, str]]:
     """Parameters of estimators as short text, by the name of their part; of what has none, nothing."""
-    rows = []
-    for part, estimator in estimators.items():
-        found = estimator.get_params(deep=False) if hasattr(estimator, "get_params") else {}
-        for name, value in found.items():
-            shown, label = " ".join(repr(value).split()), f"{part}: {name}"
-            rows += [] if label in but else [(label, shown if len(shown) <= 400 else f"{shown[:400]} ...")]
-    return rows
+    rows = [
+        (f"{part}: {name}", " ".join(repr(value).split()))
+        for part, estimator in estimators.items()
+        if hasattr(estimator, "get_params")
+        for name, value in estimator.get_params(deep=False).items()
+    ]
+    return [(name, shown if len(shown) <= 400 else f"{shown[:400]} ...") for name, shown in rows if name not in but]
