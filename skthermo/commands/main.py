@@ -82,11 +82,7 @@ OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("--out", "report", PAGE),
     ("--title", "update status report", {"help": "heading of the page"}),
     ("--fdr", "update status report", {"type": float, "default": 0.1, "help": "false discovery rate of a fleet"}),
-    (
-        "--wait",
-        f"{ONE} fit update",
-        {"type": float, "default": 60.0, "metavar": "SECONDS", "help": "for another command at work (default: 60)"},
-    ),
+    ("--wait", f"{ONE} fit update", {"type": float, "default": 60.0, "help": "seconds for another command at work"}),
     ("--replace", "fit", {"action": "store_true", "help": "fit anew; the old monitor is kept beside"}),
     ("--separator", "update", {"help": "between values of a CSV file (default: as the settings say, or a comma)"}),
     ("--decimal", "update", {"help": "decimal sign of a CSV file (default: as the settings say, or a point)"}),
@@ -110,19 +106,21 @@ GAUGES: dict[str, tuple[str, Callable[[Mapping[str, Any]], Any]]] = {
     "watch_threshold": ("Damage index above which the level watch begins", lambda status: status["watch_threshold"]),
     "newest_record_timestamp_seconds": (
         "Time of the newest record, in seconds since 1970",
-        lambda status: status["newest"] and datetime.fromisoformat(status["newest"]).timestamp(),
+        lambda status: newest(status),
     ),
     "record_age_seconds": ("Age of the newest record when the metrics were written", lambda status: status["age"]),
     "failed_sensors": ("Number of sensors that have failed", lambda status: len(status["faults"])),
-    "records": ("Number of records since the baseline", lambda status: (status["counts"] or {}).get("n_records")),
-    "records_not_evaluated": (
-        "Number of records since the baseline that were not evaluated",
-        lambda status: (status["counts"] or {}).get("n_not_evaluated"),
-    ),
+    "records": ("Number of records since the baseline", lambda status: status["counts"]["n_records"]),
+    "records_not_evaluated": ("Number of these not evaluated", lambda status: status["counts"]["n_not_evaluated"]),
 }
 """Metrics of a status that are one number each, and their help; what is not known is left out."""
 
 logger = logging.getLogger("skthermo.commands")
+
+
+def newest(status: Mapping[str, Any]) -> float | None:
+    """Time of the newest record in seconds since 1970."""
+    return status["newest"] and datetime.fromisoformat(status["newest"]).timestamp()
 
 
 class Parser(argparse.ArgumentParser):

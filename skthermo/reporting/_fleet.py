@@ -18,7 +18,7 @@ from skthermo._core.files import write_when_complete
 from skthermo._core.frames import as_moment, midnights_between
 from skthermo.monitoring import Fleet
 from skthermo.reporting._monitor import Standing, Time, monitor_facts
-from skthermo.reporting._page import Row, rendered, rows_of, settings_of, versions
+from skthermo.reporting._page import Row, rendered, rows_of, settings_of
 
 PLACES = ("significant", "open", "unexplained", "raised", "worn", "silent", "broken", "unwatched", "drifting", "well")
 """Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
@@ -102,7 +102,7 @@ def write_fleet(
             bridge, chain = unwatched(fleet, name, bool(unread), stages)
             report = getattr(chain, "report_", None)
             facts |= {"bridge": bridge, "report": report if hasattr(report, "modes") else None}
-            facts |= {"settings": None if chain is None else settings_of({"model": chain}), "versions": versions()}
+            facts |= {"settings": None if chain is None else settings_of({"model": chain})}
             page = rendered("bridge", facts, templates)
         write_when_complete(folder / own_file, page)
         bridges.append(bridge | {"name": name, "errors": stages, "n_warnings": len(messages)})
@@ -130,7 +130,6 @@ def fleet_facts(fleet: Fleet, bridges: list[Row]) -> dict[str, Any]:
         "errors": rows_of(fleet.errors),
         "n_fitted": len(fleet.chains),
         "n_watched": len(fleet.monitors),
-        "versions": versions(),
     }
 
 

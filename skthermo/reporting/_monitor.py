@@ -15,8 +15,7 @@ from skthermo._core.frames import DAY, YEAR, as_moment, midnight, midnights_betw
 from skthermo.fem import Structure
 from skthermo.monitoring import Monitor, MonitorStatus
 from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
-from skthermo.reporting._drawings import Drawing, draw, draw_structure
-from skthermo.reporting._page import Row, rows_of, settings_of, versions
+from skthermo.reporting._page import Drawing, Row, draw, draw_structure, rows_of, settings_of
 
 Time: TypeAlias = str | datetime | None
 
@@ -197,7 +196,6 @@ def monitor_facts(standing: Standing, structure: Structure | None = None) -> dic
         "settings": settings_of(
             {"monitor": monitor, **parts, "model": monitor.fem}, but=("monitor: detector", "monitor: fem")
         ),
-        "versions": versions(),
         "identified": None,
         "fleet": None,
     }

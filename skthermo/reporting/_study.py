@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -17,9 +18,8 @@ from skthermo._core.warnings import collected
 from skthermo.detection import MahalanobisDetector
 from skthermo.fem import Structure
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.plotting import PODCurveDisplay
-from skthermo.reporting._drawings import Drawing, draw, draw_damage_indices, draw_mode, draw_structure, identified_facts
-from skthermo.reporting._page import Row, rows_of, settings_of, versions
+from skthermo.plotting import DamageIndexDisplay, PODCurveDisplay, PredictionDisplay
+from skthermo.reporting._page import Drawing, Row, draw, draw_structure, identified_facts, rows_of, settings_of
 from skthermo.studies import DetectabilityStudy, IdentifiedDamage
 from skthermo.surrogate import DataInformedFEM
 
@@ -74,7 +74,6 @@ def study_facts(
         "over_temperature": over_temperature(study.fem, T, F),
         "indices": indices_of(study, families),
         "settings": settings_of(parts, but=("study: fem", "study: detectors", "study: scenarios")),
-        "versions": versions(),
         "warned": warned,
     }
 
@@ -190,6 +189,27 @@ def finding_of(study: DetectabilityStudy, family: str, rows: pd.DataFrame) -> Ro
         "has_slope": has_slope,
         "remark": remark,
     }
+
+
+def draw_mode(
+    measured: pd.Series, alt: str, predicted: pd.Series | None = None, temperature: pd.Series | None = None
+) -> Drawing:
+    """A measured frequency over time, or a measured and a predicted one over a temperature."""
+    name, tables = str(measured.name), [None if one is None else one.to_frame() for one in (measured, predicted)]
+    make = partial(PredictionDisplay.from_predictions, *tables, temperature=temperature)
+    if predicted is None or temperature is None:
+        table = measured.to_frame(f"{name} (Hz)").rename_axis(measured.index.name or "date")
+        return draw(make, alt, height=2.2, name=f"frequency {name} over time", table=table)
+    both = pd.DataFrame({f"{name} measured (Hz)": measured, f"{name} predicted (Hz)": predicted})
+    both = both.set_axis(pd.Index(temperature, name=f"{temperature.name} (°C)"))
+    return draw(make, alt, name=f"frequency {name} over temperature", table=both, is_scatter=True)
+
+
+def draw_damage_indices(shown: Mapping[str, pd.Series], threshold: float, onset: object, alt: str) -> Drawing:
+    """Damage index of some scenarios over time, and the threshold of the alarm."""
+    make = partial(DamageIndexDisplay.from_predictions, shown, threshold, onset=onset, label="damage index")
+    table = pd.DataFrame(dict(shown)).assign(threshold=threshold).rename_axis("date")
+    return draw(make, alt, height=3.2, name=f"damage index {list(shown)[-1]}", table=table)
 
 
 def draw_curve(finding: Row, title: str, alt: str) -> Drawing:

@@ -87,7 +87,7 @@ def identified_in(*args, **options):
 @pytest.fixture
 def blank_drawings(monkeypatch):
     """Drawings are made but not written, for laws of the text around them."""
-    monkeypatch.setattr("skthermo.reporting._drawings._svg", lambda figure: b"<svg/>")
+    monkeypatch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
 
 
 def test_it_is_one_sound_page_without_network(page):
@@ -289,8 +289,8 @@ def luminance(colour):
 @pytest.mark.parametrize(
     ("place", "options", "message"),
     [
-        ("missing/a.html", {}, "there is no folder .*missing"),
-        (".", {}, "a folder; expected a file"),
+        ("missing/a.html", {}, "expected a file in a folder"),
+        (".", {}, "expected a file in a folder"),
         ("a.html", {"identified": {"top": 0.1}}, r"identified is \{'top': 0.1\}"),
         ("a.html", {"structure": 3}, "structure is 3"),
         ("a.html", {"now": "2024-01-01"}, "now given for a DetectabilityStudy"),

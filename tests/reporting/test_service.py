@@ -352,9 +352,9 @@ def test_ten_years_of_service_are_a_small_page(tmp_path):
 
 
 def test_what_belongs_to_studies_or_is_not_fitted_is_refused(real, tmp_path):
-    with pytest.raises(ValueError, match="detector given for a Monitor; expected only for a DetectabilityStudy"):
+    with pytest.raises(ValueError, match="detector given for a Monitor"):
         owner_report(real[0], tmp_path / "a.html", detector="raw")
-    with pytest.raises(NotFittedError, match="the monitor is not fitted yet"):
+    with pytest.raises(NotFittedError, match="fit"):
         owner_report(Monitor(MahalanobisDetector()), tmp_path / "a.html")
     with pytest.raises(ValueError, match="drift_limit is 10; expected a loss of stiffness between 0 and 1"):
         owner_report(real[0], tmp_path / "a.html", drift_limit=10)

@@ -20,7 +20,7 @@ GERMAN = Path(__file__).parent / "german"
 
 @pytest.fixture(autouse=True)
 def blank_drawings(monkeypatch):
-    monkeypatch.setattr("skthermo.reporting._drawings._svg", lambda figure: b"<svg/>")
+    monkeypatch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
 
 
 @pytest.fixture
