@@ -58,7 +58,7 @@ COMMANDS = {
     "refit": "learn anew from the baseline and the records since",
     "discard": "take back records, such as those stamped by a wrong clock",
 }
-RECORDS, ONE, MANY = "check init", "acknowledge rebaseline refit discard", "fit update status report"
+RECORDS, SINGLE, SEVERAL = "check init", "acknowledge rebaseline refit discard", "fit update status report"
 PAGE = {"dest": "report", "type": Path, "metavar": "PAGE", "help": "HTML for the owner, or of the fleet"}
 BRIDGES = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
 OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
@@ -74,15 +74,15 @@ OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("--until", RECORDS, {"metavar": "TIME", "help": "last moment of the baseline (default: all records)"}),
     ("--into", "init", {"type": Path, "required": True, "metavar": "FOLDER", "help": "made if it does not exist"}),
     ("--name", "init", {"dest": "bridge", "help": "of the bridge (default: that of the folder)"}),
-    ("files", ONE, {"type": Path, "nargs": 1, "metavar": "file", "help": BRIDGES}),
-    ("files", MANY, {"type": Path, "nargs": "+", "help": f"{BRIDGES}; of update, then new records"}),
-    ("--metrics", f"{ONE} {MANY}", {"type": Path, "metavar": "FILE", "help": "in Prometheus' text format"}),
-    ("--now", f"{ONE} {MANY}", {"metavar": "TIME", "help": "as of this time (default: that of the clock)"}),
+    ("files", SINGLE, {"type": Path, "nargs": 1, "metavar": "file", "help": BRIDGES}),
+    ("files", SEVERAL, {"type": Path, "nargs": "+", "help": f"{BRIDGES}; of update, then new records"}),
+    ("--metrics", f"{SINGLE} {SEVERAL}", {"type": Path, "metavar": "FILE", "help": "in Prometheus' text format"}),
+    ("--now", f"{SINGLE} {SEVERAL}", {"metavar": "TIME", "help": "as of this time (default: that of the clock)"}),
     ("--report", "update status", PAGE),
     ("--out", "report", PAGE),
     ("--title", "update status report", {"help": "heading of the page"}),
     ("--fdr", "update status report", {"type": float, "default": 0.1, "help": "false discovery rate of a fleet"}),
-    ("--wait", f"{ONE} fit update", {"type": float, "default": 60.0, "help": "seconds for another command at work"}),
+    ("--wait", f"{SINGLE} fit update", {"type": float, "default": 60.0, "help": "seconds for another command at work"}),
     ("--replace", "fit", {"action": "store_true", "help": "fit anew; the old monitor is kept beside"}),
     ("--separator", "update", {"help": "between values of a CSV file (default: as the settings say, or a comma)"}),
     ("--decimal", "update", {"help": "decimal sign of a CSV file (default: as the settings say, or a point)"}),
@@ -104,10 +104,7 @@ GAUGES: dict[str, tuple[str, Callable[[Mapping[str, Any]], Any]]] = {
     "damage_index": ("Damage index of the newest record that was evaluated", lambda status: status["index"]),
     "threshold": ("Damage index above which a damage event opens", lambda status: status["threshold"]),
     "watch_threshold": ("Damage index above which the level watch begins", lambda status: status["watch_threshold"]),
-    "newest_record_timestamp_seconds": (
-        "Time of the newest record, in seconds since 1970",
-        lambda status: newest(status),
-    ),
+    "newest_record_timestamp_seconds": ("Time of the newest record, seconds since 1970", lambda status: newest(status)),
     "record_age_seconds": ("Age of the newest record when the metrics were written", lambda status: status["age"]),
     "failed_sensors": ("Number of sensors that have failed", lambda status: len(status["faults"])),
     "records": ("Number of records since the baseline", lambda status: status["counts"]["n_records"]),

@@ -12,12 +12,12 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
+import skthermo.plotting._display as shared
 from skthermo._core.arrays import Array, as_columns, is_real, real_array
 from skthermo._core.estimators import check_is_fitted, last_step
 from skthermo._core.frames import check_same_rows, check_stamp, midnights_between
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection import MahalanobisDetector
-from skthermo.plotting import _display as shared
 from skthermo.plotting._display import AMBER, BLACK, BLUE, COLOURS, DENSE, GREY, LINES, MARKERS, ORANGE, PURPLE, Display
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+import skthermo.plotting._display as shared
 from skthermo._core.arrays import Array, Label, real_array
 from skthermo._core.estimators import last_step
 from skthermo.fem import FEModel, Structure
-from skthermo.plotting import _display as shared
 from skthermo.plotting._display import BLACK, COLOURS, GREY, LIGHT, ORANGE, Display
 
 if TYPE_CHECKING:

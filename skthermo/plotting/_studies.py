@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
+import skthermo.plotting._display as shared
 from skthermo._core.arrays import Array, check_names
 from skthermo._core.text import chance_text, percent, printable, share_text
-from skthermo.plotting import _display as shared
 from skthermo.plotting._display import BLACK, BLUE, COLOURS, GREY, LINES, MARKERS, ORANGE, Display
 
 if TYPE_CHECKING:

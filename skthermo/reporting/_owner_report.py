@@ -154,11 +154,7 @@ def _check_arguments(kind: str, **given: Any) -> None:
     for name, expected in types.items():
         if given[name] is not None and not isinstance(given[name], expected):
             raise ValueError(f"{name} is {given[name]!r:.200}; expected a {expected.__name__}")
-    refused = {
-        "Fleet": ("identified", "structure", "detector"),
-        "Monitor": ("detector",),
-        "DetectabilityStudy": ("now",),
-    }
-    for name in refused[kind]:
+    of_fleets = ("identified", "structure", "detector")
+    for name in {"Fleet": of_fleets, "Monitor": ("detector",), "DetectabilityStudy": ("now",)}[kind]:
         if given[name] is not None:
             raise ValueError(f"{name} given for a {kind}; expected it for other subjects only")
