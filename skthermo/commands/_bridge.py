@@ -64,16 +64,9 @@ class Bridge:
 
     def facts(self) -> dict[str, Any]:
         """What JSON says of it."""
-        return {
-            "name": self.name,
-            "state": self.state,
-            "exit_code": self.code,
-            "status": None if self.status_ is None else self.status_.as_dict(),
-            "records": self.records,
-            "transitions": self.transitions,
-            "written": list(map(str, self.written)),
-            "errors": self.errors,
-        }
+        status = None if self.status_ is None else self.status_.as_dict()
+        done = {name: getattr(self, name) for name in ("name", "state", "records", "transitions", "errors")}
+        return done | {"exit_code": self.code, "status": status, "written": list(map(str, self.written))}
 
     @cached_property
     def settings(self) -> Settings | None:

@@ -38,10 +38,6 @@ from skthermo.surrogate import TemperatureMapper
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
 REGRESSION = "sklearn.linear_model.Ridge"
-FEATURES = {
-    "ExponentialMeans": "Means of earlier temperatures that explain the responses.",
-    "HingeFeatures": "Frequencies are piecewise-linear in temperature.",
-}
 OTHERS = """
 # An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
 # a function of a Python file that gives one, or a folder of matrices that another program exported. Other settings
@@ -131,7 +127,7 @@ class Proposal:
 
         Of natural frequencies, those that know in which direction damage moves them.
         """
-        parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen in self.features]}
+        parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen, _ in self.features]}
         parts["regression"] = class_named(REGRESSION, CLASSES["regression"])()
         are_frequencies = set(self.read.units.values()) == {HZ}
         kind = "DirectionalDetector" if are_frequencies else "MahalanobisDetector"
@@ -153,12 +149,13 @@ class Proposal:
         return sorted(tried, key=lambda one: one.size)
 
     @property
-    def features(self) -> list[tuple[str, dict[str, Any]]]:
-        """Classes and settings of what is made of temperatures: means that explain responses, and hinges."""
-        if self.means is None:
-            return [("HingeFeatures", {})]
-        chosen = {"half_lives": list(self.means.half_lives), "sensors": list(self.means.sensors)}
-        return [("ExponentialMeans", chosen), ("HingeFeatures", {})]
+    def features(self) -> list[tuple[str, dict[str, Any], str]]:
+        """Classes and settings of what is made of temperatures, means that explain responses and hinges, and why."""
+        found: list[tuple[str, dict[str, Any], str]] = []
+        if self.means is not None:
+            chosen = {"half_lives": list(self.means.half_lives), "sensors": list(self.means.sensors)}
+            found = [("ExponentialMeans", chosen, "Means of earlier temperatures that explain the responses.")]
+        return [*found, ("HingeFeatures", {}, "Frequencies are piecewise-linear in temperature.")]
 
     @property
     def monitor_options(self) -> dict[str, Any]:
@@ -191,7 +188,7 @@ class Proposal:
             ("files", None, {"name": name} if name else {}, "What is written."),
             ("records", None, asdict(self.records), "Which records there are."),
             ("csv", None, asdict(self.form), "How CSV files are written."),
-            *(("features", kind, chosen, FEATURES[kind]) for kind, chosen in self.features),
+            *(("features", *chosen) for chosen in self.features),
             ("regression", REGRESSION, {}, "Predicts the responses from the inputs: any of scikit-learn's regressors."),
             ("compensator", None, best.compensator, f"Takes out what the weather explains, of {best.text}."),
             ("detector", best.kind, {}, "Gives the damage index of what is left."),

@@ -306,23 +306,21 @@ class StructureDisplay(Display):
         kind: str,
         names: Iterable[Hashable],
         colour: str | None,
-        *,
         width: Any,
-        alpha: float = 0.3,
-        label: str | None = None,
+        **style: Any,
     ) -> Collection:
         """Add diamonds, lines or surfaces for members with nodes at some places."""
         places = [np.array([nodes[node] for node in self.structure.members[name].nodes]) for name in names]
+        alpha = style.pop("alpha", 0.3)
         if kind == "points":
-            style = {"s": 36, "marker": "D", "edgecolors": BLACK, "linewidths": 0.5, "zorder": 4, "label": label}
-            return ax.scatter(*np.vstack(places).T, c=colour, **style)
+            fixed = {"s": 36, "marker": "D", "edgecolors": BLACK, "linewidths": 0.5, "zorder": 4}
+            return ax.scatter(*np.vstack(places).T, c=colour, **fixed, **style)
         collections = shared.drawing("matplotlib.collections")
         if kind == "lines":
-            added = collections.LineCollection(places, colors=colour, linewidths=width, capstyle="round", label=label)
-        else:
-            style = {"facecolors": colour, "edgecolors": "none", "alpha": alpha, "label": label}
-            added = collections.PolyCollection(places, **style)
-        return ax.add_collection(added)
+            line = collections.LineCollection(places, colors=colour, linewidths=width, capstyle="round", **style)
+            return ax.add_collection(line)
+        surface = collections.PolyCollection(places, facecolors=colour, edgecolors="none", alpha=alpha, **style)
+        return ax.add_collection(surface)
 
 
 def by_number_of_nodes(structure: Structure, names: Iterable[Hashable]) -> dict[str, list[Hashable]]:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
 import skthermo.plotting._display as shared
-from skthermo._core.arrays import Array, check_names
+from skthermo._core.arrays import check_names
 from skthermo._core.text import chance_text, percent, printable, share_text
 from skthermo.plotting._display import BLACK, BLUE, COLOURS, GREY, LINES, MARKERS, ORANGE, Display
 
@@ -176,7 +177,8 @@ class PODCurveDisplay(Display):
             *(np.asarray(values, dtype=float) for values in (curve.severities, curve.n_detected, curve.n_records))
         )
         share = n_detected / n_records
-        errors = 100 * np.abs(np.array(wilson(n_detected, n_records)) - share)
+        tests = (binomtest(int(k), int(n)) for k, n in zip(n_detected, n_records, strict=True))
+        errors = 100 * np.abs(np.transpose([test.proportion_ci(method="wilson") for test in tests]) - share)
         label = None if number else "tested, with 95 % interval"
         style = {"linestyle": "", "markersize": 5, "capsize": 2, "elinewidth": 0.8, "color": colour, "label": label}
         self.errorbar_ = ax.errorbar(100 * severities, 100 * share, errors, marker=marker, **style)
@@ -216,15 +218,6 @@ class PODCurveDisplay(Display):
         elif np.isnan(self.curve.a90) and np.isfinite(low):
             drawn["bracket"] = self.ax_.plot([], [], " ", label=f"$a_{{90}}$ beyond {low:.1f} %")[0]
         return drawn
-
-
-def wilson(n_detected: Array, n_records: Array) -> tuple[Array, Array]:
-    """Wilson's interval of 95 % of a share of independent records."""
-    quantile = 1.959964
-    square = quantile**2
-    middle = (n_detected + square / 2) / (n_records + square)
-    half = quantile / (n_records + square) * np.sqrt(n_detected * (n_records - n_detected) / n_records + square / 4)
-    return middle - half, middle + half
 
 
 @dataclass(frozen=True, eq=False)
@@ -455,9 +448,8 @@ class DetectorsDisplay(Display):
 
     def _name_rows(self, ax: Axes) -> None:
         """Names of the detectors left of the panels, headings of groups in bold type, and an empty frame."""
-        ax.set_yticks(
-            list(self.places.values()), [shared.label_of(row[0 if row[1] is None else 1]) for row in self.places]
-        )
+        texts = [shared.label_of(group if name is None else name) for group, name in self.places]
+        ax.set_yticks(list(self.places.values()), texts)
         for text, (_, name) in zip(ax.get_yticklabels(), self.places, strict=True):
             text.set_fontweight("bold" if name is None else "normal")
         ax.set_ylim(len(self.places) - 0.4, -0.6)

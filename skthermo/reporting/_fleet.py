@@ -52,25 +52,15 @@ def watched(standing: Standing, is_significant: bool, unexplained: list[int]) ->
         "size": size / (pd.Timedelta("1D") if place == "silent" else threshold),
         "since": standing.since,
         "alarm_for": max(standing.now - standing.since, status.records.step) if state == "alarm" else None,
-        "modes": names_in(opened["modes"]),
-        "groups": names_in(opened["groups"]),
         "standing": {"status": status, "errors": standing.errors},
-        "last": standing.last,
+        "damage": [event for event in status.events if event["kind"] == "damage"],
         "worn": standing.worn,
         "unexplained": unexplained,
-        "failed": [fault["column"] for fault in status.faults],
-        "index": None if status.index is None else status.index / threshold,
-        "highest": opened["peak"].max() / threshold if len(opened) else None,
         "is_followed": standing.drift is not None,
         "drift": max(certain, key=lambda group: abs(group["change"]), default=None),
         "n_evaluated": int((standing.days["n_evaluated"].reindex(month) > 0).sum()),
         "n_days": len(month),
     }
-
-
-def names_in(texts: pd.Series) -> list[str]:
-    """Names in texts that list them."""
-    return sorted({name for text in texts if text for name in str(text).split(", ")})
 
 
 def write_fleet(
@@ -137,7 +127,7 @@ def unwatched(fleet: Fleet, name: Hashable, is_unread: bool, stages: list[str]) 
     """What is said of a bridge without a monitor that can be read, and its chain, if it has one."""
     chain, without_chain = opened(fleet.chains, name)
     bridge = {"state": "no monitor", "place": "unwatched", "size": 0.0, "since": None, "unread": "", "errors": stages}
-    bridge |= {"standing": None, "alarm_for": None, "unexplained": [], "failed": []}
+    bridge |= {"standing": None, "alarm_for": None, "unexplained": []}
     if is_unread:
         bridge |= {"state": "not evaluated", "place": "silent", "size": np.inf, "unread": "monitor"}
     elif chain is None:
