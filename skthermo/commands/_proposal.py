@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,20 +39,6 @@ from skthermo.surrogate import TemperatureMapper
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
 REGRESSION = "sklearn.linear_model.Ridge"
-OTHERS = """
-# An FE model, which knows how damage moves the frequencies, and by which slow drift of the stiffness is followed:
-# a function of a Python file that gives one, or a folder of matrices that another program exported. Other settings
-# are those of DataInformedFEM.
-# [fem]
-# model = "model.py:make_model"
-# random_state = 0
-
-# The page for the owner.
-# [page]
-# title = "Bridge over the river"
-# structure = "model.py:make_structure"
-# templates = "templates"
-# drift_limit = 0.1"""
 
 
 class TriedDetector(NamedTuple):
@@ -87,12 +74,12 @@ class Proposal:
         roles = options.temperatures, options.responses, options.reference
         read = LoggerRecords.read(options.files, *roles, options.zone, options.stamps)
         warn_each(finding for look in read.looks for finding in look.findings)
-        files, until = [f"{BASELINE}/{look.file.name}" for look in read.looks], options.until
+        copies, until = [f"{BASELINE}/{look.file.name}" for look in read.looks], options.until
         baseline = read.table if until is None else read.table.loc[:until]
         if not len(baseline):
             raise ValueError(f"no record is from before {until}; the first is of {read.table.index[0]}")
         others = {"ignore": list(read.ignored), "convert": read.convert, "until": until}
-        records = RecordSettings(files, **read.roles, **others)
+        records = RecordSettings(copies, **read.roles, **others)
         T, F = baseline[records.temperatures], baseline[records.responses]
         units = set(read.units.values())
         chosen = TemperatureMapper().behind_means(T, F)
@@ -197,8 +184,9 @@ class Proposal:
         written = f"Settings of a monitor, written by skthermo {skthermo.__version__}."
         found = [*self.account(), *self.findings.summary().splitlines(), *map(str, self.detectors)]
         parts = [_comment(f"{written} Lines with # say what else can be set."), _comment("Found in the records:")]
-        parts += [*(_comment(f"- {one}") for one in found), *(_section(*call) for call in calls), OTHERS]
-        return "\n".join(parts) + "\n"
+        parts += [*(_comment(f"- {one}") for one in found), *(_section(*call) for call in calls)]
+        optional = files("skthermo.commands").joinpath("optional_sections.toml").read_text(encoding="utf-8")
+        return "\n".join([*parts, "", optional])
 
 
 def form_of_all(looks: Sequence[FileLook]) -> CsvFormat:

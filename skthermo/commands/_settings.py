@@ -141,24 +141,21 @@ OF_A_FIT = ("records", "features", "regression", "compensator", "detector", "mon
 
 
 def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
-    """Parameters of a class or function by name, with their descriptions; defaults made by a factory are empty."""
-    doc = inspect.getdoc(maker) or ""
-    types = dict(re.findall(r"^(\w+) : ([^\n]*?)(?:, optional|, default=[^\n]*)?$", doc, re.MULTILINE))
-    texts = {name: f"{text} {types[name]}" if text.endswith(":") else text for name, text in _descriptions(doc)}
-    kinds = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
+    """Parameters of a class or function by name, as its numpydoc docstring describes them in their first paragraphs;
+    defaults made by a factory are empty."""
+    doc, many = inspect.getdoc(maker) or "", re.MULTILINE
+    part = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", doc, re.DOTALL | many)
+    one_of_them = r"^(\w[\w, ]*?) ?: (.*)\n((?:[ \t]+.*\n?)*)"
+    said: dict[str, tuple[str, str]] = {}
+    for names, of_type, lines in re.findall(one_of_them, part[1] if part else "", many):
+        kind = re.sub(r", (optional|default=.*)$", "", of_type)
+        text = re.sub(r"`+~?([^`]*)`+", r"\1", " ".join(lines.split()))
+        said |= {name.strip(): (f"{text} {kind}" if text.endswith(":") else text, kind) for name in names.split(",")}
     return {
-        name: Setting({} if "factory" in repr(one.default) else one.default, texts.get(name, ""), types.get(name, ""))
+        name: Setting({} if "factory" in repr(one.default) else one.default, *said.get(name, ("", "")))
         for name, one in inspect.signature(maker).parameters.items()
-        if name not in without and one.kind not in kinds
+        if name not in without and one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
     }
-
-
-def _descriptions(doc: str) -> Iterator[tuple[str, str]]:
-    """Names and first paragraphs of the parameters that a numpydoc docstring describes."""
-    part = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", doc, re.DOTALL | re.MULTILINE)
-    for match in re.finditer(r"^(\w[\w, ]*?) ?: [^\n]*\n((?:[ \t]+[^\n]*\n?)*)", part[1] if part else "", re.MULTILINE):
-        text = re.sub(r"`+~?([^`]*)`+", r"\1", " ".join(match[2].split()))
-        yield from ((name.strip(), text) for name in match[1].split(","))
 
 
 @dataclass(frozen=True)

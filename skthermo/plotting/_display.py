@@ -9,7 +9,6 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from sklearn.exceptions import NotFittedError
 
 from skthermo._core.estimators import import_optional
 from skthermo._core.text import printable
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skthermo.studies import DetectabilityStudy
 
 # Okabe and Ito's palette for colour-blind readers. What is measured is blue, what is predicted or simulated orange.
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
@@ -100,14 +98,6 @@ def legend(axes: np.ndarray, is_own_figure: bool, n_columns: int = 4, side: str 
     figure = axes[0].figure
     fitting = figure.get_figwidth() // (0.5 + LETTER * max(map(len, by_label)))
     figure.legend(*given, loc=f"outside {side} center", ncols=int(np.clip(fitting, 1, n_columns)), **style)
-
-
-def check_study(study: DetectabilityStudy) -> None:
-    """Raise an error for what is no study, or one without results."""
-    if not hasattr(study, "scenarios"):
-        raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy")
-    if not hasattr(study, "results_"):
-        raise NotFittedError("the study has no results yet; expected a call of run before")
 
 
 class Display:

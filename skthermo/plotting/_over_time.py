@@ -218,17 +218,19 @@ class PredictionDisplay(Display):
         """
         if (lowest is None) != (highest is None):
             raise ValueError("only one of lowest and highest is given; expected both or none")
+        first = as_table(measured, "measured")
+
+        def like_first(table: ArrayLike, name: str) -> pd.DataFrame:
+            check_same_rows(measured, table, ("measured", name))
+            found = as_table(table, name)
+            if found.shape != first.shape:
+                n_columns = f"{first.shape[1]} columns and {name} {found.shape[1]}"
+                raise ValueError(f"measured has {n_columns}; expected the same")
+            return found
+
         by_label = predicted if isinstance(predicted, Mapping) else {labels[1]: predicted}
-        given = {str(label): table for label, table in by_label.items()} | {"lowest": lowest, "highest": highest}
-        first, tables = as_table(measured, "measured"), {}
-        for name, table in given.items():
-            if table is not None:
-                check_same_rows(measured, table, ("measured", name))
-                tables[name] = as_table(table, name)
-                if tables[name].shape != first.shape:
-                    n_columns = f"{first.shape[1]} columns and {name} {tables[name].shape[1]}"
-                    raise ValueError(f"measured has {n_columns}; expected the same")
-        ends = tables.pop("lowest", None), tables.pop("highest", None)
+        tables = {str(label): like_first(one, str(label)) for label, one in by_label.items() if one is not None}
+        ends = () if lowest is None else (like_first(lowest, "lowest"), like_first(highest, "highest"))
         if temperature is not None:
             check_same_rows(temperature, measured, ("temperature", "measured"))
             table = as_table(temperature, "temperature")
@@ -310,9 +312,11 @@ class PredictionDisplay(Display):
         return self
 
     def _draw_each(self, label: str, x: NDArray, values: NDArray, style: Mapping[str, object]) -> None:
-        """Points or lines of each column in its panel."""
+        """Points or lines of each column in its panel, over one x or that of each column."""
+        xs = x.T if x.ndim == 2 else [x] * len(self.axes_)
+        columns = zip(self.axes_, xs, values.T, strict=True)
         style = {**style, "label": shared.shortened(label)}
-        self.lines_[label] = [one.plot(x, column, **style)[0] for one, column in zip(self.axes_, values.T, strict=True)]
+        self.lines_[label] = [one.plot(x, column, **style)[0] for one, x, column in columns]
 
     def _with_unit(self, quantity: str) -> str:
         """Label of an axis."""
@@ -351,11 +355,10 @@ class PredictionDisplay(Display):
 
     def _draw_scatter(self) -> None:
         label, predicted = next(iter((self.predicted or {}).items()))
-        style = marker_style(0, len(self.measured))
-        pairs = list(zip(self.measured.to_numpy().T, predicted.to_numpy().T, strict=True))
-        self.lines_[label] = [one.plot(*pair, **style)[0] for one, pair in zip(self.axes_, pairs, strict=True)]
-        for one, pair in zip(self.axes_, pairs, strict=True):
-            known = pair[0][np.isfinite(pair).all(axis=0)]
+        tables = self.measured.to_numpy(), predicted.to_numpy()
+        self._draw_each(label, *tables, marker_style(0, len(self.measured)))
+        for one, x, y in zip(self.axes_, *(table.T for table in tables), strict=True):
+            known = x[np.isfinite(x + y)]
             if known.size:
                 one.axline((known.mean(),) * 2, slope=1, color=BLACK, linewidth=0.8, linestyle="--")
             one.set(xlabel=self._with_unit(self.label), ylabel=self._with_unit(label))

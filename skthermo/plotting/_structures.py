@@ -300,17 +300,10 @@ class StructureDisplay(Display):
                     self.members_[name] = self._add(self.ax_, rest, kind, some, colour, width=own, label=label)
 
     def _add(
-        self,
-        ax: Axes,
-        nodes: Places,
-        kind: str,
-        names: Iterable[Hashable],
-        colour: str | None,
-        width: Any,
-        **style: Any,
+        self, ax: Axes, at: Places, kind: str, names: Iterable[Hashable], colour: str | None, width: Any, **style: Any
     ) -> Collection:
         """Add diamonds, lines or surfaces for members with nodes at some places."""
-        places = [np.array([nodes[node] for node in self.structure.members[name].nodes]) for name in names]
+        places = [np.array([at[node] for node in self.structure.members[name].nodes]) for name in names]
         alpha = style.pop("alpha", 0.3)
         if kind == "points":
             fixed = {"s": 36, "marker": "D", "edgecolors": BLACK, "linewidths": 0.5, "zorder": 4}

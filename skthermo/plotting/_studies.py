@@ -124,7 +124,6 @@ class PODCurveDisplay(Display):
         UserWarning
             If the curve has no finite slope, or lies outside the bounds of some tested severities.
         """
-        shared.check_study(study)
         curve = study.pod_curve(family, source, detector=detector)
         return cls.from_predictions(curve, label=label or detector or family, **options)
 
@@ -142,15 +141,7 @@ class PODCurveDisplay(Display):
         Returns
         -------
         PODCurveDisplay
-
-        Raises
-        ------
-        ValueError
-            If the curve lacks an attribute or method.
         """
-        needed = ("severities", "n_detected", "n_records", "a90", "a90_95", "predict")
-        if missing := [name for name in needed if not hasattr(curve, name)]:
-            raise ValueError(f"curve is a {type(curve).__name__} without {missing}; expected a PODCurve")
         return cls._drawn(curve, **options)
 
     def plot(self, ax: Axes | None = None, *, marks: bool = True) -> PODCurveDisplay:
@@ -314,7 +305,6 @@ class DetectorsDisplay(Display):
         *,
         max_false_alarms: float = 0.02,
         source: str = "simulated",
-        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         **options: object,
     ) -> DetectorsDisplay:
         """Draw the ranking of the detectors of a study, or its simulated rates beside measured ones.
@@ -329,8 +319,6 @@ class DetectorsDisplay(Display):
             Limit of the share of false alarms in a ranking.
         source : str, default="simulated"
             Records of a ranking: "simulated" or "reference".
-        by : {"pod", "pod_at_equal_pfa"}, default="pod"
-            What a ranking compares: detectors as they are, or with thresholds moved to equal false alarms.
         **options : dict
             Options of `from_predictions` and of `plot`.
 
@@ -345,13 +333,12 @@ class DetectorsDisplay(Display):
         ValueError
             If ``what`` is something else, or the study has no healthy scenario to rank by, or no measured records.
         """
-        shared.check_study(study)
         if what not in ("ranking", "agreement"):
             raise ValueError(f"what is {what!r}; expected 'ranking' or 'agreement'")
         if what == "agreement":
             return cls.from_predictions(study.results_, **options)
-        ranking = study.ranking(max_false_alarms, source, by=by)
-        return cls.from_predictions(ranking, max_false_alarms=max_false_alarms, by=by, **options)
+        ranking = study.ranking(max_false_alarms, source)
+        return cls.from_predictions(ranking, max_false_alarms=max_false_alarms, **options)
 
     @classmethod
     def from_predictions(
@@ -359,7 +346,6 @@ class DetectorsDisplay(Display):
         table: pd.DataFrame,
         *,
         max_false_alarms: float = 0.02,
-        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         scenarios: Sequence[str] | None = None,
         groups: Mapping[str, str] | None = None,
         **options: object,
@@ -376,8 +362,6 @@ class DetectorsDisplay(Display):
             `~skthermo.detection.DirectionalDetector.minimum_detectable_damage` gives it.
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms with which a ranking was made.
-        by : {"pod", "pod_at_equal_pfa"}, default="pod"
-            What was compared with the best in a ranking.
         scenarios : sequence of str, optional
             Scenarios of results that are drawn, in this order. By default all, false alarms first.
         groups : mapping of str to str, optional
@@ -413,7 +397,7 @@ class DetectorsDisplay(Display):
         if missing := [name for name in needed if name not in columns]:
             got = f"lacks the columns {missing}" if columns else f"is {table!r:.200}"
             raise ValueError(f"table {got}; expected a ranking, or results with {needed}, and one row or more")
-        made = of_ranking(table, max_false_alarms, by) if is_ranking else of_results(table, scenarios, groups or {})
+        made = of_ranking(table, max_false_alarms) if is_ranking else of_results(table, scenarios, groups or {})
         return cls(**made).plot(**options)
 
     def plot(self, ax: Axes | np.ndarray | None = None) -> DetectorsDisplay:
@@ -501,7 +485,7 @@ class DetectorsDisplay(Display):
                 ax.text(y=height, s=text, transform=ax.get_yaxis_transform(), **place, **style)
 
 
-def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object]:
+def of_ranking(ranking: pd.DataFrame, limit: float) -> dict[str, object]:
     """Contents of a display of a ranking."""
     has_bounds = ranking["pod_deficit_ci_low"].notna().any()
     level = "not significantly worse" if has_bounds else "order uncertain: one repeat"
@@ -519,12 +503,11 @@ def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object
     errors = ranking.loc[~is_tested, "error"].to_dict() if "error" in ranking else {}
     unknown = tested.get("not_evaluated", pd.Series(dtype=float))
     notes = {name: f"{share_text(share)} not evaluated" for name, share in unknown.items() if share > 0}
-    label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
     false, found = "healthy in alarm (%, square-root scale)", "damaged in alarm (%)"
     panels = {
         "false_alarms": RatesPanel("false alarms", false, rates("false_alarms"), errors, "small", 100 * limit),
         "pod": RatesPanel("probability of detection", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
-        "pod_deficit": RatesPanel("POD below that of the best", label, rates("pod_deficit"), axis="free"),
+        "pod_deficit": RatesPanel("POD below that of the best", "percentage points", rates("pod_deficit"), axis="free"),
     }
     colours = {name: {level: BLUE, worse: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
     labels = ["confidence interval", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]

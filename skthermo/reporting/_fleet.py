@@ -98,29 +98,10 @@ def write_fleet(
         bridges.append(bridge | {"name": name, "errors": stages, "n_warnings": len(messages)})
         bridges[-1]["link"] = f"{quote(folder.name)}/{own_file}"
     bridges.sort(key=lambda bridge: (PLACES.index(bridge["place"]), -bridge["size"]))
-    facts = {"title": title, "written": written, "limit": limit, "fdr": fdr, "found": found, "bridges": bridges}
-    write_when_complete(file, rendered("fleet", fleet_facts(fleet, bridges) | facts, templates))
-
-
-def fleet_facts(fleet: Fleet, bridges: list[Row]) -> dict[str, Any]:
-    """What the template of the page is given beside its bridges: how many are in which state, warnings and errors."""
-    counts = Counter(bridge["state"] for bridge in bridges)
-    unexplained = [bridge for bridge in bridges if bridge["place"] == "unexplained"]
-    n_unknown = sum(counts[state] for state in ("not evaluated", "not fitted", "no monitor"))
-    worst = {"alarm": counts["alarm"], "attention": len(unexplained) + counts["attention"], "watch": counts["watch"]}
-    worst |= {"not evaluated": n_unknown, "healthy": 1}
     kinds = fleet.warnings.groupby("kind").agg(n=("bridge", "nunique"), first=("message", "first"))
-    return {
-        "counts": dict(+counts),
-        "n_unknown": n_unknown,
-        "state": next(state for state, number in worst.items() if number),
-        "alarms": [bridge for bridge in bridges if bridge["state"] == "alarm"],
-        "unexplained": unexplained,
-        "warned": rows_of(kinds.sort_values("n")[::-1]),
-        "errors": rows_of(fleet.errors),
-        "n_fitted": len(fleet.chains),
-        "n_watched": len(fleet.monitors),
-    }
+    facts = {"title": title, "written": written, "limit": limit, "fdr": fdr, "found": found, "bridges": bridges}
+    facts |= {"fleet": fleet, "counts": Counter(bridge["state"] for bridge in bridges), "warned": kinds}
+    write_when_complete(file, rendered("fleet", facts, templates))
 
 
 def unwatched(fleet: Fleet, name: Hashable, is_unread: bool, stages: list[str]) -> tuple[Row, Any]:

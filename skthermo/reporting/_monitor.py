@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -22,7 +22,8 @@ Time: TypeAlias = str | datetime | None
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """A monitor, the time at which its page is written, in the time zone of the records, and a limit of slow loss.
+    """A monitor, the time at which its page is written, in the time zone of the records, a limit of slow loss, and what
+    the monitor says at that time.
 
     ``errors`` are the stages that failed, such as "update" where the newest records could not be evaluated.
     """
@@ -30,29 +31,18 @@ class Standing:
     monitor: Monitor
     now: pd.Timestamp
     limit: float
-    errors: tuple[str, ...] = ()
+    errors: tuple[str, ...]
+    status: MonitorStatus
+    events: pd.DataFrame
+    days: pd.DataFrame
+    evaluations: pd.DataFrame
 
     @classmethod
     def at(cls, monitor: Monitor, now: Time, limit: float, errors: Iterable[str] = ()) -> Standing:
         """Now is by the clock where no time is given."""
-        return cls(monitor, as_moment(now, monitor.last_.tz), limit, tuple(dict.fromkeys(errors)))
-
-    @cached_property
-    def events(self) -> pd.DataFrame:
-        return self.monitor.events_
-
-    @cached_property
-    def days(self) -> pd.DataFrame:
-        return self.monitor.days_
-
-    @cached_property
-    def evaluations(self) -> pd.DataFrame:
-        return self.monitor.evaluations_
-
-    @cached_property
-    def status(self) -> MonitorStatus:
-        """The facts by the time at which the page is written."""
-        return self.monitor.status(self.now)
+        now = as_moment(now, monitor.last_.tz)
+        facts = monitor.status(now), monitor.events_, monitor.days_, monitor.evaluations_
+        return cls(monitor, now, limit, tuple(dict.fromkeys(errors)), *facts)
 
     @property
     def has_records(self) -> bool:

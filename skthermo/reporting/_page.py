@@ -85,8 +85,6 @@ def check_templates(folder: str | os.PathLike[str] | None) -> str:
         return ""
     path = check_path(folder, "templates")
     known = sorted(one.name for one in files("skthermo.reporting").joinpath("templates").iterdir())
-    if not path.is_dir():
-        raise ValueError(f"templates is {str(path)!r}, and there is no such folder; expected one with {known[0]!r}")
     if not any((path / name).is_file() for name in known):
         raise ValueError(f"templates is {str(path)!r}; expected a folder with one of {', '.join(known)}")
     return str(path.resolve())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -92,25 +92,9 @@ def states_of(study: DetectabilityStudy) -> list[Row]:
     states = rows_of(study.results_)
     for state in states:
         index = study.indices_[state["detector"], state["scenario"], state["source"]]
-        state |= {"change": change_of(scenarios.get(state["scenario"])), "n_first": len(index)}
+        state |= {"change": scenarios.get(state["scenario"]), "n_first": len(index)}
         state |= {"n_unknown": int(index.isna().sum())}
     return states
-
-
-def change_of(scenario: Any) -> Row | None:
-    """What a scenario changes, and from when until when: records by number, or by time."""
-    if scenario is None:
-        return None
-    is_uncertain = hasattr(scenario, "draws")
-    damage = scenario.draws.mean().round(3) if is_uncertain else getattr(scenario, "damage", None)
-    places = {name: getattr(scenario, name, None) for name in ("onset", "end")}
-    return {
-        "damage": {} if damage is None else dict(damage),
-        "parameters": dict(getattr(scenario, "parameters", None) or {}),
-        "added": [what for what in ("stiffness", "mass") if getattr(scenario, what, None) is not None],
-        "is_uncertain": is_uncertain,
-        **{name: pd.Timestamp(at) if isinstance(at, str) else at for name, at in places.items()},
-    }
 
 
 def agreement(results: pd.DataFrame) -> Row | None:
@@ -172,21 +156,15 @@ def finding_of(study: DetectabilityStudy, family: str, rows: pd.DataFrame) -> Ro
             remark = "gap" if is_gap else "outside" if np.isfinite(curve.slope) and curve.n_missed else ""
         except ValueError:
             remark = "falling"
-    has_slope = curve is not None and np.isfinite(curve.slope)
     ends = (float(abs(end)) if np.isfinite(end) else np.inf for end in limits[1:])
     return {
         "family": family,
-        "is_damage": bool(severities[0] > 0),
         "severities": severities,
         "rates": rows["rate"].to_numpy(dtype=float),
         "smallest": limits[0],
-        "is_least": bool(limits[0] == severities[0]),
-        "least": float(abs(severities[0])),
-        "largest": float(abs(severities[-1])),
         "bounds": list(dict.fromkeys(ends)),
-        "on_curve": [abs(curve.a90), abs(curve.a90_95)] if has_slope else [],
         "curve": curve,
-        "has_slope": has_slope,
+        "has_slope": curve is not None and np.isfinite(curve.slope),
         "remark": remark,
     }
 
@@ -215,7 +193,7 @@ def draw_damage_indices(shown: Mapping[str, pd.Series], threshold: float, onset:
 def draw_curve(finding: Row, title: str, alt: str) -> Drawing:
     """Probability of detection of one family of scenarios."""
     fitted, is_curve = finding["curve"], finding["has_slope"]
-    marks = is_curve and max(finding["on_curve"]) <= finding["largest"]  # no extrapolation
+    marks = is_curve and max(abs(fitted.a90), abs(fitted.a90_95)) <= abs(finding["severities"][-1])  # no extrapolation
     make = partial(PODCurveDisplay.from_predictions, fitted, label="fitted curve", marks=marks)
     names = ["observed", "fitted", "lowest", "highest"] if is_curve else ["observed"]
     shares = [np.asarray(fitted.n_detected) / np.asarray(fitted.n_records), *fitted.predict(fitted.severities)]
@@ -228,24 +206,22 @@ def draw_curve(finding: Row, title: str, alt: str) -> Drawing:
 def records_of(T: pd.DataFrame, F: pd.DataFrame) -> dict[str, Any]:
     """Number, period and usual distance of records, and ranges of their temperatures and frequencies."""
     columns = columns_by_sensor(T)
-    sensors = [
-        range_of(name if len(found) > 1 else T.columns[found[0]], T.iloc[:, found[0]]) | {"n_lags": len(found) - 1}
-        for name, found in columns.items()
-    ]
+    names = [name if len(found) > 1 else T.columns[found[0]] for name, found in columns.items()]
+    sensors = T.iloc[:, [found[0] for found in columns.values()]].set_axis(names, axis=1)
     has_times = isinstance(F.index, pd.DatetimeIndex) and len(F) > 1
     return {
         "n": len(F),
         "period": period_text(F.index),
         "step": pd.Series(F.index).diff().abs().median() if has_times else None,
-        "sensors": sensors,
-        "modes": [range_of(name, values) | {"n_lags": 0} for name, values in F.items()],
+        "sensors": ranges_of(sensors, [len(found) - 1 for found in columns.values()]),
+        "modes": ranges_of(F),
     }
 
 
-def range_of(name: object, values: pd.Series) -> Row:
-    """Lowest, mean and highest value, and the share that is missing."""
-    ends = {"lowest": values.min(), "mean": values.mean(), "highest": values.max()}
-    return {"name": name, **ends, "missing": values.isna().mean()}
+def ranges_of(table: pd.DataFrame, n_lags: Sequence[int] | int = 0) -> list[Row]:
+    """Lowest, mean and highest value of each column, and the share that is missing."""
+    ends = table.agg(["min", "mean", "max"]).T.set_axis(["lowest", "mean", "highest"], axis=1)
+    return rows_of(ends.assign(missing=table.isna().mean(), n_lags=n_lags))
 
 
 def training_tables(fem: DataInformedFEM) -> list[pd.DataFrame]:

@@ -176,9 +176,9 @@ def test_a_ranking_says_who_is_behind_who_is_loud_and_who_failed():
 def test_a_ranking_comes_from_a_study_with_the_limit_that_was_asked():
     asked = []
     study = SimpleNamespace(scenarios=[], results_=None)
-    study.ranking = lambda *given, by: asked.append((*given, by)) or RANKING
+    study.ranking = lambda *given: asked.append(given) or RANKING
     display = DetectorsDisplay.from_estimator(study, max_false_alarms=0.05, source="reference")
-    assert asked == [(0.05, "reference", "pod")]
+    assert asked == [(0.05, "reference")]
     assert limit_of(display) == 5
     bounds = ["pod_deficit_ci_low", "pod_deficit_ci_high"]
     display = DetectorsDisplay.from_predictions(
