@@ -46,6 +46,7 @@ class Bridge:
         self.code = HEALTHY
         self.status_: MonitorStatus | None = None
         self.records: dict[str, Any] | None = None
+        self.metrics_file: Path | None = None
         self.lines: list[str] = []
         self.transitions: list[dict[str, Any]] = []
         self.written: list[Path] = []
@@ -54,7 +55,10 @@ class Bridge:
     def attempt(self, command: str) -> Exception | None:
         """Do the work of a command, which fails on this bridge alone; the error."""
         try:
-            self.name = self.file.stem if self.settings is None else self.settings.name
+            if self.settings is not None:
+                self.name = self.settings.name
+                if self.settings.files.metrics and command != "status":  # which changes nothing
+                    self.metrics_file = self.settings.path(self.settings.files.metrics)
             getattr(self, command)()
         except Exception as error:  # Python's own exit code of an error would be that of an alarm
             self.code, self.lines, self.state = FAILED, [], None
@@ -73,13 +77,6 @@ class Bridge:
         return read_settings(self.file) if self.file.suffix == ".toml" else None
 
     @property
-    def needed_settings(self) -> Settings:
-        """Settings, for what needs them."""
-        if self.settings is None:
-            raise ValueError(f"{self.file} is no file of settings; expected a monitor.toml, as init writes it")
-        return self.settings
-
-    @property
     def monitor_file(self) -> Path:
         return self.file if self.settings is None else self.settings.path(self.settings.files.monitor)
 
@@ -87,15 +84,6 @@ class Bridge:
     def taken_file(self) -> Path:
         """What was taken in from which files; named after the monitor, whose lock it is under."""
         return self.monitor_file.with_name(f"{self.monitor_file.name}.taken.json")
-
-    @property
-    def metrics_file(self) -> Path | None:
-        """Where metrics are written after each command but status, which changes nothing; None for nowhere."""
-        try:
-            metrics = None if self.settings is None else self.settings.files.metrics
-        except (OSError, ValueError):  # of settings with an error, which is reported
-            return None
-        return None if not metrics or self.options.name == "status" else self.settings.path(metrics)
 
     def alone(self) -> Any:
         """Be the only process that changes the monitor."""
@@ -156,7 +144,9 @@ class Bridge:
 
     def fit(self) -> None:
         """Fit a monitor to its baseline, and save it."""
-        settings, file = self.needed_settings, self.monitor_file
+        settings, file = self.settings, self.monitor_file
+        if settings is None:
+            raise ValueError(f"{file} is no file of settings; expected a monitor.toml, as init writes it")
         paths = [settings.path(name) for name in settings.records.baseline]
         records, layouts = read_baseline(paths, settings.csv, settings.records)
         baseline = records if settings.records.until is None else records[: settings.records.until]
@@ -223,9 +213,8 @@ class Bridge:
 
         sources: list[tuple[Path, pd.Timestamp | None]] = [(file, None) for file in named]
         if not named:
-            records = self.needed_settings.records
-            later = records.baseline if records.until else []
-            sources += [(file, None) for file in files_in(settings.path(records.folder))]
+            later = settings.records.baseline if settings.records.until else []
+            sources += [(file, None) for file in files_in(settings.path(settings.records.folder))]
             sources += [(settings.path(name), monitor.baseline_.index[-1]) for name in later]
         found = []
         for file, after in sources:

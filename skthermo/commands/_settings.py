@@ -18,8 +18,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from types import UnionType
-from typing import Any, NamedTuple, Union, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
 import pandas as pd
@@ -297,11 +296,10 @@ def _checked(file: Path, content: Mapping[str, Any]) -> Settings:
         if name in content or name not in ("fem", "page")
     }
     for name in ("files", "records", "csv"):
-        maker = _called(name)[0]
-        for key, value in values[name].items():
-            if not fits(value, get_type_hints(maker)[key]):
-                expected = settings_of(maker)[key].kind
-                raise SettingError(f"[{name}] {key} is {value!r:.100}; expected {expected}", name, key)
+        kinds = {key: setting.kind for key, setting in settings_of(_called(name)[0]).items()}
+        if wrong := [key for key, value in values[name].items() if not fits(value, kinds[key])]:
+            got = f"[{name}] {wrong[0]} is {values[name][wrong[0]]!r:.100}"
+            raise SettingError(f"{got}; expected {kinds[wrong[0]]}", name, wrong[0])
     files, records, form = (_called(name)[0](**values[name]) for name in ("files", "records", "csv"))
     parts: dict[str, Any] = {name: _made(name, content[name]) for name in ("regression", "detector")}
     parts["features"] = [_made("features", one, number) for number, one in enumerate(content.get("features", ()))]
@@ -390,18 +388,13 @@ def class_named(name: Any, packages: Sequence[str]) -> type:
     raise ValueError(f"is {name!r}{_nearest(str(name), list(own), expected)}")
 
 
-def fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type."""
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin in (Union, UnionType):
-        return any(fits(value, one) for one in inner)
-    if origin is not None and issubclass(origin, Mapping):
-        return isinstance(value, Mapping) and all(fits(one, inner[1]) for one in value.values())
-    if origin is not None:
-        return isinstance(value, list) and all(fits(one, inner[0]) for one in value)
-    if hint is float:
-        return isinstance(value, int | float) and not isinstance(value, bool)
-    return isinstance(value, hint) and (hint is bool or not isinstance(value, bool))
+def fits(value: Any, kind: str) -> bool:
+    """Whether a value is of a kind, such as "str", "list of float" or "mapping of str to str"."""
+    outer, _, inner = kind.partition(" of ")
+    types = {"str": str, "int": int, "float": (int, float), "list": list, "mapping": dict}
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    is_right = isinstance(value, types[outer]) and not isinstance(value, bool)
+    return is_right and all(fits(one, inner.removeprefix("str to ")) for one in parts)
 
 
 def _nearest(name: str, known: Sequence[str] | Mapping[str, Any], expected: Sequence[str] | None = None) -> str:

@@ -221,7 +221,7 @@ def _parser() -> Parser:
 
 def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     """Do the work of a command on each bridge; the exit code."""
-    given = [_settings_in(file) for file in options.files]
+    given = [file / "monitor.toml" if (file / "monitor.toml").is_file() else file for file in options.files]
     files = [file for file in given if file.suffix in MONITORS]
     options.records = [file for file in given if file.suffix not in MONITORS]
     if empty := [file for file in given if file.is_dir() or not (file.suffix or file.exists())]:
@@ -258,12 +258,6 @@ def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
         except OSError as error:
             _failed(error, f"{file} was not written: ", facts)
     return facts["exit_code"]
-
-
-def _settings_in(path: Path) -> Path:
-    """The settings in a bridge's folder; any other path as it is."""
-    settings = path / "monitor.toml"
-    return settings if settings.is_file() else path
 
 
 def _say(bridge: Bridge, options: argparse.Namespace, number: int, error: Exception | None) -> None:

@@ -473,9 +473,7 @@ class DamageIndexDisplay(Display):
         last = last_step(estimator)
         if not hasattr(estimator, "score_samples"):
             raise ValueError(f"{estimator!r:.200} has no method 'score_samples'; expected an outlier detector")
-        threshold = getattr(last, "threshold_", None)
-        if threshold is None:
-            threshold = -getattr(last, "offset_", float("nan"))
+        threshold = getattr(last, "threshold_", -getattr(last, "offset_", np.nan))
         tables = X if isinstance(X, Mapping) else {"records": X}
         indices = {}
         for label, records in tables.items():
@@ -620,9 +618,8 @@ class DamageIndexDisplay(Display):
 
 def monitored(monitor: Any, start: Time, end: Time, by: str) -> dict[str, Any]:
     """Indices of a monitor's days or records, those in alarm apart, with its thresholds and events."""
-    missing = [name for name in ("days_", "events_", "evaluations_", "threshold_") if not hasattr(monitor, name)]
-    if missing:
-        raise ValueError(f"{monitor!r:.200} has no {missing}; expected a fitted Monitor, or records for a detector")
+    if not hasattr(monitor, "evaluations_"):
+        raise ValueError(f"{monitor!r:.200} has no evaluations; expected a fitted Monitor, or records for a detector")
     if by not in ("day", "record"):
         raise ValueError(f"by is {by!r}; expected 'day' or 'record'")
     evaluated, is_daily = monitor.evaluations_, by == "day"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -382,23 +383,21 @@ class DetectorsDisplay(Display):
         if isinstance(table, pd.Series) and len(table):
             return cls(**of_changes(table)).plot(**options)
         columns = set(table.columns) if isinstance(table, pd.DataFrame) and len(table) else set()
-        identified = {
-            of_causes: {"probability", "severity", "ci_low", "ci_high"},
-            of_shifts: {"measured", "explained", "standard_error"},
-            of_explanations: {"probability"},
-        }
-        for made, needed in identified.items():
-            if needed <= columns and "rate" not in columns:
-                return cls(**made(table)).plot(**options)
-        needed = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
-        if is_ranking := "within_limit" in columns:
-            bounds = [f"{name}{end}" for name in ("pod", "pod_deficit") for end in ("", "_ci_low", "_ci_high")]
-            needed = ["false_alarms", *bounds, "pod_at_equal_pfa", "significantly_worse"]
-        if missing := [name for name in needed if name not in columns]:
-            got = f"lacks the columns {missing}" if columns else f"is {table!r:.200}"
-            raise ValueError(f"table {got}; expected a ranking, or results with {needed}, and one row or more")
-        made = of_ranking(table, max_false_alarms) if is_ranking else of_results(table, scenarios, groups or {})
-        return cls(**made).plot(**options)
+        bounded = {f"{name}{end}" for name in ("pod", "pod_deficit") for end in ("", "_ci_low", "_ci_high")}
+        known = (
+            (bounded | {"false_alarms", "within_limit"}, partial(of_ranking, limit=max_false_alarms)),
+            ({"detector", "scenario", "rate", "pi_low"}, partial(of_results, scenarios=scenarios, groups=groups or {})),
+            ({"probability", "severity", "ci_low", "ci_high"}, of_causes),
+            ({"measured", "explained", "standard_error"}, of_shifts),
+            ({"probability"}, of_explanations),
+        )
+        made = next((made for needed, made in known if needed <= columns), None)
+        if made is None:
+            got = f"has the columns {sorted(map(str, columns))}" if columns else f"is {table!r:.200}"
+            raise ValueError(
+                f"table {got}; expected a ranking, results of a run, identified damage or smallest changes"
+            )
+        return cls(**made(table)).plot(**options)
 
     def plot(self, ax: Axes | np.ndarray | None = None) -> DetectorsDisplay:
         """Draw into axes.

@@ -31,19 +31,19 @@ def watched(standing: Standing, is_significant: bool, unexplained: list[int]) ->
 
     ``size`` orders bridges in one place: the larger, the worse. ``unexplained`` are numbers of its ended events.
     """
-    state, status, opened = standing.state, standing.status, standing.opened("damage")
-    threshold, peaks = float(standing.monitor.threshold_), standing.events["peak"]
+    state, status, threshold = standing.state, standing.status, float(standing.monitor.threshold_)
+    peak = max((event["peak"] for event in status.events), default=0.0)
     certain = [group for group in standing.drift or () if group["significant"]]
     lost = max([-group["change"] for group in certain], default=0.0)
     places = {
-        "alarm": ("significant" if is_significant else "open", opened["peak"].max()),
-        "watch": ("raised", standing.opened("watch")["peak"].max()),
+        "alarm": ("significant" if is_significant else "open", peak),
+        "watch": ("raised", peak),
         "attention": ("worn", lost),
         "not evaluated": ("silent", standing.now - standing.since),
     }
     place, size = places.get(state, ("drifting" if lost > 0 else "well", lost))
     if unexplained and state != "alarm":
-        place, size = "unexplained", peaks[unexplained].max()
+        place, size = "unexplained", standing.events.loc[unexplained, "peak"].max()
     month = midnights_between(standing.now - pd.Timedelta(days=30), standing.now)
     month = month[month >= standing.days.index[0]] if standing.has_records else month[:0]
     return {

@@ -173,8 +173,8 @@ class Standing:
 
 def monitor_facts(standing: Standing, structure: Structure | None = None) -> dict[str, Any]:
     """What the template of the page on a monitor is given."""
-    monitor, detector = standing.monitor, standing.monitor.detector_
-    parts = dict(detector.named_steps) if hasattr(detector, "named_steps") else {"detector": detector}
+    monitor = standing.monitor
+    parts = {"monitor": monitor, "detector": monitor.detector_, "model": monitor.fem}
     groups = monitor.smallest_changes_.groups if structure is not None else {}
     losses = {name: loss for name, loss in groups.items() if name in structure.groups and np.isfinite(loss)}
     return {
@@ -183,9 +183,7 @@ def monitor_facts(standing: Standing, structure: Structure | None = None) -> dic
         "monitor": monitor,
         "losses": losses,
         "draw_detectable": partial(draw_structure, structure, losses=losses),
-        "settings": settings_of(
-            {"monitor": monitor, **parts, "model": monitor.fem}, but=("monitor: detector", "monitor: fem")
-        ),
+        "settings": settings_of(parts, but=("monitor: detector", "monitor: fem")),
         "identified": None,
         "fleet": None,
     }
