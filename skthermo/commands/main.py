@@ -98,7 +98,7 @@ OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("--until", "discard", {"metavar": "TIME", "help": "last stamp (default: all records since)"}),
     ("--force", "refit", {"action": "store_true", "help": "take over whatever speaks against it"}),
 )
-"""Arguments and options, the commands that have them, and what argparse is told of them."""
+"""Arguments and options, the commands that have them, and their settings for argparse."""
 
 GAUGES: dict[str, tuple[str, Callable[[Mapping[str, Any]], Any]]] = {
     "damage_index": ("Damage index of the newest record that was evaluated", lambda status: status["index"]),

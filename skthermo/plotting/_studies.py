@@ -394,9 +394,7 @@ class DetectorsDisplay(Display):
         made = next((made for needed, made in known if needed <= columns), None)
         if made is None:
             got = f"has the columns {sorted(map(str, columns))}" if columns else f"is {table!r:.200}"
-            raise ValueError(
-                f"table {got}; expected a ranking, results of a run, identified damage or smallest changes"
-            )
+            raise ValueError(f"table {got}; expected a ranking, results, identified damage, or smallest changes")
         return cls(**made(table)).plot(**options)
 
     def plot(self, ax: Axes | np.ndarray | None = None) -> DetectorsDisplay:
