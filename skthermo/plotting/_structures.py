@@ -231,7 +231,9 @@ class StructureDisplay(Display):
         rest = {node: place @ axes for node, place in self.structure.nodes.items()}
         shapes = () if self.shapes is None else self.shapes.T
         moved = [moved_nodes(self.structure, shape, amplitude, axes) for shape in shapes]
-        width, height = np.ptp([place for places in (rest, *moved) for place in places.values()], axis=0)
+        seen = np.array([place for places in (rest, *moved) for place in places.values()])
+        (width, height), margin = np.ptp(seen, axis=0), 0.03 * np.ptp(seen, axis=0).max()
+        low, high = seen.min(axis=0) - margin, seen.max(axis=0) + margin
         ratio = float(np.clip(height / max(width, 1e-9), 0.12, 1.6))
         width = (5.0 if moved else 9.0) / max(ratio, 1.0)  # tall structures are as high as others are wide
         is_low = ax is None and ratio < 0.4  # a colour bar has no room beside it
@@ -253,8 +255,7 @@ class StructureDisplay(Display):
         for one in self.axes_:
             draw_supports(one, self.structure, rest, axes, size=7.0 if moved else 11.0)
             one.set_axis_off()
-            one.set_aspect("equal")
-            one.autoscale_view()
+            one.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         if not moved:
             shared.legend(self.axes_, ax is None, n_columns=5, side="lower")
         return self

@@ -123,6 +123,17 @@ def test_what_has_no_plane_is_drawn_as_matplotlib_sees_space(view):
         StructureDisplay.from_structure(structure, ax=space)
 
 
+def test_a_structure_along_a_line_has_room_for_its_lines_and_points():
+    nodes = {"a": (0, 0, 0), "b": (10, 0, 0)}
+    beam = Structure(
+        nodes, {"ab": Beam("a", "b", **BEAM, orientation=(0, 0, 1))}, {"a": "xyz rx ry rz", "b": "yz rx rz"}
+    )
+    display = StructureDisplay.from_structure(beam, [1.0])
+    low, high = display.ax_.get_ylim()
+    assert low < 0 < high
+    assert high - low == pytest.approx(0.6)
+
+
 def test_groups_get_a_colour_and_a_line_of_the_legend_each():
     display = StructureDisplay.from_structure(king_post(), groups=["ties", "post"], linewidth={"post": 4.0})
     assert len(display.members_["ties"].get_segments()) == 2
