@@ -90,14 +90,11 @@ RECIPES = {  # each but the last changes one more of the paper's choices
 }
 DEFAULT = "nothing imputed"
 EXPECTED_WARNINGS = (
-    ".*round-trip-error",
     ".*uncalibrated-model",
-    ".*few-rows",
+    ".*few-records",
     ".*outside-bounds",
-    ".*outside-training-weather",
-    ".*not-converged",
-    ".*outside-reduced-model",
-    ".*outside-reduced-bounds",
+    ".*other-weather",
+    ".*poor-fit",
     "Got `batch_size` less than 1",
 )
 

@@ -57,7 +57,7 @@ class SingleRecords:
         self.baseline = self.campaign(n_years=1)
         self.fem = DataInformedFEM(self.model, random_state=seed)
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message=".*(not-converged|outside-training-weather)")
+            warnings.filterwarnings("ignore", message=".*(poor-fit|other-weather)")
             self.fem.fit(self.baseline.temperatures, self.baseline.frequencies)
         self.regression = TemperatureMapper().fit(self.baseline.temperatures, self.baseline.frequencies)
         self.detector = MahalanobisDetector(contamination=0.02, threshold="quantile").fit(self.baseline.frequencies)
