@@ -24,10 +24,11 @@ from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._settings import (
     CLASSES,
-    SECTIONS,
+    REQUIRED,
     Files,
     RecordSettings,
     Settings,
+    called_by,
     class_named,
     read_settings,
     settings_of,
@@ -213,16 +214,16 @@ def _fits(form: CsvFormat, look: FileLook) -> bool:
 def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) -> str:
     """A section: what is chosen as settings, all others as comments with their defaults."""
     if kind is None:
-        maker, without = SECTIONS[name][0](), SECTIONS[name][1]
+        maker, without = called_by(name)
     else:
-        maker, without = class_named(kind, CLASSES[name]), ()
+        maker, without = class_named(kind, CLASSES[name]), []
     header = f"[[{name}]]" if name == "features" else f"[{name}]"
     lines = ["", _comment(text), header, *([f"class = {toml(kind)}"] if kind else [])]
     known = settings_of(maker, without) if maker.__module__.startswith("skthermo") else {}
     for key, setting in known.items():
         value = chosen.get(key, setting.default)
         is_new = key in chosen and value is not None and value not in ([], (), {}, setting.default)
-        is_chosen = setting.is_required or is_new or (key in chosen and name == "monitor")
+        is_chosen = setting.default is REQUIRED or is_new or (key in chosen and name == "monitor")
         shown = "..." if value is None else toml(value)
         lines += [_comment(setting.text, "## "), f"{'' if is_chosen else '# '}{key} = {shown}"]
     return "\n".join(lines)

@@ -30,6 +30,7 @@ from skthermo.monitoring import Monitor
 from skthermo.preprocessing.loggers.logger_files import CsvFormat
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
+REQUIRED = inspect.Parameter.empty  # the default of what has none
 NONE = "none"  # in a file, where a parameter may be None and is not by default
 
 
@@ -109,22 +110,15 @@ class Setting(NamedTuple):
     text: str
     kind: str
 
-    @property
-    def is_required(self) -> bool:
-        return self.default is inspect.Parameter.empty
 
-
-SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = {
-    "files": (lambda: Files, ()),
-    "records": (lambda: RecordSettings, ()),
-    "csv": (lambda: CsvFormat, ()),
-    "compensator": (lambda: CompensatedDetector, ("detector", "regressor", "targets")),
-    "monitor": (lambda: Monitor, ("detector", "targets", "reference", "fem")),
-    "fem": (lambda: import_module("skthermo.surrogate").DataInformedFEM, ("inverse", "mapper", "imputer")),
-    "page": (
-        lambda: import_module("skthermo.reporting").owner_report,
-        ("subject", "path", "identified", "detector", "max_false_alarms", "now"),
-    ),
+SECTIONS: dict[str, tuple[str, str]] = {
+    "files": ("skthermo.commands._settings.Files", ""),
+    "records": ("skthermo.commands._settings.RecordSettings", ""),
+    "csv": ("skthermo.preprocessing.loggers.logger_files.CsvFormat", ""),
+    "compensator": ("skthermo.detection.CompensatedDetector", "detector regressor targets"),
+    "monitor": ("skthermo.monitoring.Monitor", "detector targets reference fem"),
+    "fem": ("skthermo.surrogate.DataInformedFEM", "inverse mapper imputer"),
+    "page": ("skthermo.reporting.owner_report", "subject path identified detector max_false_alarms now"),
 }
 """What each section calls, imported when it is needed, and which parameters come from elsewhere."""
 
@@ -137,6 +131,13 @@ CLASSES: dict[str, tuple[str, ...]] = {
 
 OF_A_FIT = ("records", "features", "regression", "compensator", "detector", "monitor", "fem")
 """Sections of which changes take effect with the next fit."""
+
+
+def called_by(section: str) -> tuple[Callable[..., Any], list[str]]:
+    """What a section calls, and which parameters come from elsewhere."""
+    maker, without = SECTIONS[section]
+    module, _, name = maker.rpartition(".")
+    return getattr(import_module(module), name), without.split()
 
 
 def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
@@ -210,7 +211,7 @@ class Settings:
         options = dict(self.options["fem"])
         if not options:
             return None
-        return SECTIONS["fem"][0]()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
+        return called_by("fem")[0](_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
 
     def page(self) -> dict[str, Any]:
         """Arguments of the owner's page."""
@@ -291,16 +292,16 @@ def _checked(file: Path, content: Mapping[str, Any]) -> Settings:
     if lacking := [name for name in ("regression", "detector") if name not in content]:
         raise SettingError(f"there is no section [{lacking[0]}]; expected one, with class = a name", lacking[0])
     values = {
-        name: _known(name, content.get(name, {}), settings_of(*_called(name)))
+        name: _known(name, content.get(name, {}), settings_of(*called_by(name)))
         for name in SECTIONS
         if name in content or name not in ("fem", "page")
     }
     for name in ("files", "records", "csv"):
-        kinds = {key: setting.kind for key, setting in settings_of(_called(name)[0]).items()}
+        kinds = {key: setting.kind for key, setting in settings_of(called_by(name)[0]).items()}
         if wrong := [key for key, value in values[name].items() if not fits(value, kinds[key])]:
             got = f"[{name}] {wrong[0]} is {values[name][wrong[0]]!r:.100}"
             raise SettingError(f"{got}; expected {kinds[wrong[0]]}", name, wrong[0])
-    files, records, form = (_called(name)[0](**values[name]) for name in ("files", "records", "csv"))
+    files, records, form = (called_by(name)[0](**values[name]) for name in ("files", "records", "csv"))
     parts: dict[str, Any] = {name: _made(name, content[name]) for name in ("regression", "detector")}
     parts["features"] = [_made("features", one, number) for number, one in enumerate(content.get("features", ()))]
     options = {name: values.get(name, {}) for name in ("compensator", "monitor", "fem", "page")}
@@ -317,18 +318,12 @@ def _checked(file: Path, content: Mapping[str, Any]) -> Settings:
     return found
 
 
-def _called(name: str) -> tuple[Callable[..., Any], tuple[str, ...]]:
-    """What a section calls, and which parameters come from elsewhere."""
-    maker, without = SECTIONS[name]
-    return maker(), without
-
-
 def _known(name: str, given: Mapping[str, Any], known: Mapping[str, Setting], number: int = 0) -> dict[str, Any]:
     """Values of a section, which are parameters of what it calls: times as text, and None by a word."""
     for key in given:
         if key not in known:
             raise SettingError(f"[{name}] has no setting {key!r}{_nearest(key, known)}", name, key, number)
-    if lacking := [key for key, one in known.items() if one.is_required and key not in given]:
+    if lacking := [key for key, one in known.items() if one.default is REQUIRED and key not in given]:
         raise SettingError(f"[{name}] lacks {', '.join(lacking)}", name, "", number)
     is_time = datetime.date, datetime.time
     plain = {key: value.isoformat() if isinstance(value, is_time) else value for key, value in given.items()}

@@ -277,10 +277,11 @@ def _as_fleet(
     """Say which alarms are significant among those of several bridges, and write their page."""
     from skthermo.monitoring import Fleet  # a job of one bridge needs none
 
-    names = [bridge.name for bridge in bridges]
-    if len(set(names)) < len(names):
+    working = [bridge for bridge in bridges if bridge.state is not None]
+    loaded = {bridge.name: bridge.load for bridge in working}
+    if len(loaded) < len(working):
+        names = [bridge.name for bridge in working]
         raise ValueError(f"bridges are called {names}; expected another name for each, as in [files]")
-    loaded = {bridge.name: bridge.load for bridge in bridges if bridge.state is not None}
     try:
         fleet = Fleet.of_monitors(ReadWhenAsked(loaded), errors)
         facts["fleet"] = {"summary": fleet.summary(), "page": None, "discoveries": []}
