@@ -18,21 +18,11 @@ import pandas as pd
 from sklearn.pipeline import Pipeline
 
 import skthermo
+import skthermo.commands._settings as settings
 from skthermo._core.files import write_when_complete
 from skthermo._core.frames import usual_step
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected, warn_each
-from skthermo.commands._settings import (
-    CLASSES,
-    REQUIRED,
-    Files,
-    RecordSettings,
-    Settings,
-    called_by,
-    class_named,
-    read_settings,
-    settings_of,
-)
 from skthermo.preprocessing import ExponentialMeans, RecordFindings, check_records
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, PARQUET, CsvFormat, FileLook, read_file
 from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
@@ -64,7 +54,7 @@ class Proposal:
 
     read: LoggerRecords
     form: CsvFormat
-    records: RecordSettings
+    records: settings.RecordSettings
     baseline: pd.DataFrame
     findings: RecordFindings
     means: ExponentialMeans | None
@@ -80,7 +70,7 @@ class Proposal:
         if not len(baseline):
             raise ValueError(f"no record is from before {until}; the first is of {read.table.index[0]}")
         others = {"ignore": list(read.ignored), "convert": read.convert, "until": until}
-        records = RecordSettings(copies, **read.roles, **others)
+        records = settings.RecordSettings(copies, **read.roles, **others)
         T, F = baseline[records.temperatures], baseline[records.responses]
         units = set(read.units.values())
         chosen = TemperatureMapper().behind_means(T, F)
@@ -115,18 +105,18 @@ class Proposal:
 
         Of natural frequencies, those that know in which direction damage moves them.
         """
-        parts = {"features": [class_named(kind, CLASSES["features"])(**chosen) for kind, chosen, _ in self.features]}
-        parts["regression"] = class_named(REGRESSION, CLASSES["regression"])()
+        parts = {"features": [settings.class_named("features", kind)(**chosen) for kind, chosen, _ in self.features]}
+        parts["regression"] = settings.class_named("regression", REGRESSION)()
         are_frequencies = set(self.read.units.values()) == {HZ}
         kind = "DirectionalDetector" if are_frequencies else "MahalanobisDetector"
         falls = ", falls of frequencies with more weight than rises" if are_frequencies else ""
-        parts["detector"], tried = class_named(kind, CLASSES["detector"])(), []
+        parts["detector"], tried = settings.class_named("detector", kind)(), []
         ways: dict[str, dict[str, Any]] = {"each record for itself": {}}
         if self.step <= pd.Timedelta(hours=6):  # a day has enough records
             ways["the records of a day together"] = {"window": "1D"}
         for text, chosen in ways.items():
             options = {"compensator": chosen, "monitor": self.monitor_options}
-            made = Settings(Path(), {}, Files(), self.records, self.form, parts, options)
+            made = settings.Settings(Path(), {}, settings.Files(), self.records, self.form, parts, options)
             try:
                 with collected():  # the fit that follows gives them
                     smallest = made.monitor().fit(self.baseline).smallest_changes_
@@ -166,7 +156,7 @@ class Proposal:
             if copy.resolve() != look.file.resolve():
                 shutil.copyfile(look.file, copy)
         write_when_complete(file, self.text(name))
-        read_settings(file)  # what is written can be read
+        settings.read_settings(file)  # what is written can be read
         return file
 
     def text(self, name: str | None = None) -> str:
@@ -214,16 +204,16 @@ def _fits(form: CsvFormat, look: FileLook) -> bool:
 def _section(name: str, kind: str | None, chosen: Mapping[str, Any], text: str) -> str:
     """A section: what is chosen as settings, all others as comments with their defaults."""
     if kind is None:
-        maker, without = called_by(name)
+        maker, without = settings.called_by(name)
     else:
-        maker, without = class_named(kind, CLASSES[name]), []
+        maker, without = settings.class_named(name, kind), []
     header = f"[[{name}]]" if name == "features" else f"[{name}]"
     lines = ["", _comment(text), header, *([f"class = {toml(kind)}"] if kind else [])]
-    known = settings_of(maker, without) if maker.__module__.startswith("skthermo") else {}
+    known = settings.settings_of(maker, without) if maker.__module__.startswith("skthermo") else {}
     for key, setting in known.items():
         value = chosen.get(key, setting.default)
         is_new = key in chosen and value is not None and value not in ([], (), {}, setting.default)
-        is_chosen = setting.default is REQUIRED or is_new or (key in chosen and name == "monitor")
+        is_chosen = setting.default is settings.REQUIRED or is_new or (key in chosen and name == "monitor")
         shown = "..." if value is None else toml(value)
         lines += [_comment(setting.text, "## "), f"{'' if is_chosen else '# '}{key} = {shown}"]
     return "\n".join(lines)

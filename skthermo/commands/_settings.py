@@ -334,7 +334,7 @@ def _made(name: str, given: Mapping[str, Any], number: int = 0) -> Any:
     """An estimator of the class that a section names, and its parts."""
     values = dict(given)
     try:
-        maker = class_named(values.pop("class", None), CLASSES[name])
+        maker = class_named(name, values.pop("class", None))
     except ValueError as error:
         raise SettingError(f"[{name}] class {error}", name, "class", number) from error
     known = _known(name, values, settings_of(maker), number)
@@ -366,8 +366,9 @@ def _check_columns(records: RecordSettings) -> None:
             raise SettingError(text, "records", "convert")
 
 
-def class_named(name: Any, packages: Sequence[str]) -> type:
-    """A class of skthermo by its name, or one of scikit-learn by its module and name."""
+def class_named(section: str, name: Any) -> type:
+    """A class that a section may call: of skthermo by its name, of scikit-learn by its module and name."""
+    packages = CLASSES[section]
     rooms = [import_module(package) for package in packages if package.startswith("skthermo")]
     own = {one: getattr(room, one) for room in rooms for one in room.__all__}
     own = {one: found for one, found in own.items() if hasattr(found, "get_params")}

@@ -233,9 +233,7 @@ class PredictionDisplay(Display):
         ends = () if lowest is None else (like_first(lowest, "lowest"), like_first(highest, "highest"))
         if temperature is not None:
             check_same_rows(temperature, measured, ("temperature", "measured"))
-            table = as_table(temperature, "temperature")
-            if table.shape[1] != 1:
-                raise ValueError(f"temperature has {table.shape[1]} columns; expected one sensor")
+            table = as_table(temperature, "temperature", is_one=True)
             is_named = isinstance(temperature, pd.DataFrame) or getattr(temperature, "name", None) is not None
             options["temperature"] = table.iloc[:, 0].rename(table.columns[0] if is_named else "temperature")
         return cls._drawn(first, tables, *ends, label=labels[0], **options)
@@ -519,9 +517,7 @@ class DamageIndexDisplay(Display):
         for title, by_label in by_title.items():
             if not isinstance(by_label, Mapping) or not by_label:
                 raise ValueError(f"damage index is {by_label!r:.200}; expected one or more by label")
-            own = {str(label): as_table(one, f"damage index {label!r}") for label, one in by_label.items()}
-            if several := [label for label, table in own.items() if table.shape[1] > 1]:
-                raise ValueError(f"damage index {several[0]!r} has several columns; expected one")
+            own = {str(label): as_table(one, f"damage index {label!r}", is_one=True) for label, one in by_label.items()}
             tables[title] = own
             value = given.get(title)
             is_known = is_real(value) or (isinstance(value, pd.Series) and len(value) > 0)
@@ -744,14 +740,15 @@ def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:
     ax.text(x, y, text, transform=ax.transAxes, fontsize="small", color=GREY, bbox=box, **style)
 
 
-def as_table(values: ArrayLike, what: str, prefix: str = "f") -> pd.DataFrame:
+def as_table(values: ArrayLike, what: str, prefix: str = "f", *, is_one: bool = False) -> pd.DataFrame:
     """A frame of floats; the columns of an array are called f1, f2, ... and its rows by their numbers from 0."""
     if isinstance(values, pd.Series):
         values = values.to_frame(f"{prefix}1" if values.name is None else values.name)
     real_array(values, what)
     columns = as_columns(values)
-    if columns.ndim != 2 or not columns.size:
-        raise ValueError(f"{what} has shape {np.shape(values)}; expected one or more records (rows) and columns")
+    if columns.ndim != 2 or not columns.size or (is_one and columns.shape[1] > 1):
+        expected = "one column" if is_one else "one or more records (rows) and columns"
+        raise ValueError(f"{what} has shape {np.shape(values)}; expected {expected}")
     if isinstance(values, pd.DataFrame):
         return pd.DataFrame(columns, values.index, values.columns)
     return pd.DataFrame(columns, columns=[f"{prefix}{i + 1}" for i in range(columns.shape[1])])
