@@ -46,8 +46,8 @@ WITHIN = {  # what a package within a package may import, beside what its parent
     "surrogate": {"fem.affine", "preprocessing.checks"},  # polynomials of ln f, periods of records
     "detection": {"preprocessing.checks"},  # misplaced columns
     "monitoring": {"preprocessing.checks"},
-    "studies.detectability": set(),
-    "studies.identification": set(),
+    "studies.detectability": {"preprocessing.checks"},  # their records go through the gate
+    "studies.identification": {"preprocessing.checks"},
 }
 CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
 FILES = sorted(PACKAGE.rglob("*.py"))

@@ -284,52 +284,13 @@ def check_share(value: float, what: str) -> float:
     return float(value)
 
 
-class BridgeFleet(dict[str, FleetBridge]):
-    """The bridges of `make_fleet` by name.
-
-    Parameters
-    ----------
-    bridges : sequence of FleetBridge
-        In order.
-
-    Attributes
-    ----------
-    covariates : DataFrame
-        A row for each bridge: "kind", "material", "span" in m and "latitude" in degrees.
-
-    See Also
-    --------
-    make_fleet : How to make one.
-
-    Examples
-    --------
-    >>> from skthermo.datasets import make_fleet
-    >>> [name for name, bridge in make_fleet(20, random_state=0).items() if bridge.is_atypical]
-    ['bridge 007']
-    """
-
-    def __init__(self, bridges: Sequence[FleetBridge]):
-        super().__init__({bridge.name: bridge for bridge in bridges})
-
-    def __repr__(self) -> str:
-        kinds = pd.Series([bridge.kind for bridge in self.values()]).value_counts(sort=False)
-        counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-        atypical = sum(bridge.is_atypical for bridge in self.values())
-        return f"BridgeFleet({counts}; {atypical} with thermal laws of their own)"
-
-    @cached_property
-    def covariates(self) -> pd.DataFrame:
-        """Facts that the owner knows of each bridge, a row for each name."""
-        return pd.DataFrame.from_dict({name: bridge.covariates for name, bridge in self.items()}, orient="index")
-
-
 def make_fleet(
     n_bridges: int = 20,
     *,
     kinds: Sequence[str] = ("truss", "girder", "arch"),
     atypical: float = 0.05,
     random_state: int | np.random.RandomState | None = None,
-) -> BridgeFleet:
+) -> dict[str, FleetBridge]:
     """Synthetic fleet of bridges with known truth: trusses, girders and tied arches under their own climates.
 
     Every bridge has its own span, material, climate, thermometers, noise and stiffnesses. Bridges of one material share
@@ -351,9 +312,11 @@ def make_fleet(
 
     Returns
     -------
-    BridgeFleet
-        A mapping of names ("bridge 000", ...) to `FleetBridge`; its ``covariates`` are a table. Bridges are small until
-        their models and records are asked for, so that workers make these themselves.
+    dict of str to FleetBridge
+        Bridges by name ("bridge 000", ...), each with its FE ``model`` and ``groups``, ``records(days, ...)``, the
+        ``roles`` of its thermometers, its ``noise``, ``covariates`` ("kind", "material", "span" in m, "latitude" in
+        degrees), and its ``truth``. Bridges are small until their models and records are asked for, so that workers
+        make these themselves.
 
     Raises
     ------
@@ -372,13 +335,10 @@ def make_fleet(
     --------
     >>> from skthermo.datasets import make_fleet
     >>> fleet = make_fleet(20, random_state=0)
-    >>> fleet
-    BridgeFleet(7 truss, 7 girder, 6 arch; 1 with thermal laws of their own)
-    >>> fleet.covariates.head(3)
-                  kind  material  span  latitude
-    bridge 000   truss     steel  41.5     47.52
-    bridge 001  girder  concrete  28.4     51.71
-    bridge 002    arch     steel  90.6     53.14
+    >>> [name for name, bridge in fleet.items() if bridge.is_atypical]
+    ['bridge 007']
+    >>> fleet["bridge 001"].covariates
+    {'kind': 'girder', 'material': 'concrete', 'span': 28.4, 'latitude': 51.71}
     """
     n_bridges = positive_integer(n_bridges, "n_bridges")
     if isinstance(kinds, str) or not kinds or not set(kinds) <= set(KINDS):
@@ -394,4 +354,4 @@ def make_fleet(
         is_atypical = np.floor((round_ + 1) * atypical + phase) > np.floor(round_ * atypical + phase)
         atypical_law = ATYPICAL_LAWS[stream(root, k).randint(len(ATYPICAL_LAWS))] if is_atypical else None
         bridges.append(FleetBridge(f"bridge {k:03d}", kinds[turn], (root, k), atypical_law))
-    return BridgeFleet(bridges)
+    return {bridge.name: bridge for bridge in bridges}

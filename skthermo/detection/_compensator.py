@@ -28,8 +28,7 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
 from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
-from skthermo.preprocessing import set_aside
-from skthermo.preprocessing.checks import misplaced_columns
+from skthermo.preprocessing.checks import misplaced_columns, set_aside
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.sensors import SensorRegression, filled_text

@@ -9,7 +9,7 @@ from skthermo.fem._structure import ImportedStructure, Structure
 from skthermo.fem.affine import AffineModel, FrequencySurface, ReducedModel
 from skthermo.fem.elements import Bar, Beam, Element, Membrane, PointMass, Spring
 from skthermo.fem.external import CallableModel, difference_terms, load_affine, probe, read_triplets
-from skthermo.fem.modal import LocalModes, mac, match_modes, shape_components
+from skthermo.fem.modal import mac, match_modes, shape_components
 
 __all__ = [
     "AffineModel",
@@ -20,7 +20,6 @@ __all__ = [
     "FEModel",
     "FrequencySurface",
     "ImportedStructure",
-    "LocalModes",
     "Membrane",
     "PointMass",
     "ReducedModel",

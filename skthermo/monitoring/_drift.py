@@ -18,7 +18,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import SPACE, Sentences, counted, listed, percent, probability_text, significant
 from skthermo._core.warnings import warn_each
 from skthermo.fem.damage import ALL_GROUPS, read_groups
-from skthermo.preprocessing import set_aside
+from skthermo.preprocessing.checks import set_aside
 from skthermo.residuals.gaussian import Gaussian
 
 

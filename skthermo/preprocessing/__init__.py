@@ -8,9 +8,8 @@ from skthermo.preprocessing._impute import KNNGapImputer
 from skthermo.preprocessing._mode_tracker import ModeTracker
 from skthermo.preprocessing._past import ExponentialMeans, LagFeatures
 from skthermo.preprocessing._read_records import read_records
-from skthermo.preprocessing._residual_trend import residual_trend
 from skthermo.preprocessing._transformers import BiasAligner, HingeFeatures, SensorMeans
-from skthermo.preprocessing.checks import RecordFindings, SetAside, check_records, set_aside
+from skthermo.preprocessing.checks import RecordFindings, check_records
 from skthermo.preprocessing.folds import BlockedKFold
 
 __all__ = [
@@ -24,9 +23,6 @@ __all__ = [
     "ModeTracker",
     "RecordFindings",
     "SensorMeans",
-    "SetAside",
     "check_records",
     "read_records",
-    "residual_trend",
-    "set_aside",
 ]

@@ -19,7 +19,7 @@ def project_on_cones(products: Array, along: Array, which: NDArray[np.intp]) -> 
     The amounts a >= 0 that are closest to a row, min |w - B a|, depend on products alone: B'B of each cone, (n_cones,
     n_directions, n_directions), and ``along``, B'w of each row, (n_rows, n_directions), whose cone is ``which``. They
     are found by the active sets of Lawson and Hanson (1974), for all rows together: those with the same cone and active
-    set share an inverse (Van Benthem and Keenan, 2004).
+    set share an inverse (Van Benthem and Keenan, 2004), of the size of that set: there may be any number of directions.
     """
     lengths = np.sqrt(np.einsum("ijj->ij", products))
     scale = np.where(lengths > 0, lengths, 1.0)
@@ -90,16 +90,24 @@ def _move(
 
 def _solved(products: Array, along: Array, which: NDArray[np.intp], active: NDArray[np.bool_]) -> Array:
     """Least squares of rows in the directions of their active sets; zero in the others."""
-    codes = active @ (1 << np.arange(active.shape[1], dtype=np.int64)) + (which.astype(np.int64) << active.shape[1])
-    _, first, case = np.unique(codes, return_index=True, return_inverse=True)
-    both = active[first][:, :, np.newaxis] & active[first][:, np.newaxis, :]
-    alone = np.where(both, products[which[first]], 0.0)
-    alone += np.eye(active.shape[1]) * ~active[first][:, np.newaxis, :]
-    inverses = np.where(both, np.linalg.inv(alone), 0.0)
-    return np.einsum("ijk,ik->ij", inverses[case], along)
+    sets = np.hstack([np.packbits(active, axis=1), which[:, np.newaxis].astype("<i8").view(np.uint8)])
+    _, first, case = np.unique(sets.view(f"V{sets.shape[1]}").ravel(), return_index=True, return_inverse=True)
+    most = max(int(active[first].sum(axis=1).max(initial=0)), 1)
+    places = np.argsort(~active[first], axis=1, kind="stable")[:, :most]  # the active directions, before some others
+    used = np.take_along_axis(active[first], places, axis=1)
+    both = used[:, :, np.newaxis] & used[:, np.newaxis, :]
+    among = products[which[first][:, np.newaxis, np.newaxis], places[:, :, np.newaxis], places[:, np.newaxis, :]]
+    inverses = np.where(both, np.linalg.inv(np.where(both, among, np.eye(most))), 0.0)
+    solved = np.einsum("ijk,ik->ij", inverses[case], np.take_along_axis(along, places[case], axis=1))
+    amounts = np.zeros_like(along)
+    np.put_along_axis(amounts, places[case], solved, axis=1)
+    return amounts
 
 
 def _times(products: Array, amounts: Array, which: NDArray[np.intp]) -> Array:
-    if len(products) == 1:
-        return amounts @ products[0]
-    return np.einsum("ijk,ik->ij", products[which], amounts)
+    """Each row times the products of its cone."""
+    times = np.empty_like(amounts)
+    for cone in np.unique(which):
+        own = which == cone
+        times[own] = amounts[own] @ products[cone]
+    return times

@@ -270,8 +270,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             inverse with ``dofs``, whose order the sensors have.
         sample_weight : array-like of shape (n_samples,), optional
             Weight of each record in the fits of M2 and of the discrepancy; those of a series are matched to the rows of
-            a frame by index. Records of weight 0 do not train them and have no residuals; imputer, aligner and M1 see
-            all alike.
+            a frame by index. Their scale does not count. Records of weight 0 do not train them and have no residuals;
+            imputer, aligner and M1 see all alike.
 
         Returns
         -------
@@ -299,12 +299,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         F, self.y_is_vector_ = frequency_table(y)
         gate = check_records(T, frame_like(F, check_array(F, **options)), model=self.model)
         gate.refuse_meaningless(needs_all=True)
-        T, F, far, weights = (
-            gate.temperatures,
-            gate.frequencies,
-            gate.outliers.to_numpy(),
-            row_weights(sample_weight, X),
-        )
+        T, F, far = gate.temperatures, gate.frequencies, gate.outliers.to_numpy()
+        weights = row_weights(sample_weight, X)
+        if weights is not None:
+            weights = weights / weights[weights > 0].mean()  # penalties do not depend on their scale
         usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))  # outliers train nothing
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
         self._clone_parts(has_shapes=shapes is not None)

@@ -14,7 +14,7 @@ from skthermo._core.arrays import Array, as_columns, check_flag
 from skthermo._core.estimators import _fit_context, check_is_fitted
 from skthermo._core.frames import frame_like, has_stamps, like_targets, row_times
 from skthermo._core.warnings import collected, warn_each
-from skthermo.preprocessing import set_aside
+from skthermo.preprocessing.checks import set_aside
 from skthermo.surrogate._regression import TableRegressor, TemperatureMapper
 
 

@@ -48,7 +48,8 @@ from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.fem import evaluate
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import ExponentialMeans, HingeFeatures, set_aside
+from skthermo.preprocessing import ExponentialMeans, HingeFeatures
+from skthermo.preprocessing.checks import set_aside
 from skthermo.surrogate._means import chosen_means
 
 

@@ -216,8 +216,8 @@ for owner in (TRUSS, REDUCED):
 FULL = {"full": (TRUSS, models()), "bounds": (0.1, BOUNDED)}
 use("fem.ReducedModel", lambda **a: solved(fem.ReducedModel(**a)), usual="tol random_state", **FULL)
 LOCAL = TRUSS.local_modes(ROW)
-method("fem.LocalModes.shapes", LOCAL, usual="dofs")
-method("fem.LocalModes.derivatives", LOCAL, usual="dofs", columns=([0, 1], integers(6)))
+method("fem.modal.LocalModes.shapes", LOCAL, usual="dofs")
+method("fem.modal.LocalModes.derivatives", LOCAL, usual="dofs", columns=([0, 1], integers(6)))
 
 
 def member(cls, **extra):
@@ -1143,14 +1143,6 @@ fitted(
 RECORDS = {"temperatures": (T, weather(T, fixed=False)), "frequencies": (F, frequencies(F, fixed=False))}
 MODEL = (TRUSS, {cause: value for cause, value in models().items() if cause != "None"})
 use("preprocessing.check_records", **RECORDS, model=MODEL)
-use(
-    "preprocessing.set_aside",
-    lambda **a: preprocessing.set_aside(**a).others,
-    **RECORDS,
-    model=MODEL,
-    unit=("Hz", texts("empty")),
-)
-use("preprocessing.residual_trend", residuals=(F, table(F, fixed=False, rows=False)))
 fitted(
     OutlierDetector,
     (F, {}),
@@ -1545,17 +1537,13 @@ NOT_CALLED |= {
     "detection.DamageDetector": "abstract",
     "fem.Element": "a protocol",
     "fem.FEModel": "a protocol",
-    "fem.LocalModes": "made by a model's local_modes",
     "surrogate.FitReport": "made by a chain's fit",
     **dict.fromkeys(
         ("surrogate.refitted", "surrogate.resampled", "surrogate.with_model"),
         "called by studies, which check chains and models; refitted hands records to fit",
     ),
     "preprocessing.RecordFindings": "made by check_records",
-    "preprocessing.SetAside": "made by set_aside",
     "studies.IdentifiedDamage": "made by identify_damage",
-    "datasets.BridgeFleet": "made by make_fleet",
-    "datasets.FleetBridge": "made by make_fleet",
     "studies.PODCurve": "made by pod_curve",
     "fem.FrequencySurface": "made by chains, of what they have checked",
     **dict.fromkeys(("datasets.load_kw51", "datasets.load_z24"), "their tests damage files in every place"),
@@ -1570,7 +1558,6 @@ UNTRIED |= {
     "fem.AffineModel": {"contents"},
     "preprocessing.ExponentialMeans": {"half_lives", "sensors"},
     "preprocessing.check_records": {"unit"},
-    "preprocessing.set_aside": {"exclude", "is_baseline", "needs_all"},
     "reporting.owner_report": {"detector", "drift_limit", "fdr", "max_false_alarms", "now"},
     "studies.DetectabilityStudy": {"memory", "models", "n_replicates"},
     "studies.detection_task": {"columns", "gaps", "outliers"},
@@ -1586,10 +1573,10 @@ LEGAL |= {
     "reduce": {("true", "*"): "True takes the default tolerance"},
     "shapes": {("all nan", f"fem.{kind}.nominal_mac"): "NaN stays NaN" for kind in ("AffineModel", "ReducedModel")},
     "columns": {
-        ("too high", "fem.LocalModes.derivatives"): "more modes are kept than are given",
-        ("repeated", "fem.LocalModes.derivatives"): "a column may be asked for twice",
+        ("too high", "fem.modal.LocalModes.derivatives"): "more modes are kept than are given",
+        ("repeated", "fem.modal.LocalModes.derivatives"): "a column may be asked for twice",
     },
-    "dofs": {("empty", "fem.LocalModes.derivatives"): "documented: saves time where no shapes are wanted"},
+    "dofs": {("empty", "fem.modal.LocalModes.derivatives"): "documented: saves time where no shapes are wanted"},
     "phi_a": {("NaN inside", "fem.mac"): "NaN stays NaN"},
     "phi_b": {("NaN inside", "fem.mac"): "NaN stays NaN"},
     "weights": {("None", "preprocessing.KNNGapImputer"): "scikit-learn's word for uniform"},
@@ -1637,7 +1624,6 @@ for argument, name, causes, reason in (
     ("temperature", "datasets.steel_modulus", ["no columns"], EMPTY),
     ("y", "surrogate.TemperatureMapper", ["a series"], VECTORS),
     ("y", "surrogate.InverseSurrogate.fit", ["a series"], VECTORS),
-    ("residuals", "preprocessing.residual_trend", ["a series"], VECTORS),
     ("measured", "plotting.PredictionDisplay.from_predictions", ["a series"], VECTORS),
     ("temperature", "datasets.steel_modulus", ["a series"], VECTORS),
     ("frequencies", "preprocessing.check_records", ["a series"], VECTORS),

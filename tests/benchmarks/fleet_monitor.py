@@ -131,7 +131,8 @@ class Kind:
         fleet = {name: prepared(members[name], year) for name, year in years.items()}
         self.columns = list(next(iter(fleet.values()))[0])
         if FleetPrior:
-            self.prior = FleetPrior().fit(fleet, made.covariates.loc[list(members), ["material", "span"]])
+            covariates = pd.DataFrame({name: made[name].covariates for name in members}).T[["material", "span"]]
+            self.prior = FleetPrior().fit(fleet, covariates)
         else:
             self.mappers = [TemperatureMapper().fit(X, F) for X, F in fleet.values()]
         self.mean = FleetMean(fleet)

@@ -270,6 +270,11 @@ def evaluate(member, new, start, days, ways):
     return [{"bridge": new, "days": days, "way": way, "error": e, "inside": share} for way, (e, share) in found.items()]
 
 
+def covariates_of(bridges):
+    """A row for each bridge: its kind, material, span and latitude."""
+    return pd.DataFrame.from_dict({name: bridge.covariates for name, bridge in bridges.items()}, orient="index")
+
+
 def known_of(bridge, fleet):
     """Covariates of a bridge; a material that no bridge of the fleet has counts as unknown."""
     given = bridge.covariates
@@ -345,15 +350,15 @@ def main():
     )
     fleet = make_fleet(options.bridges, random_state=options.seed)
     strangers = make_fleet(options.newcomers, atypical=1.0, random_state=200 + options.seed)
-    strangers = type(strangers)(
-        [type(b)(f"atypical {n}", b.kind, b.seed, b.atypical_law) for n, b in strangers.items()]
-    )
+    strangers = {
+        f"atypical {n}": type(b)(f"atypical {n}", b.kind, b.seed, b.atypical_law) for n, b in strangers.items()
+    }
     member_of, of = {
         "frequencies": (Frequencies, "without FE models"),
         "chains": (Chain, "with FE models"),
     }[options.members]
     members, newcomers = ({name: member_of(b) for name, b in bridges.items()} for bridges in (fleet, strangers))
-    covariates, asked = pd.concat([fleet.covariates, strangers.covariates]), (options.days, options.starts)
+    covariates, asked = covariates_of({**fleet, **strangers}), (options.days, options.starts)
     rows = campaign_rows(members, covariates, np.array_split(list(members), options.groups), *asked)
     settings = f"new bridges {of}, one of {len(fleet)} each, in {options.groups} groups"
     shown_by(f"Error of the frequencies of a later year, %: {settings}", rows)

@@ -27,7 +27,6 @@ from structures import AgeingTruss
 
 from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring import Monitor, track_parameters
-from skthermo.preprocessing import residual_trend
 from skthermo.surrogate import TemperatureMapper
 
 YEARS, SMOOTHED, LEVEL, BAND, YEAR = 4, 60, 0.01, 1.96, 365
@@ -80,15 +79,19 @@ def regression(fem, T, F):
     year = both.index < both.index[0] + pd.Timedelta(days=365)
     compensator = TemperatureCompensator(TemperatureMapper(), targets=list(F))
     residuals = np.vstack([compensator.fit_transform(both[year]), compensator.transform(both[~year])])
-    trends = residual_trend(pd.DataFrame(residuals, both.index, F.columns))
-    change, errors = trends["change"], trends["standard_error"]  # relative, as the residuals
+    share = np.linspace(0, 1, len(both))
+    trends = [stats.linregress(share, column) for column in residuals.T]
+    change = np.array([trend.slope for trend in trends])  # relative, as the residuals
+    beside = residuals - residuals.mean(axis=0) - np.outer(share - share.mean(), change)
+    means = [part.mean(axis=0) for part in np.array_split(beside, 12)]
+    memory = np.maximum(len(beside) / 12 * np.var(means, axis=0, ddof=1) / beside.var(axis=0), 1.0)
+    errors = np.array([trend.stderr for trend in trends]) * np.sqrt(memory)
     found = stats.chi2.sf(((change / errors) ** 2).sum(), len(change)) <= LEVEL
     groups = list(AgeingTruss.groups)  # the others hardly move these frequencies
     slopes = -fem.damage_directions(groups).to_numpy().T
-    inverse = np.linalg.pinv(slopes / errors.to_numpy()[:, np.newaxis])
-    at_end, deviations = inverse @ (change / errors).to_numpy(), np.sqrt((inverse**2).sum(axis=1))
-    share = np.linspace(0, 1, len(both))[:, np.newaxis]
-    frames = (pd.DataFrame(share * row, both.index, groups) for row in (at_end, deviations))
+    inverse = np.linalg.pinv(slopes / errors[:, np.newaxis])
+    at_end, deviations = inverse @ (change / errors), np.sqrt((inverse**2).sum(axis=1))
+    frames = (pd.DataFrame(np.outer(share, row), both.index, groups) for row in (at_end, deviations))
     first = groups[int(np.argmax(np.abs(at_end) / deviations))]
     return *frames, found, {first}, both.index[0]
 

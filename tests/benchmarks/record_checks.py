@@ -17,7 +17,7 @@ from inside import ASIDE_KINDS
 from structures import slow_soil
 
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss_campaign
-from skthermo.preprocessing import HampelFilter, check_records, set_aside
+from skthermo.preprocessing import HampelFilter, check_records
 
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
@@ -243,7 +243,7 @@ def healthy_table(records):
     """By kind of records, how many have a false finding, and how many of their values are set aside."""
     rows = {}
     for name, (T, F) in records:
-        cleaned = set_aside(T, F, exclude={"no-rows"})
+        cleaned = check_records(T, F)
         n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(ASIDE_KINDS), 0).sum()
         counts = (1, bool(found(T, F) - ALSO), np.size(T) + np.size(F), n_values, len(cleaned.left_out))
         rows.setdefault(name, []).append(counts)

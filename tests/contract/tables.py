@@ -13,12 +13,12 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import Bunch
 
-from skthermo.datasets import make_fleet, make_truss, make_truss_campaign
+from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import match_modes
 from skthermo.metrics import error_table
 from skthermo.monitoring import Monitor, track_parameters
-from skthermo.preprocessing import check_records, residual_trend, set_aside
+from skthermo.preprocessing import check_records
 from skthermo.studies import (
     DetectabilityStudy,
     compare_extensions,
@@ -79,14 +79,9 @@ def results():
 def results_of_records():
     year = make_truss_campaign(samples_per_year=120, random_state=0)
     yield "datasets.make_truss_campaign", year
-    bridges = make_fleet(2, random_state=0)
-    yield "datasets.BridgeFleet.covariates", bridges.covariates
-    yield "datasets.FleetBridge.records", bridges["bridge 000"].records(10)
     T, F = year.temperatures.copy(), year.frequencies.copy()
     T.iloc[3, 0], F.iloc[5, 1] = -999.0, 900.0
     yield "preprocessing.RecordFindings", check_records(T, F)
-    yield "preprocessing.SetAside", set_aside(T, F)
-    yield "preprocessing.residual_trend", residual_trend(F - F.mean())
     yield "metrics.error_table", error_table(F, F * 1.01)
 
 

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from skthermo.datasets import make_kw51_campaign, make_truss_campaign
-from skthermo.preprocessing import LagFeatures, check_records, residual_trend, set_aside
+from skthermo.preprocessing import LagFeatures, check_records
+from skthermo.preprocessing.checks import set_aside
 
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
@@ -220,28 +221,6 @@ class TestOutliers:
         changed = F.copy()
         changed.iloc[300:, 0] *= 0.8
         assert "frequency-outliers" not in set(check_records(T, changed).table["what"])
-
-
-class TestTrend:
-    @pytest.mark.parametrize("rho", [0.0, 0.9])
-    def test_estimates_scatter_by_their_standard_errors(self, rho):
-        random, errors = np.random.default_rng(0), []
-        noise = random.standard_normal((1000, 200))
-        for row in range(1, 1000):
-            noise[row] = rho * noise[row - 1] + np.sqrt(1 - rho**2) * noise[row]
-        drift = np.linspace(0, 2, 1000)[:, np.newaxis]
-        table = residual_trend(noise + drift)
-        errors = (table["change"] - 2) / table["standard_error"]
-        assert 0.9 <= (errors.abs() < 2).mean() <= 0.99
-
-    def test_times_count_and_their_order_does_not(self):
-        stamps = pd.date_range("2025-01-01", periods=400, freq="D")
-        residuals = pd.DataFrame({"f": np.arange(400.0)}, stamps)
-        trend = residual_trend(residuals.sample(frac=1, random_state=0))
-        np.testing.assert_allclose(trend["change"], 399)
-        np.testing.assert_allclose(trend["per_year"], 365.25)
-        assert (trend["last"] > trend["first"]).all()
-        assert residual_trend(np.zeros((5, 1))).isna().all(axis=None)
 
 
 def test_findings_do_not_depend_on_the_order_of_rows():

@@ -17,7 +17,6 @@ from skthermo.preprocessing import (
     LagFeatures,
     SensorMeans,
     check_records,
-    set_aside,
 )
 
 YEAR = make_truss_campaign(random_state=0)
@@ -130,7 +129,7 @@ def test_polars_frames_come_out_of_the_gate_with_their_names():
         polars.DataFrame({name: table[name].to_numpy() for name in table})
         for table in (YEAR.temperatures, YEAR.frequencies)
     )
-    found = set_aside(T, F)
+    found = check_records(T, F)
     pd.testing.assert_frame_equal(found.frequencies, YEAR.frequencies.reset_index(drop=True))
     assert list(found.temperatures) == list(YEAR.temperatures)
 

@@ -136,3 +136,14 @@ def test_routing_changes_no_result():
     with config_context(enable_metadata_routing=True):
         on = clone(fem).fit(T, gaps)
         np.testing.assert_array_equal(on.predict(T, return_std=True), off.predict(T, return_std=True))
+
+
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_the_scale_of_weights_does_not_count(scale):
+    year = make_truss_campaign(samples_per_year=120, random_state=0)
+    fits = [
+        DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies, sample_weight=weights)
+        for weights in (None, np.full(120, scale))
+    ]
+    one, other = (fit.predict(year.temperatures) for fit in fits)
+    np.testing.assert_allclose(one, other, rtol=1e-9)

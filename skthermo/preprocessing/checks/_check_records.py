@@ -114,7 +114,6 @@ def check_records(
     See Also
     --------
     HampelFilter : Puts NaN in place of outliers.
-    residual_trend : The trend of residuals of any regression.
 
     Notes
     -----
@@ -212,7 +211,7 @@ def set_aside(
     --------
     >>> import warnings
     >>> from skthermo.datasets import make_truss_campaign
-    >>> from skthermo.preprocessing import set_aside
+    >>> from skthermo.preprocessing.checks import set_aside
     >>> year = make_truss_campaign(random_state=0)
     >>> year.temperatures.loc["2025-03", "T1"] = 484.667
     >>> with warnings.catch_warnings():

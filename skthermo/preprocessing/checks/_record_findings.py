@@ -138,7 +138,7 @@ class RecordFindings(SavesFrames):
     outliers : DataFrame of bool of shape (n_records, n_modes), optional
         Which frequencies are outliers, on the records' index.
     temperatures, frequencies : array-like or DataFrame, optional
-        The tables as they were given, NaN in place of values that cannot be measurements, as `set_aside` gives them.
+        The tables as they were given, NaN in place of values that cannot be measurements.
     left_out : dict, optional
         Columns that cannot be used, each with the reason.
 
@@ -256,7 +256,7 @@ class SetAside(SavesFrames):
     Examples
     --------
     >>> from skthermo.datasets import make_truss_campaign
-    >>> from skthermo.preprocessing import set_aside
+    >>> from skthermo.preprocessing.checks import set_aside
     >>> year = make_truss_campaign(random_state=0)
     >>> found = set_aside(year.temperatures, year.frequencies)
     >>> len(found.table), found.left_out

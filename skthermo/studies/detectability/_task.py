@@ -28,7 +28,7 @@ from skthermo._core.frames import Table, has_stamps, row_times, time_of
 from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
-from skthermo.preprocessing import set_aside
+from skthermo.preprocessing.checks import set_aside
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._rates import Rate, rate_of
 from skthermo.studies.detectability._simulation import (

@@ -15,7 +15,7 @@ from skthermo._core.arrays import Array, as_floats, check_dofs, check_noise, mea
 from skthermo._core.estimators import check_array
 from skthermo._core.text import counted, listed
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
-from skthermo.preprocessing import set_aside
+from skthermo.preprocessing.checks import set_aside
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.numbers import independent_records
 from skthermo.studies.identification._causes import Cause, changed

@@ -1,7 +1,7 @@
 """Defects of records are found: stuck sensors, kelvin, shifted clocks, markers."""
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.preprocessing import check_records, set_aside
+from skthermo.preprocessing import check_records
 
 year = make_truss_campaign(random_state=0)
 T, F = year.temperatures, year.frequencies
@@ -11,7 +11,7 @@ marked = T.copy()
 marked.loc["2025-03", "T1"] = -999.0
 high = F.copy()
 high.iloc[7, 2] *= 100
-aside = set_aside(marked, high)
+aside = check_records(marked, high)
 RESULTS = {
     "nothing": len(check_records(T, F).table),
     "stuck": check_records(stuck, F).table[["what", "column", "n_rows"]],
