@@ -758,7 +758,7 @@ use(
 
 def published(**values):
     """The paper's chain after one epoch."""
-    fem = surrogate.paper_chain(TRUSS, random_state=0, **values)
+    fem = surrogate.paper_chain(**values)
     mapper = "mapper__temperaturemapper" if values["lags"] is not None else "mapper"
     fem.set_params(**{"inverse__regressor__max_iter": 1, f"{mapper}__regressor__max_iter": 1})
     return fem.fit(T, F).predict(T)
