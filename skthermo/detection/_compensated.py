@@ -53,7 +53,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         Whether records are divided in two where, at one value of one input, the scatter of residuals changes, as when
         bearings freeze. Each regime has a detector of its own, and means are taken within a regime.
 
-        - ``"auto"``: at the value by which held-out weeks are clearly likelier, if there is one; never with a window.
+        - ``"auto"``: at the value by which held-out weeks are clearly likelier, if there is one; with a window, only if
+          two regimes of the first two thirds of the baseline have at most 4 % false alarms in the last third.
         - ``None``: no division.
         - A tuple of the name or position of an input, and the highest value of the first regime.
     cv : "contiguous", int, cross-validation splitter or iterable, default=None
@@ -179,7 +180,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         if hasattr(self.compensator_, "feature_names_in_"):
             self.feature_names_in_ = self.compensator_.feature_names_in_
         T, R = self.compensator_.inputs(X)[0], as_floats(residuals)
-        self.regime_ = self._chosen_regime(T, R)
+        self.regime_ = self._chosen_regime(X, T, R)
         regime = self._regime_of(T)
         self.means_ = None
         Z = as_frame(X, residuals)
@@ -357,18 +358,35 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         """Threshold of the first regime's detector over that of another regime."""
         return self.detectors_[0].threshold_ / self.detectors_[number].threshold_
 
-    def _chosen_regime(self, T: Any, R: Array) -> tuple[Any, float] | None:
+    def _chosen_regime(self, X: Any, T: Any, R: Array) -> tuple[Any, float] | None:
         """The input, by name or position, and the value at which records are divided."""
         names = column_names(T, "") if isinstance(T, pd.DataFrame) else list(range(T.shape[1]))
         if isinstance(self.regimes, tuple):
             if len(self.regimes) != 2 or self.regimes[0] not in names or not isinstance(self.regimes[1], Real):
                 raise ValueError(f"regimes is {self.regimes!r}; expected an input among {names}, and a value")
             return self.regimes[0], float(self.regimes[1])
-        if self.regimes is None or self.window is not None:
+        if self.regimes is None:
             return None
         far = np.abs(R - median(R)) > 8 * robust_deviation(R)
         found = change_of_scatter(as_floats(T), np.where(far, np.nan, R), self.compensator_.folds_)
-        return None if found is None else (names[found[0]], found[1])
+        if found is None or not (self.window is None or self._holds_later(X, T, names[found[0]], found[1])):
+            return None
+        return names[found[0]], found[1]
+
+    def _holds_later(
+        self, X: Any, T: Any, name: Any, value: float, *, most: float = 0.04, least_rows: int = 40
+    ) -> bool:
+        """Whether two regimes of the first two thirds have few false alarms in the last third.
+
+        Means over a window scatter so little that a slow change counts as damage in the narrower regime.
+        """
+        n_first = 2 * len(T) // 3
+        is_low = as_floats(T[name] if isinstance(T, pd.DataFrame) else T[:, name])[:n_first] <= value
+        if min(is_low.sum(), (~is_low).sum()) < least_rows:
+            return False
+        with collected():
+            earlier = clone(self).set_params(regimes=(name, value), cv=None).fit(X[:n_first])
+            return bool(np.mean(earlier.predict(X[n_first:]) == -1) <= most)
 
     def _regime_of(self, T: Any) -> Regimes:
         """The number of the regime of each record: 0 up to the value, 1 above; a missing input counts as above."""

@@ -4,6 +4,7 @@
 - `Footbridge`: a cable-stayed footbridge with two years of records every two hours. Asphalt, cables that sag, frost in
   the core of the deck, and bearings that stiffen as they freeze move its frequencies, and noise that lasts.
 - `slow_soil`: a girder whose soil follows the weather slowly.
+- `Site`: a girder whose bearings freeze, and an arch with moisture that nobody measures.
 - `Campaign`: records of one of `KNOWN` structures, and a chain that has learned them; later records with damage.
 - `AgeingTruss`: campaigns of a truss that ages for years, and chains that learn from their first year.
 """
@@ -23,7 +24,7 @@ from scipy.special import ndtri
 from sklearn.pipeline import make_pipeline
 from sklearn.utils import Bunch
 
-from skthermo.datasets import kw51_sensors, make_kw51, make_truss, make_truss_campaign
+from skthermo.datasets import kw51_sensors, make_fleet, make_kw51, make_truss, make_truss_campaign
 from skthermo.fem import AffineModel, Bar, Beam, PointMass, Spring, Structure, add_noise
 from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse
@@ -349,6 +350,78 @@ def soil_spoiled(clean, noise, correlation, gaps, outliers, drawn, rows):
     lost = persistent(missing, GAP_HOURS)[rows] < ndtri(share)
     outage = persistent(drawn[:, -1:], GAP_HOURS)[rows] < ndtri(gaps * OUTAGES)
     return np.where(lost | outage, np.nan, clean * (1 + relative))
+
+
+class Site:
+    """A bridge of ``make_fleet`` under laws of its own, three-hourly; the model that comes with it is a little wrong.
+
+    - "frozen girder": bearings that are seven times as stiff in frost, asphalt, concrete.
+    - "moist arch": steel, concrete with moisture of 20 days that no weather tells, and bearings on soil that follows
+      the air with 30 days.
+
+    The weather of the years 2024 and 2025 goes on; two thermometers have errors of .2 K.
+    """
+
+    KINDS = {"frozen girder": "girder", "moist arch": "arch"}
+
+    def __init__(self, name, seed=0):
+        self.bridge = next(
+            one for one in make_fleet(3, atypical=0.0, random_state=seed).values() if one.kind == self.KINDS[name]
+        )
+        self.name, self.seed, self.model = name, seed, self.bridge.model
+        self.index = pd.date_range("2024-01-01", "2026-01-01", freq="3h", inclusive="left", name="time")
+        weather = CLIMATE.weather(self.index[0], self.index[-1] + pd.Timedelta(hours=3), (seed, WEATHER))
+        rows = weather.index.get_indexer(self.index)
+        self.weather = {
+            part: Law(slope=0.0, hours=hours, sun=sun).temperature(weather)[rows]
+            for part, (hours, sun) in {
+                "air": (0.0, 0.5),
+                "steel": (3.0, 5.0),
+                "concrete": (12.0, 6.0),
+                "soil": (720.0, 0.0),
+            }.items()
+        }
+        self.theta = self._multipliers()
+        random = np.random.default_rng(seed)
+        self.noise = 0.003 * random.standard_normal((len(self.index), self.model.n_modes))
+        self.missing = random.random(self.noise.shape) < 0.05
+        self.temperatures = pd.DataFrame(
+            {name: self.weather[name] + 0.2 * random.standard_normal(len(self.index)) for name in ("air", "steel")},
+            self.index,
+        )
+
+    def _multipliers(self):
+        """By zone of the truth."""
+        air, steel, concrete, soil = self.weather.values()
+        asphalt = 1 - 0.02 * (steel - 10) + 0.3 / (1 + np.exp((steel - 2) / 3))
+        if self.name == "frozen girder":
+            stiff, bearings = 1 - 0.0012 * (concrete - 10), 1 + 6 / (1 + np.exp((air + 3) / 0.7))
+            zones = {
+                "west": stiff,
+                "east": stiff,
+                "pavement": asphalt,
+                "bearings": bearings,
+                "soil": 1 - 0.001 * (soil - 10),
+            }
+        else:
+            moisture = autoregression(np.random.default_rng(self.seed + 1), (len(self.index), 1), np.exp(-1 / 160))[
+                :, 0
+            ]
+            stiff = 1 - 0.0008 * (steel - 10)
+            zones = {"west": stiff, "east": stiff, "pavement": asphalt, "bearings": np.exp(-0.006 * (soil - 10))}
+            zones["girder"] = 1 - 0.0015 * (concrete - 10) + 0.01 * moisture
+        return np.column_stack([zones[name] for name in self.bridge.truth.parameter_names])
+
+    def records(self, year, damage=None):
+        """Temperatures and frequencies of a year side by side."""
+        rows = self.index.year == year
+        truth = self.bridge.truth.damaged(damage or {})
+        box = np.column_stack([0.99 * self.theta.min(axis=0), 1.01 * self.theta.max(axis=0)])
+        F = truth.reduced(box, random_state=0).frequencies(self.theta[rows]) * (1 + self.noise[rows])
+        modes = [f"f{mode + 1}" for mode in range(F.shape[1])]
+        return self.temperatures[rows].join(
+            pd.DataFrame(np.where(self.missing[rows], np.nan, F), self.index[rows], modes)
+        )
 
 
 TRAINING_DAYS, LATER_DAYS = 730, 90

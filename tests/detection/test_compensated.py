@@ -104,10 +104,20 @@ def test_regimes_are_found_where_scatter_changes_and_find_damage_on_warm_days():
     assert CompensatedDetector(targets=MODES).fit(YEAR).regime_ is None
 
 
+def test_with_a_window_two_regimes_have_to_hold_in_a_later_third():
+    """A loss that creeps after two thirds would be an alarm in the regime of little scatter."""
+    steady, creeping = frosty(0), frosty(0)
+    creeping.iloc[487:, 1:] *= 1 - np.linspace(0, 0.005, 243)[:, np.newaxis]
+    for window, records, has_two in ((None, creeping, True), ("2D", steady, True), ("2D", creeping, False)):
+        detector = whole(MahalanobisDetector(), targets=["f1", "f2", "f3"], window=window).fit(records)
+        assert (detector.regime_ is not None) == has_two
+        assert len(detector.detectors_) == 1 + has_two
+
+
 def test_the_baseline_is_the_history_of_later_windows_and_batches_are_one_pass():
     stamps = pd.date_range("2025", periods=2 * len(YEAR), freq="D")
     records = pd.concat([YEAR, LATER]).set_axis(stamps)
-    detector = whole(MahalanobisDetector(), window="7D").fit(records[: len(YEAR)])
+    detector = whole(MahalanobisDetector(), window="7D", regimes=None).fit(records[: len(YEAR)])
     later = records[len(YEAR) :]
     index = detector.damage_index(later)
     assert index.notna().all()
