@@ -220,9 +220,10 @@ def paper_chain(
 
     Notes
     -----
-    Its detector is ``MahalanobisDetector(threshold="quantile")``. Networks learn logarithms of frequencies and
-    parameters, so that predictions are positive; in the paper, the values themselves. ``set_params(reduce="auto")``
-    solves a reduced model, which takes a fraction of the time where the FE model is large.
+    Its detector is ``MahalanobisDetector(threshold="quantile")``. Each network holds out a fifth of its rows, M2 of the
+    records that `fit` is given. Networks learn logarithms of frequencies and parameters, so that predictions are
+    positive; in the paper, the values themselves. ``set_params(reduce="auto")`` solves a reduced model, which takes a
+    fraction of the time where the FE model is large.
 
     Examples
     --------
@@ -230,7 +231,7 @@ def paper_chain(
     >>> from skthermo.surrogate import paper_chain
     >>> year = make_truss_campaign(random_state=0)
     >>> fem = paper_chain(make_truss(), bounds=0.2, n_samples=200, random_state=0)
-    >>> fem = fem.set_params(inverse__regressor__max_iter=20, mapper__regressor__max_iter=20)  # 1000 take 15 seconds
+    >>> fem = fem.set_params(inverse__regressor__max_iter=20, mapper__regressor__max_iter=20)  # of 1000
     >>> fem.fit(year.temperatures, year.frequencies).simulate(year.temperatures, damage={"bottom": 0.2}).shape
     (365, 6)
     """

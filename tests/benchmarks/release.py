@@ -93,6 +93,7 @@ PARTS = {
     "paper-kw51": Part("paper_tables.py --parts kw51"),
     "paper-appendix": Part("paper_tables.py --parts appendix"),
     "paper-lines": timing("paper_tables.py --parts lines"),
+    "paper-reduced": timing("paper_tables.py --parts reduced"),
     "false-alarms": Part("false_alarm_rates.py", "--baselines 6 --laws iid --days 365 --asked 1"),
     "nightly-call": timing("nightly_jobs.py --nights 3", "--nights 1 --bridges 2"),
     "solves": timing("solves.py --parts truss", "--quick --rounds 1"),
