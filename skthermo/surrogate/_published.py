@@ -100,7 +100,7 @@ class DropoutRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
         layers = self._layers(X, random)
         by_output = (layers[-1] - y) / len(X)
         of_coefs, of_intercepts = [], []
-        for inputs, coefs, rate in reversed(list(zip(layers, self.coefs_, self._rates, strict=False))):
+        for inputs, coefs, rate in reversed(list(zip(layers[:-1], self.coefs_, self._rates, strict=True))):
             of_coefs.append(inputs.T @ by_output + self.alpha / len(X) * coefs)
             of_intercepts.append(by_output.sum(axis=0))
             by_output = by_output @ coefs.T * (inputs > 0) / (1 - rate)

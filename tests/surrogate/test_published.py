@@ -135,6 +135,7 @@ def test_gaps_of_temperatures_and_frequencies_are_filled_together_so_that_all_ro
     holed_T, holed_F = gappy(T, 0), gappy(F, 1)
     fem = quick(lags=3).fit(holed_T, holed_F)
     assert fem.report_.rows.trained == len(T)
+    assert fem.report_.rows.filled.empty
     filled = KNNGapImputer(n_neighbors=10).fit_transform(np.hstack([holed_T, holed_F]))
     np.testing.assert_array_equal(fem.records_.inputs[:, ::3], filled[:, :3])
     whole = quick(lags=3).fit(
