@@ -91,13 +91,11 @@ def chain(name):
 
 
 EXPECTED_WARNINGS = (
-    ".*round-trip-error",
     ".*uncalibrated-model",
-    ".*few-rows",
+    ".*few-records",
     ".*outside-bounds",
-    ".*outside-training-weather",
-    ".*outside-reduced-model",
-    ".*outside-reduced-bounds",
+    ".*other-weather",
+    ".*poor-fit",
 )
 
 

@@ -25,7 +25,7 @@ from skthermo.studies import detection_task, sweep
 
 options = command_line().parse_args()
 warnings.filterwarnings("ignore", message=".*outside-prior")  # some of the coldest records, by their noise
-warnings.filterwarnings("ignore", message=".*few-baseline-records")  # one cold season scatters more than the rest
+warnings.filterwarnings("ignore", message=".*few-records")  # one cold season scatters more than the rest
 
 # %%
 # A baseline

@@ -105,7 +105,7 @@ colder = DetectabilityStudy(
     fem, {name: detectors[name] for name in few}, scenarios[:1], n_repeats=5, random_state=0, uncertainty="noise"
 )
 with warnings.catch_warnings():
-    warnings.filterwarnings("ignore", ".*outside-training-weather")  # as they are meant to be
+    warnings.filterwarnings("ignore", ".*other-weather")  # as they are meant to be
     colder.run(cold, baseline, reference=lambda scenario, seed: add_noise(clean_cold, 0.01, random_state=seed))
 rates = colder.results_.pivot(index="detector", columns="source", values="rate").loc[few]
 print((100 * rates.assign(**{"not colder": ranking["false_alarms"]})).round(1).to_string())

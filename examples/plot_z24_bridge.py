@@ -28,7 +28,7 @@ from skthermo.plotting import PredictionDisplay
 from skthermo.updating import sensitivity
 
 bridge, folder = read_arguments()
-warnings.filterwarnings("ignore", ".*outside-training-weather")  # counted below
+warnings.filterwarnings("ignore", ".*other-weather")  # counted below
 
 # %%
 # The model, before any data

@@ -30,7 +30,7 @@ from z24_recipes import GREY, PAVEMENT, REGIMES, Records, alarm_table, compensat
 from skthermo.plotting import DetectorsDisplay
 
 bridge, folder = read_arguments()
-warnings.filterwarnings("ignore", ".*outside-training-weather")
+warnings.filterwarnings("ignore", ".*other-weather")
 warnings.filterwarnings("ignore", ".*set-aside")  # one record, whose abutments would be nine times as stiff
 records = Records.of(bridge)
 

@@ -30,9 +30,8 @@ def write_synthetic_log(path, model, scatter, n_days=25):
 def quietly(function, *arguments):
     """Call a function without its warnings of unknown weather, rows after gaps and few weeks, which are known."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*outside-training-weather")
-        warnings.filterwarnings("ignore", ".*not-predicted")
-        warnings.filterwarnings("ignore", ".*weather-of-one-fold")
+        warnings.filterwarnings("ignore", ".*other-weather")
+        warnings.filterwarnings("ignore", ".*not-evaluated")
         return function(*arguments)
 
 

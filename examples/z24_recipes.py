@@ -91,7 +91,7 @@ def hold_out_table(bridge, ways=(True, False)):
         rows[f"{name}, T to F"] = [*direct, direct.mean(), 1.0]
         for track in ways:
             with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", ".*not-converged")
+                warnings.filterwarnings("ignore", ".*poor-fit")
                 fem = chain(bridge_model(track), regressor).fit(T, F)
             errors = mape(F_test, fem.predict(T_test))
             label = f"{name}, chain, {'tracked' if track else 'sorted'}"

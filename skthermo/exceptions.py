@@ -19,7 +19,7 @@ class SkthermoWarning(UserWarning):
     message : str, default=""
         Text of the warning.
     kind : str, default=""
-        Code of what the warning is about, such as "few-rows". The text ends with it in brackets; the guide's page on
+        Code of what the warning is about, such as "few-records". The text ends with it in brackets; the guide's page on
         warnings has an entry of this name.
 
     Examples

@@ -89,11 +89,13 @@ def names_in_two_files(trees):
 
 
 def kinds_of_warnings(tree):
-    """Kinds that the source gives to warnings; None where it does not show the text."""
-    for call in ast.walk(tree):
-        match call:
-            case ast.Call(func=ast.Name(id=name), args=[_, *_, kind]) if re.fullmatch(r"\w+Warning", name):
-                yield kind.value if isinstance(kind, ast.Constant) else None
+    """Kinds of warnings, each with the category that the source gives it; None in the table of findings' texts."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Name(id=name), args=[_, ast.Constant(value=kind)]) if name.endswith("Warning"):
+                yield kind, name
+            case ast.Assign(targets=[ast.Name(id="WARNINGS")], value=ast.Dict(keys=keys)):
+                yield from ((key.value, None) for key in keys)
 
 
 def hidden_state(tree):

@@ -50,10 +50,10 @@ PAGE = Path(__file__).parents[1] / "docs" / "reference" / "scikit_learn.rst"
 pytestmark = [  # scikit-learn checks detectors on 20 to 50 rows
     pytest.mark.filterwarnings(f"ignore:.*{cause}")
     for cause in (
-        "few-baseline-records",
-        "unit-of-temperatures",
+        "few-records",
+        "wrong-unit",
         "implausible-values",  # of normal values about 100, those above, as temperatures
-        "no-thermal-effect",
+        "different-rows",
         "windows.*not-evaluated",
     )
 ]
@@ -274,14 +274,14 @@ def test_every_estimator_is_listed():
     assert estimators == {type(estimator) for estimator in listed} - {InHundredths}
 
 
-@pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
+@pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)")
 def test_what_studies_monitors_and_priors_keep_has_a_trailing_underscore():
     for estimator, fit in [(STUDY, run(STUDY)), (MONITOR, fitted(MONITOR, YEAR))]:
         check_names_of_state(estimator, fit)
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
+@pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)")
 def test_metadata_routing_changes_no_result():
     def results(estimator, data):
         fit = fitted(estimator, *data)
@@ -322,7 +322,7 @@ def test_every_method_says_that_the_estimator_is_not_fitted():
     assert not wrong, "\n" + "\n".join(wrong)
 
 
-@pytest.mark.filterwarnings("ignore:.*not-predicted")
+@pytest.mark.filterwarnings("ignore:.*not-evaluated")
 @pytest.mark.parametrize("estimator", TRANSFORMERS_AND_DETECTORS, ids=lambda estimator: type(estimator).__name__)
 def test_fitted_estimators_are_pickled(estimator):
     fitted = pickle.loads(pickle.dumps(estimator)).fit(RECORDS)

@@ -23,7 +23,7 @@ from tests.fem.frames import FRAME
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra 'distributed' brings it")
 pytestmark = pytest.mark.filterwarnings(
     "default",  # Dask's own warnings are not tested
-    "ignore:.*(outside-bounds|outside-training-weather)",
+    "ignore:.*(outside-bounds|other-weather)",
     "ignore:.*mode-order",
 )
 

@@ -13,6 +13,7 @@ from tests.source import (
     constants,
     constructors_called_of,
     hidden_state,
+    kinds_of_warnings,
     names_in_two_files,
     private_imports,
     trees,
@@ -23,7 +24,13 @@ WARNS = "_core/warnings.py"  # finds the user's line, and collects the warnings 
 ALLOWED = {
     WARNS: {"the caller's frames", "filters of warnings"},  # one function finds the user's line
 }
-AT_MOST = {"constants": 300, "constructors called of": 0, "names in two files": 0, "tests with private imports": 15}
+AT_MOST = {
+    "constants": 300,
+    "constructors called of": 0,
+    "kinds of warnings": 30,
+    "names in two files": 0,
+    "tests with private imports": 15,
+}
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +85,11 @@ def test_constructors_say_what_they_learn_or_read(files):
 def test_no_two_classes_or_constants_share_a_name(files):
     found = names_in_two_files(files)
     assert len(found) <= AT_MOST["names in two files"], found
+
+
+def test_few_kinds_of_warnings(files):
+    found = {kind for tree in files.values() for kind, _ in kinds_of_warnings(tree)}
+    assert len(found) <= AT_MOST["kinds of warnings"], sorted(found)
 
 
 def test_few_tests_look_inside():

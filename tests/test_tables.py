@@ -26,7 +26,7 @@ TRANSFORMERS = [
     TemperatureCompensator(make_pipeline(LagFeatures(2), Ridge()), targets=[1, 2]),
 ]
 DETECTORS = [MahalanobisDetector(), OutlierDetector(OneClassSVM())]
-UNRELATED = pytest.mark.filterwarnings("ignore:.*(no-thermal-effect|not-predicted)")  # of RECORDS
+UNRELATED = pytest.mark.filterwarnings("ignore:.*(different-rows|not-evaluated)")  # of RECORDS
 each_transformer = pytest.mark.parametrize("estimator", TRANSFORMERS, ids=lambda one: type(one).__name__)
 each_estimator = pytest.mark.parametrize("estimator", TRANSFORMERS + DETECTORS, ids=lambda one: type(one).__name__)
 
@@ -38,7 +38,7 @@ def output(estimator, X):
 # Missing values
 
 
-@pytest.mark.filterwarnings("ignore:2 of 60.*not-predicted")
+@pytest.mark.filterwarnings("ignore:2 of 60.*not-evaluated")
 @UNRELATED
 @each_estimator
 def test_masked_values_are_missing_to_estimators(estimator):

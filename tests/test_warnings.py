@@ -9,6 +9,7 @@ from sklearn.base import clone
 from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 
+from skthermo._core.warnings import one_of_each_kind
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, WeatherWarning
@@ -60,6 +61,15 @@ def test_a_fit_warns_at_most_once_of_a_kind_and_equal_records_in_equal_words(fit
     assert [str(one.message) for one in given(fit)] == [str(one.message) for one in found]
 
 
+def test_findings_of_one_kind_are_one_warning_that_hides_none():
+    findings = [FewRecordsWarning(text, "few-records") for text in ("a", "b", "a", "c", "d", "e")]
+    others = [RecordsWarning("z", "set-aside")]
+    joined, alone = one_of_each_kind([*findings, *others])
+    assert (str(alone), type(joined), joined.kind) == ("z [set-aside]", FewRecordsWarning, "few-records")
+    assert all(text in joined.args[0] for text in ("a", "b", "c", "2 more"))
+    assert one_of_each_kind(findings[:1])[0].args == findings[0].args
+
+
 def test_filters_tell_categories_apart():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -71,6 +81,6 @@ def test_filters_tell_categories_apart():
 
 
 def test_the_code_ends_the_text_also_of_a_copy():
-    warning = FewRecordsWarning("3 records", "few-rows")
+    warning = FewRecordsWarning("3 records", "few-records")
     again = pickle.loads(pickle.dumps(warning))
-    assert (str(again), again.kind) == (str(warning), "few-rows") == ("3 records [few-rows]", "few-rows")
+    assert (str(again), again.kind) == (str(warning), "few-records") == ("3 records [few-records]", "few-records")

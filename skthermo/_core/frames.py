@@ -114,7 +114,7 @@ def marker_findings(X: ArrayLike) -> list[RecordsWarning]:
         RecordsWarning(
             f"some values look like codes for missing values: {', '.join(found)}. They are used as measured. Put NaN "
             "there",
-            "placeholders",
+            "doubtful-values",
         )
     ]
 

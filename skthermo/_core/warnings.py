@@ -9,12 +9,23 @@ from contextlib import contextmanager
 from skthermo.exceptions import SkthermoWarning
 
 
-def warn_each(findings: Iterable[SkthermoWarning]) -> None:
-    """Give at most one warning of each kind, at the nearest line outside skthermo, scikit-learn and joblib."""
-    first_of_kind: dict[str, SkthermoWarning] = {}
+def one_of_each_kind(findings: Iterable[SkthermoWarning], *, most: int = 3) -> list[SkthermoWarning]:
+    """Findings of one kind as one, whose text names at most three of them, and how many more there are."""
+    by_kind: dict[str, dict[str, SkthermoWarning]] = {}
     for finding in findings:
-        first_of_kind.setdefault(finding.kind, finding)
-    if not first_of_kind:
+        by_kind.setdefault(finding.kind, {}).setdefault(finding.args[0], finding)
+    joined = []
+    for kind, by_text in by_kind.items():
+        rest = f" (and {len(by_text) - most} more)" if len(by_text) > most else ""
+        category = type(next(iter(by_text.values())))
+        joined.append(category(". Also: ".join([*by_text][:most]) + rest, kind))
+    return joined
+
+
+def warn_each(findings: Iterable[SkthermoWarning]) -> None:
+    """Give one warning of each kind that was found, at the nearest line outside skthermo, scikit-learn and joblib."""
+    of_each_kind = one_of_each_kind(findings)
+    if not of_each_kind:
         return
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (
@@ -22,7 +33,7 @@ def warn_each(findings: Iterable[SkthermoWarning]) -> None:
         *("contextlib", "functools"),  # which call what is decorated
     ):
         frame, level = frame.f_back, level + 1
-    for finding in first_of_kind.values():
+    for finding in of_each_kind:
         warnings.warn(finding, stacklevel=level)
 
 

@@ -144,5 +144,5 @@ def read_baseline(
             f"{counted(len(waiting), 'stamp')} of the baseline are not in all files, the first {waiting.min()}. They "
             f"are left out; {len(whole)} records have all columns. If they are many, compare the clocks of the loggers"
         )
-        warn_each([RecordsWarning(text, "unmatched-stamps")])
+        warn_each([RecordsWarning(text, "different-rows")])
     return once(whole).sort_index(), [list(table) for table in tables]

@@ -103,7 +103,7 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
             f"{file} has the MD5 checksum {md5}, the published trackedmodes.zip has {PUBLISHED_MD5}. Its content may "
             "differ from what was published. Download it again, unless you changed it"
         )
-        findings.append(RecordsWarning(text, "other-kw51-file"))
+        findings.append(RecordsWarning(text, "read-as"))
     warn_each(findings)
     return KW51Monitoring(**data, is_published=is_published)
 
@@ -142,7 +142,7 @@ def _data(content: dict[str, object], file: Path) -> tuple[dict[str, Any], list[
             f"row {row}, column {channels[column]!r}: {env[row, column]:g}. They are used as measured. Compare the "
             "file with the published one, or put NaN there"
         )
-        findings.append(RecordsWarning(text, "placeholders"))
+        findings.append(RecordsWarning(text, "doubtful-values"))
     shapes = m.reshape(n_records, n_modes, len(sensors)).astype(complex, copy=False)
     for number, sensor in enumerate(sensors):
         for part in (shapes.real, shapes.imag):

@@ -255,7 +255,7 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
                     "the baseline has too few independent records (n_independent_) for a false-alarm rate of "
                     f"{self.contamination:.2g}: expected {np.ceil(1 / self.contamination - 1):.0f} or more. Later "
                     "records may raise several times as many alarms. Give a longer baseline, or a higher contamination",
-                    "few-baseline-records",
+                    "few-records",
                 )
             )
         warn_each(self.findings_)
@@ -373,5 +373,5 @@ def mean_log_density(densities: Array, present: NDArray[np.bool_]) -> tuple[floa
         text = (
             "more than half of the rows have no score: a value is missing there. Compare scores of the same rows only"
         )
-        findings.append(UnevaluatedRowsWarning(text, "rows-not-scored"))
+        findings.append(UnevaluatedRowsWarning(text, "not-evaluated"))
     return float(densities[known].sum() / present.sum()) if known.any() else float("nan"), findings

@@ -27,16 +27,16 @@ from skthermo._core.frames import column_names, frame_like, marker_findings, pos
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
-from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
+from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing.checks import misplaced_columns, set_aside
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.gaussian import Gaussian
-from skthermo.residuals.sensors import SensorRegression, filled_text
+from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import (
     BEYOND,
     Extrapolation,
     TrainingRange,
-    unpredicted_text,
+    unpredicted_findings,
     unseen_weather,
 )
 
@@ -354,8 +354,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         residuals = self._shrunk(residuals, inputs, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
         unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
-        text = unpredicted_text(unknown, as_floats(inputs))
-        findings += [*filled, *doubts, *as_findings(UnevaluatedRowsWarning, text, "not-predicted")]
+        findings += [*filled, *doubts, *unpredicted_findings(unknown, as_floats(inputs))]
         findings += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")
         return findings, frame_like(F, residuals)
 
@@ -436,7 +435,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         findings += [
             *self.training_range_.doubts(inputs),
             *self.sensors_.doubts(T),
-            *as_findings(UnevaluatedRowsWarning, unpredicted_text(unknown, as_floats(inputs)), "not-predicted"),
+            *unpredicted_findings(unknown, as_floats(inputs)),
         ]
         residuals = self._shrunk(self._difference(as_floats(F), predicted), inputs, predicted)
         return frame_like(F, residuals), inputs, findings
@@ -472,8 +471,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def _filled(self, T: Any) -> tuple[Any, list[SkthermoWarning]]:
         """Inputs whose gaps the other sensors fill, and a finding that names these."""
         values, deviations = self.sensors_.fill(T)
-        text = filled_text(deviations, column_names(T, "x"), "The spread of residuals includes the error of that")
-        return frame_like(T, values), as_findings(RecordsWarning, text, "filled-temperatures")
+        consequence = "The spread of residuals includes the error of that"
+        return frame_like(T, values), filled_findings(deviations, column_names(T, "x"), consequence)
 
     def _read_baseline(self, X: Any) -> tuple[Any, Any, list[SkthermoWarning]]:
         """Inputs and targets without values that cannot be, and findings."""
@@ -486,9 +485,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         named_T = pd.DataFrame(as_floats(T), index, np.delete(names, self.targets_))
         named_F = pd.DataFrame(as_floats(F), named_T.index, names[self.targets_])
         # inputs need not be temperatures, and may be constant
-        inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"constant"})
-        responses = set_aside(frequencies=named_F, unit="", needs_all=True)
-        findings = [*inputs.others.warnings(), *responses.others.warnings(), *misplaced_columns(named_T, named_F)]
+        inputs, of_inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"useless-column"})
+        responses, of_responses = set_aside(frequencies=named_F, unit="", needs_all=True)
+        findings = [*of_inputs, *of_responses, *misplaced_columns(named_T, named_F)]
         cleaned = (np.ascontiguousarray(as_floats(found.frequencies)) for found in (inputs, responses))
         T, F = (frame_like(table, values) for table, values in zip((T, F), cleaned, strict=True))
         return T, F, findings
@@ -511,8 +510,3 @@ def split_columns(X: Any, values: NDArray, targets: NDArray[np.intp]) -> tuple[A
     others = np.delete(np.arange(len(columns)), targets)
     T, F = (frame_like(X, np.ascontiguousarray(values[:, some]), columns[some]) for some in (others, targets))
     return T, F
-
-
-def as_findings(category: type[SkthermoWarning], text: str, kind: str) -> list[SkthermoWarning]:
-    """A finding of a text; none of an empty one."""
-    return [category(text, kind)] if text else []

@@ -13,7 +13,7 @@ from sklearn.covariance import EmpiricalCovariance
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import HasMethods, StrOptions
 from skthermo.detection._base import DamageDetector, conformal_threshold
-from skthermo.exceptions import FewRecordsWarning, ResultWarning, SkthermoWarning
+from skthermo.exceptions import FewRecordsWarning, SkthermoWarning
 from skthermo.preprocessing.folds import Rows, out_of_fold
 from skthermo.residuals.gaussian import Gaussian, check_invertible, modes_text
 
@@ -179,7 +179,7 @@ def most_likely(F: Array, names: Sequence[str] | None, findings: list[SkthermoWa
         text = (
             "gaps leave a part of the covariance nearly undetermined. Leave out the mode that is missing most, or give "
         )
-        findings.append(ResultWarning(text + "more records", "covariance-with-gaps"))
+        findings.append(FewRecordsWarning(text + "more records", "few-records"))
     learned = EmpiricalCovariance()
     learned.location_, learned.covariance_, learned.n_features_in_ = normal.mean, normal.covariance, F.shape[1]
     learned.precision_ = np.linalg.inv(normal.covariance / np.outer(scale, scale)) / np.outer(scale, scale)
@@ -195,7 +195,7 @@ def look_at_gaps(F: Array, names: Sequence[str] | None, findings: list[SkthermoW
     if (n_together == 0).any():
         pair = modes_text(np.isin(np.arange(F.shape[1]), np.argwhere(n_together == 0)[0]), names)
         text = f"{pair} never have a value in the same row: their correlation is inferred from the other modes. Leave "
-        findings.append(FewRecordsWarning(text + "one of them out, or give records with both", "modes-never-together"))
+        findings.append(FewRecordsWarning(text + "one of them out, or give records with both", "few-records"))
 
 
 def as_if_complete(distances: Array, F: Array) -> Array:

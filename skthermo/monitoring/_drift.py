@@ -798,10 +798,9 @@ class ParameterHistory(Sentences):
                 f"frequencies are a {type(F).__name__} with the columns {list(getattr(F, 'columns', []))}; expected a "
                 f"DataFrame on a DatetimeIndex with {list(self.shifts.columns)}"
             )
-        found = set_aside(
-            frequencies=F, exclude={"no-rows", "missing-column", "constant"}, needs_all=True, is_baseline=False
-        )
-        warn_each(found.others.warnings())
+        harmless = {"few-records", "useless-column"}
+        found, doubts = set_aside(frequencies=F, exclude=harmless, needs_all=True, is_baseline=False)
+        warn_each(doubts)
         days = self.shifts.index
         of_day = np.clip(days.searchsorted(F.index, side="right") - 1, 0, len(days) - 1)
         return frame_like(F, as_floats(found.frequencies) * np.exp(-self.shifts.to_numpy()[of_day]))
@@ -862,13 +861,12 @@ def _checked(fem: Any, T: Any, F: Any) -> tuple[pd.DataFrame, pd.DataFrame]:
         raise ValueError(f"the frequencies have the columns {list(F.columns)}; expected {fem.mode_names_}, as in fit")
     if not len(F):
         raise ValueError("F has 0 samples; expected at least one record")
-    found = set_aside(T, F, model=fem.model, exclude={"no-rows"})
-    warn_each(found.others.warnings(exclude={"unsorted-stamps"}))
+    in_order = (table.sort_index(kind="stable") for table in (T, F))
+    found, doubts = set_aside(*in_order, model=fem.model, exclude={"few-records"})
+    warn_each(doubts)
+    firsts = (table[~table.index.duplicated()] for table in (found.temperatures, found.frequencies))
     T, F = (
-        table.drop(columns=list(found.left_out), errors="ignore")
-        .reindex(columns=table.columns)[~table.index.duplicated()]
-        .sort_index()
-        for table in (found.temperatures, found.frequencies)
+        table.drop(columns=list(found.left_out), errors="ignore").reindex(columns=table.columns) for table in firsts
     )
     return T.dropna(axis=1, how="all"), F
 

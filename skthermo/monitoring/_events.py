@@ -328,7 +328,7 @@ class EventLevels:
                 f"the baseline has {counted_number(estimate.n_years, 'year', 2)} of records{without}: {asked:.2g} "
                 f"events are expected in it (0.4 tell the threshold {self.threshold:.3g}), and other seasons may "
                 f"have more. Now {seen}. Refit with a whole year, or allow more alarms a year",
-                "short-baseline",
+                "few-records",
             )
         if asked >= 0.4 and seen.is_relative and seen.common > 0.025:  # 5 % of the stiffness of the structure
             yield ResultWarning(
@@ -345,7 +345,7 @@ class EventLevels:
                 f"next {second:.3g}: chance explains that in fewer than 1 % of baselines. It raises the threshold to "
                 f"{self.threshold:.3g}, which may hide damage. Put NaN there if it is a fault or another state"
             )
-            yield RecordsWarning(text, "baseline-peak")
+            yield RecordsWarning(text, "doubtful-values")
 
 
 def whole_weeks(records: pd.DataFrame, most: int) -> pd.DataFrame:

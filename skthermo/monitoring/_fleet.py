@@ -341,7 +341,7 @@ def fit_fleet(
             "Their monitors restart without earlier records and events, which files ending in .replaced keep. To "
             "continue with monitors as they were, use Fleet(folder)"
         )
-        findings.append(SkthermoWarning(text, "monitors-restarted"))
+        findings.append(SkthermoWarning(text, "changed-settings"))
     warn_each(findings)
     return fleet
 

@@ -167,7 +167,7 @@ class Monitor(SavesFrames, Estimator):
         them, too.
     set_aside_ : DataFrame
         Values of the baseline that cannot be, and count as missing: a row for each finding, as in
-        `~skthermo.preprocessing.SetAside`.
+        `~skthermo.preprocessing.RecordFindings`.
     columns_, reference_, features_ : list
         Names of the columns that `fit` saw, which `update` expects, those of ``reference`` among them, and those that
         the detector sees.

@@ -26,9 +26,9 @@ from skthermo.detection import (
     TemperatureCompensator,
 )
 from skthermo.preprocessing import HampelFilter
-from skthermo.preprocessing.checks import SetAside, set_aside
+from skthermo.preprocessing.checks import RecordFindings, set_aside
 
-OF_TRAINING = frozenset({"no-rows", "missing-column", "constant"})  # gross errors that do no harm to a few records
+OF_TRAINING = frozenset({"few-records", "useless-column"})  # gross errors that do no harm to a few records
 
 
 def read_records(X: Any, columns: list[Any] | None = None, zone: Any = None) -> pd.DataFrame:
@@ -288,7 +288,9 @@ def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
     return wanted
 
 
-def usable_baseline(monitor: Any, baseline: pd.DataFrame) -> tuple[pd.DataFrame, BaseEstimator, Columns, SetAside]:
+def usable_baseline(
+    monitor: Any, baseline: pd.DataFrame
+) -> tuple[pd.DataFrame, BaseEstimator, Columns, RecordFindings]:
     """What can be used of a baseline, by which unfitted detector and columns, and what was set aside."""
     detector = None if monitor.detector is None else clone(monitor.detector)
     columns = Columns.assigned(monitor, list(baseline.columns), detector)
@@ -304,10 +306,10 @@ def usable_baseline(monitor: Any, baseline: pd.DataFrame) -> tuple[pd.DataFrame,
 
 def without_what_cannot_be(
     records: pd.DataFrame, targets: list[Any], units: Mapping[Any, str], **options: Any
-) -> tuple[pd.DataFrame, SetAside]:
+) -> tuple[pd.DataFrame, RecordFindings]:
     """Records with NaN where a value cannot be, and what was set aside, by options of `set_aside`."""
     T, F = records.drop(columns=targets), records[targets]
     unit = "Hz" if all(units[name] == "Hz" for name in targets) else ""
-    found = set_aside(T if len(T.columns) else None, F, unit=unit, **options)
+    found, _ = set_aside(T if len(T.columns) else None, F, unit=unit, **options)
     tables = [table for table in (found.temperatures, found.frequencies) if table is not None]
     return pd.concat(tables, axis=1)[list(records.columns)], found

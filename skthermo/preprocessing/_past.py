@@ -222,26 +222,14 @@ class LagFeatures(PastFeatures):
         if not reach or np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True):
             return []
         done = "are padded with the first record" if self.padding == "edge" else "lack lags"
-        return [
-            FewRecordsWarning(
-                f"lags reach {reach} rows back, and rows that have fewer rows before {done}. Give the {reach} rows "
-                "before, too, or a frame on a DatetimeIndex",
-                "no-earlier-records",
-            )
-        ]
+        return no_earlier_records(f"lags reach {reach} rows back, and the first rows {done}", f"{reach} rows")
 
     def _doubts_of_history(self, unknown: NDArray[np.bool_]) -> list[FewRecordsWarning]:
         """A finding where more than half of the rows have lags that reach before the first of them and find nothing."""
         if 2 * unknown.sum() <= len(unknown):
             return []
         reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
-        return [
-            FewRecordsWarning(
-                f"lags reach {reach} back, and most rows lack lags, for which there are no records. Give the {reach} "
-                "before, too",
-                "no-earlier-records",
-            )
-        ]
+        return no_earlier_records(f"lags reach {reach} back, and most rows lack lags", reach)
 
     def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
         n_rows, sensors = len(values), np.ascontiguousarray(values.T)
@@ -466,13 +454,13 @@ class ExponentialMeans(PastFeatures):
             return []
         is_timed = self.stamps_ is not None
         reach = duration_text(pd.Timedelta(self._longest)) if is_timed else f"{self._longest} rows"
-        return [
-            FewRecordsWarning(
-                f"most rows have too few records in the {reach} before, and their means are missing or of fewer "
-                f"records than the half-life asks for. Give the records of {MEAN_REACH} times {reach} before, too",
-                "no-earlier-records",
-            )
-        ]
+        few = f"most rows have too few records in the {reach} before for means with such a half-life"
+        return no_earlier_records(few, f"{MEAN_REACH} times {reach}")
+
+
+def no_earlier_records(found: str, needed: str) -> list[FewRecordsWarning]:
+    """The finding that features reach to where there are no records, and how many are needed."""
+    return [FewRecordsWarning(f"{found}. Give the records of {needed} before, too", "no-earlier-records")]
 
 
 def trailing_means(

@@ -200,7 +200,7 @@ class ReferenceModes(NamedTuple):
                 f"reference modes cannot be distinguished: {named}. A frequency can lie within "
                 f"max_shift={max_shift:g} of both, and {by}. One may be taken for the other. Use a smaller max_shift, "
                 "or more sensors",
-                "similar-modes",
+                "mode-order",
             )
         ]
 

@@ -95,7 +95,7 @@ def read_records(
             f"{counted(len(read.waiting), 'stamp')} are not in all files, the first {read.waiting.min()}. They are "
             f"left out; {len(read.table)} records have all columns. If they are many, compare the loggers' clocks"
         )
-        findings.append(RecordsWarning(text, "unmatched-stamps"))
+        findings.append(RecordsWarning(text, "different-rows"))
     warn_each(findings)
     return read.table[read.roles["temperatures"]], read.table[read.roles["responses"]]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skthermo._core.arrays import Array, as_floats, spread_evenly
 from skthermo._core.frames import frame_like, row_times
 from skthermo._core.warnings import collected
-from skthermo.exceptions import RecordsWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.weather import FAR_OUTSIDE, TrainingRange, parts
 
@@ -90,7 +90,7 @@ class SensorRegression:
                 f"{self.reach.names[int(excess.argmax())]!r} departs from the other sensors' prediction more than it "
                 "did in training. It drifts, is stuck or was moved, which moves predictions and gives false alarms. "
                 "Put NaN where it is wrong: the other sensors fill it",
-                "sensor-disagrees",
+                "faulty-sensor",
             )
         ]
 
@@ -140,13 +140,14 @@ class SensorRegression:
         return variances
 
 
-def filled_text(deviations: Array, names: Sequence[Any], consequence: str) -> str:
-    """Text of the warning that names sensors that were filled, from standard deviations; else an empty string."""
+def filled_findings(deviations: Array, names: Sequence[Any], consequence: str) -> list[SkthermoWarning]:
+    """The finding that sensors were filled, from standard deviations."""
     filled = (deviations > 0).any(axis=0)
     if not filled.any():
-        return ""
+        return []
     listed = ", ".join(repr(name) for name, is_filled in zip(names, filled, strict=True) if is_filled)
-    return (
+    text = (
         f"missing temperatures were filled from the other sensors: {listed}. {consequence}. If a sensor has failed, "
         "leave it out and fit again"
     )
+    return [RecordsWarning(text, "faulty-sensor")]

@@ -16,7 +16,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skthermo._core.arrays import Array, as_floats, means_of_known
 from skthermo._core.frames import column_names
-from skthermo.exceptions import RecordsWarning, WeatherWarning
+from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
 from skthermo.preprocessing.checks import Plausible
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
@@ -70,7 +70,7 @@ class TrainingRange:
                 f"temperatures are outside the training range by more than {FAR_OUTSIDE:.0%} of it: {names}. "
                 f"Predictions there are extrapolated (extrapolation_distance says how far). Give degrees Celsius"
                 f"{kelvin}, or train on such weather",
-                "outside-training-weather",
+                "other-weather",
             )
         ]
 
@@ -130,7 +130,7 @@ def implausible(known: TrainingRange, temperatures: Any) -> list[RecordsWarning]
         RecordsWarning(
             f"temperatures are implausible: {names}. Their predictions are wrong. Give degrees Celsius, and NaN where "
             "a value is missing",
-            "implausible-temperatures",
+            "doubtful-values",
         )
     ]
 
@@ -155,24 +155,23 @@ def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> l
         WeatherWarning(
             f"records of a fold are in weather that the other folds lack: {listed}. {consequence}. Train on a whole "
             "year, in folds that each have all seasons, such as blocks of a week",
-            "weather-of-one-fold",
+            "other-weather",
         )
     ]
 
 
-def unpredicted_text(
-    unknown: NDArray[np.bool_], weather: Array, others: str = "with lags that reach to no record"
-) -> str:
-    """Text of the warning of rows that cannot be predicted, for want of weather or as ``others`` says."""
+def unpredicted_findings(unknown: NDArray[np.bool_], weather: Array) -> list[SkthermoWarning]:
+    """The finding of rows that cannot be predicted, for want of weather or of earlier records."""
     if not unknown.any():
-        return ""
+        return []
     empty = np.isnan(weather).all(axis=1)
     causes = {
         "without any temperature": (unknown & empty, "A row needs a temperature of at least one sensor"),
-        others: (unknown & ~empty, "Lags need the records before a row: give these, too"),
+        "with lags that reach to no record": (unknown & ~empty, "Lags need the records before a row: give these, too"),
     }
     found = {cause: need for cause, (rows, need) in causes.items() if rows.any()}
-    return f"rows {', and rows '.join(found)} cannot be predicted and are NaN. {'. '.join(found.values())}"
+    text = f"rows {', and rows '.join(found)} cannot be predicted and are NaN. {'. '.join(found.values())}"
+    return [UnevaluatedRowsWarning(text, "not-evaluated")]
 
 
 def weather_coordinates(weather: Array, explained: float = 0.99) -> Pipeline:

@@ -334,13 +334,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             fit_checked(mapper, filled, named(filled, found.theta, self.parameter_names_), weights)
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
-            findings += [
-                *found.findings,
-                *of_mapper,
-                *of_model,
-                *([] if is_auto(self.reduce) else self.simulator_.doubts()),
-            ]
-            few_outliers = {"frequency-outliers"} if far.mean() <= 0.05 else ()
+            findings += [*found.findings, *of_mapper, *of_model]
+            few_outliers = {"doubtful-values"} if far.mean() <= 0.05 else ()
             of_records = [
                 *gate.warnings(exclude=few_outliers),
                 *misplaced_columns(T, F),
@@ -672,7 +667,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
             text = "the score leaves out most rows, which have gaps. Compare scores of the same rows only"
-            warn_each([UnevaluatedRowsWarning(text, "rows-not-scored")])
+            warn_each([UnevaluatedRowsWarning(text, "not-evaluated")])
         return complete_r2(y, predicted, row_weights(sample_weight, X))
 
     def __sklearn_tags__(self):

@@ -98,7 +98,7 @@ class FittedRows(SavesFrames):
             yield RecordsWarning(
                 f"temperatures were filled from the other sensors in more than half of the rows: {named(mostly)}. "
                 "Repair these sensors, or leave them out",
-                "filled-temperatures",
+                "faulty-sensor",
             )
 
 
@@ -107,7 +107,7 @@ def few_rows(what: str) -> FewRecordsWarning:
     return FewRecordsWarning(
         f"there are few records: {what}. The fit is unreliable. Give a year of records and fill their gaps, such as by "
         "imputer=KNNGapImputer(), or use fewer lags",
-        "few-rows",
+        "few-records",
     )
 
 
@@ -230,8 +230,8 @@ class FitReport(SavesFrames):
     def _sentences(self) -> list[str]:
         trained, *others = repr(self.rows).splitlines()
         lines = [trained, self.solved, *others]
-        kinds = set(self.findings.table["what"])  # the summary lists them
-        lines += [f"{capital(str(doubt))}." for doubt in self.doubts if doubt.kind not in kinds]
+        of_records = set(map(str, self.findings.warnings()))  # the summary lists them
+        lines += [f"{capital(str(doubt))}." for doubt in self.doubts if str(doubt) not in of_records]
         n_parameters, n_modes = len(self.parameters.deviations), len(self.modes)
         if n_parameters > n_modes:
             lines.append(
@@ -339,7 +339,7 @@ def doubts_of_modes(modes: pd.DataFrame, unexplained_offset: float) -> Iterator[
                 f"the inverse turns the model's nominal frequencies into parameters that miss {shares.idxmax()!r} "
                 "by more than measurements scatter around the predictions (see report_.modes). Detectors take this "
                 "error for damage. Raise n_samples, or use the default inverse",
-                "round-trip-error",
+                "uncalibrated-model",
             )
 
 

@@ -150,9 +150,10 @@ class FleetMapper(TableRegressor):
         """
         inputs, targets = self._read_xy(X, y, ("temperatures", "outputs"))
         self.parameter_names_ = [y.name] if getattr(y, "name", None) is not None else self.parameter_names_
-        harmless = ("no-rows", "stuck", "implausible-values", "constant")  # in rows of any order
+        harmless = ("few-records", "stuck", "implausible-values", "useless-column")  # in rows of any order
         with collected() as self.findings_:
-            inputs = np.asarray(set_aside(frame_like(X, inputs), exclude=harmless, needs_all=True).temperatures)
+            found, _ = set_aside(frame_like(X, inputs), exclude=harmless, needs_all=True)
+        inputs = np.asarray(found.temperatures)
         usable = ~(np.isnan(inputs).any(axis=1)[:, np.newaxis] | np.isnan(targets))
         if (usable.sum(axis=0) < 2).any():
             raise ValueError(

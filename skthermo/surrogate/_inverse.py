@@ -25,7 +25,7 @@ from skthermo._core.estimators import (
 from skthermo._core.frames import frame_like
 from skthermo._core.memory import remembered
 from skthermo._core.warnings import collected, warn_each
-from skthermo.exceptions import FewRecordsWarning, ModelWarning, SkthermoWarning
+from skthermo.exceptions import ModelWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel, add_noise, evaluate, sample
 from skthermo.metrics.errors import complete_r2
 from skthermo.surrogate._regression import FrequencyInverse, MultiplierRegressor, default_network
@@ -330,10 +330,10 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         if len(self.parameter_names_) <= self.model.n_modes:
             return []
         return [
-            FewRecordsWarning(
+            ResultWarning(
                 "there are more parameters than modes: frequencies cannot distinguish all parameters. Use more modes "
                 "or fewer parameters, or a PosteriorInverse",
-                "underdetermined",
+                "undetermined",
             )
         ]
 

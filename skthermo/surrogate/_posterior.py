@@ -27,7 +27,6 @@ from skthermo._core.arrays import (
     check_model,
     check_noise,
     check_prior,
-    is_auto,
     median,
     real_array,
     robust_deviation,
@@ -530,7 +529,7 @@ class ShapeInputs:
                 RecordsWarning(
                     "most measured modes lack a component of their shape at some sensor. Their shapes are not used. "
                     "Leave sensors that failed out of dofs",
-                    "few-shapes",
+                    "doubtful-shapes",
                 )
             )
         rows = spread_evenly(np.flatnonzero(~np.isnan(theta).any(axis=1)), 100)
@@ -543,11 +542,11 @@ class ShapeInputs:
         mode, sensor = np.unravel_index(excess.argmax(), excess.shape)
         if excess[mode, sensor] > 5:
             findings.append(
-                ModelWarning(
+                RecordsWarning(
                     f"measured shapes of {column_names(inputs, 'f')[mode]!r} are unlike those of the model at the "
                     f"parameters of the records, the most at sensor {sensor}. They distort the parameters. Check the "
                     "modes, and order, signs and gains of the sensors (dofs), or raise shape_noise",
-                    "foreign-shapes",
+                    "doubtful-shapes",
                 )
             )
         return findings
@@ -605,7 +604,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         Whether steps are taken on the reduced model ``model.reduced(bounds)`` within what the records need, much faster
         for large models. "auto" reduces where ``model.reduction_pays`` and a basis is accurate. True allows a relative
         error of 1e-5 in the frequencies, as "auto" does; a number sets the error allowed. Rows that end outside its box
-        are solved by the full model, with a warning that counts them (:doc:`/guide/costs`).
+        are solved by the full model (:doc:`/guide/costs`).
     memory : str or joblib.Memory, optional
         Folder for what `fit` learns and for the inversion of the records, so that searches and cross-validation make
         each only once. Clear it when the program behind a model of your own changes.
@@ -747,11 +746,9 @@ class PosteriorInverse(FrequencyInverse, Estimator):
                 FewRecordsWarning(
                     "fewer than 10 records teach the prior of the parameters and the noise of the modes. Both stay "
                     "near 1 to 3 %. Give prior and noise",
-                    "few-teaching-records",
+                    "few-records",
                 )
             )
-        if not is_auto(self.reduce):
-            self.findings_ += self.simulator_.doubts()
         warn_each(self.findings_)
         return self
 
@@ -809,8 +806,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
               they have reached;
             - ``by_full_model`` (n_samples,): whether the full model was solved for the row because steps ended outside
               the box of the reduced one;
-            - ``findings``, a list: warnings that more than 1 % of the rows have not converged, or were solved by the
-              full model.
+            - ``findings``, a list: a warning if more than 1 % of the rows have not converged.
 
         Examples
         --------
@@ -874,22 +870,13 @@ def unconverged(found: Bunch) -> NDArray[np.bool_]:
 
 
 def doubts_of(found: Bunch, *, many: float = 0.01) -> list[ModelWarning]:
-    """Findings that many rows have not converged, or were solved by the full model."""
-    findings = []
-    if unconverged(found).sum() > many * len(found.weight):
-        findings.append(
-            ModelWarning(
-                "parameters of many records did not converge, and are what was reached in 100 steps (invert says "
-                "which). Use a model with track=True where modes cross",
-                "not-converged",
-            )
+    """The finding that many rows have not converged."""
+    if unconverged(found).sum() <= many * len(found.weight):
+        return []
+    return [
+        ModelWarning(
+            "parameters of many records did not converge, and are what was reached in 100 steps (invert says which). "
+            "Use a model with track=True where modes cross",
+            "poor-fit",
         )
-    if found.by_full_model.sum() > many * len(found.weight):
-        findings.append(
-            ModelWarning(
-                "parameters of many records are outside the box of the reduced model, and the full one was solved for "
-                "them, which takes longer (invert says for which). Fit to records of such weather",
-                "outside-reduced-model",
-            )
-        )
-    return findings
+    ]

@@ -32,7 +32,7 @@ from skthermo._core.estimators import _safe_indexing, last_step
 from skthermo._core.frames import Table, check_same_rows, column_names, row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
-from skthermo.exceptions import ModelWarning
+from skthermo.exceptions import RecordsWarning
 from skthermo.fem import FEModel, match_modes
 from skthermo.preprocessing import BlockedKFold
 from skthermo.preprocessing.folds import out_of_fold
@@ -135,7 +135,7 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
 
 def doubts_of_order(
     model: FEModel, F: Table, *, large: float = 15.0, small: float = 5.0, better: float = 0.25
-) -> list[ModelWarning]:
+) -> list[RecordsWarning]:
     """The finding that modes look like others of the model.
 
     Modes count as swapped if another order reduces the squared offsets to a share of ``better``, all below ``large``
@@ -153,7 +153,7 @@ def doubts_of_order(
     if not len(moved) or not is_better or len(np.unique(order)) < len(order):
         return []
     return [
-        ModelWarning(
+        RecordsWarning(
             f"the frequencies {[names[place] for place in moved]} look like other modes of the model. They would be "
             "learned as those of their columns. Order them as the model does, or use "
             f"model.with_modes({order.tolist()})",

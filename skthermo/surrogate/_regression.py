@@ -401,9 +401,9 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        harmless = ("no-rows", "stuck", "implausible-values")  # in rows of any order, of any inputs
+        harmless = ("few-records", "stuck", "implausible-values")  # in rows of any order, of any inputs
         with collected() as self.findings_:
-            found = set_aside(frame_like(X, T), exclude=harmless, needs_all=True)
+            found, _ = set_aside(frame_like(X, T), exclude=harmless, needs_all=True)
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, Reduce, is_auto, tolerance
-from skthermo.exceptions import ModelWarning
 from skthermo.fem import FEModel, FrequencySurface, evaluate, linearise, linearise_modes
 
 NO_BASIS = "no reduced model is accurate where the parameters of the records are"
@@ -67,30 +66,6 @@ class Simulator:
             return cls(model, model.reduced(box, tol=tol, random_state=0), box, tol, usual=theta)
         except RuntimeError:
             return cls(model, tol=tol, reason=NO_BASIS)
-
-    def doubts(self) -> list[ModelWarning]:
-        """The finding that a reduced model was asked for, and none is accurate."""
-        if self.reason != NO_BASIS:
-            return []
-        return [
-            ModelWarning(
-                f"{NO_BASIS} (expected errors up to {self.tol:g}). The full model solves all rows, which takes long. "
-                "Update the model to the records, or allow a larger error",
-                "no-reduced-model",
-            )
-        ]
-
-    def doubts_at(self, theta: Array) -> list[ModelWarning]:
-        """The finding that rows of theta are outside the box of the reduced model."""
-        if self.reduced is None or not self.outside(theta).any():
-            return []
-        return [
-            ModelWarning(
-                "rows are outside the box of the reduced model: their weather is outside the training weather. "
-                "The full model solves them, which takes longer. Train on such weather, or give reduce=False",
-                "outside-reduced-model",
-            )
-        ]
 
     @property
     def described(self) -> str:

@@ -32,9 +32,9 @@ from skthermo._core.estimators import (
 from skthermo._core.frames import Table, check_same_rows, column_names, frame_like
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
-from skthermo.exceptions import ModelWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
-from skthermo.residuals.sensors import SensorRegression, filled_text
-from skthermo.residuals.weather import TrainingRange, unpredicted_text
+from skthermo.exceptions import ModelWarning, SkthermoWarning
+from skthermo.residuals.sensors import SensorRegression, filled_findings
+from skthermo.residuals.weather import TrainingRange, unpredicted_findings
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
 from skthermo.surrogate._simulator import Simulator
 
@@ -179,24 +179,22 @@ class ThermalModel(SavesFrames):
 
     def doubts(self, weather: Weather) -> list[SkthermoWarning]:
         """Findings: filled sensors, unknown weather, impossible parameters."""
-        findings = self.sensors.doubts(weather.given)
         consequence = "Standard deviations and intervals of predictions include the error of that"
-        message = filled_text(weather.deviations, column_names(weather.filled, "T"), consequence)
-        if message:
-            findings.append(RecordsWarning(message, "filled-temperatures"))
-        message = unpredicted_text(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled))
-        if message:
-            findings.append(UnevaluatedRowsWarning(message, "not-predicted"))
-        findings += self.training_range.doubts(weather.inputs)
+        findings = [
+            *self.sensors.doubts(weather.given),
+            *filled_findings(weather.deviations, column_names(weather.filled, "T"), consequence),
+            *unpredicted_findings(np.isnan(weather.inputs).any(axis=1), as_floats(weather.filled)),
+            *self.training_range.doubts(weather.inputs),
+        ]
         if weather.impossible.any():
             findings.append(
                 ModelWarning(
                     "the mapper gave multipliers outside 1e-06 to 1e+06. These rows are NaN. Use a mapper that "
                     "extrapolates mildly, such as the default",
-                    "impossible-parameters",
+                    "outside-bounds",
                 )
             )
-        return findings + self.simulator.doubts_at(weather.theta)
+        return findings
 
     def frequencies(self, theta: Array) -> Array:
         """Frequencies of the healthy model in the measured domain, without discrepancy; NaN where theta is."""
@@ -317,7 +315,7 @@ def doubts_of_factors(parameters: Mapping[str, float] | None, *, large: float = 
         ModelWarning(
             f"the factor of parameter {name!r} is {factor:g} (expected at most {large:g}). Its stiffness is multiplied "
             "by that. Give 1.02 for 2 % more",
-            "large-factor",
+            "doubtful-factor",
         )
         for name, factor in (as_mapping(parameters) or {}).items()
         if factor > large

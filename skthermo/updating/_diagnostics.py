@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from skthermo._core.arrays import Array
-from skthermo.exceptions import ModelWarning
+from skthermo.exceptions import ModelWarning, RecordsWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel, mac
 from skthermo.updating._residuals import Measured, Outcome, Residuals, macs, paired_modes
 
@@ -52,58 +52,48 @@ def unfinished(outcome: Outcome, residuals: Residuals) -> ModelWarning:
     return ModelWarning(
         f"the best start has not converged{failed}. theta_ may not be the optimum (starts_ lists evaluations). Raise "
         f"max_iter{heavier}, or narrow bounds to where the model has modes",
-        "not-converged",
+        "poor-fit",
     )
 
 
-def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[ModelWarning]:
+def false_matches(model: FEModel, measured: Measured, theta: Array) -> Iterator[RecordsWarning]:
     """Warnings about measured modes that are not the modes in the updated model's columns of the same number."""
     names = np.array(measured.names)
-    if not (measured.dofs.size and hasattr(model, "local_modes")):
-        swapped = names[_swapped(model, theta)[measured.columns]]
-        if swapped.size:
-            yield ModelWarning(
-                f"modes {swapped.tolist()} change their order between the nominal model and the optimum. Frequencies "
-                "of other modes are fitted to theirs. Use a model with track=True, or give shapes",
-                "mode-order",
+    if measured.dofs.size and hasattr(model, "local_modes"):
+        modes = paired_modes(model, measured, theta)
+        unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < LOW_MAC)]
+        if unlike.size:
+            yield RecordsWarning(
+                f"no mode of the updated model has the measured shapes of {unlike.tolist()} (MAC below {LOW_MAC}). "
+                "Check the order and signs of the sensors (dofs), or leave these shapes out",
+                "doubtful-shapes",
             )
-        return
-    modes = paired_modes(model, measured, theta)
-    unlike = names[measured.has_shape & (macs(modes.shapes, measured.shapes) < LOW_MAC)]
-    if unlike.size:
-        yield ModelWarning(
-            f"no mode of the updated model has the measured shapes of {unlike.tolist()} (MAC below {LOW_MAC}). Check "
-            "the order and signs of the sensors (dofs), or leave these shapes out",
-            "foreign-shapes",
-        )
-    columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
-    other = names[modes.ranks != columns[measured.columns]]
+        columns = model.local_modes(theta, follow=True).ranks if model.track else np.arange(model.n_modes)
+        other = names[modes.ranks != columns[measured.columns]]
+        what = "have the shapes of other modes of the updated model than those in their columns"
+    else:
+        other = names[_swapped(model, theta)[measured.columns]]
+        what = "change their order between the nominal model and the optimum, and are fitted to other modes"
     if other.size:
-        yield ModelWarning(
-            f"modes {other.tolist()} have the shapes of other modes of the updated model than those in their columns. "
-            "Put the measured modes in the model's order, or use track=True where modes change their order",
+        yield RecordsWarning(
+            f"modes {other.tolist()} {what}. Put the measured modes in the model's order, give shapes, or use "
+            "track=True where modes change their order",
             "mode-order",
         )
 
 
-def undetermined(names: Sequence[str], n_residuals: int, covariance: Array) -> Iterator[ModelWarning]:
-    """The warning, without a prior, about parameters that the measured modes do not determine."""
-    if len(names) > n_residuals:
-        yield ModelWarning(
-            f"{len(names)} parameters are to be found from {n_residuals} residuals. Many theta fit equally well. Use "
-            "fewer parameters, shapes, or a prior",
-            "underdetermined",
-        )
-        return
+def undetermined(names: Sequence[str], n_residuals: int, covariance: Array) -> list[ResultWarning]:
+    """The finding, without a prior, that the measured modes do not determine some parameters."""
     deviations = np.sqrt(np.diagonal(covariance))
     hardly = ~(deviations < 1e4 * np.fmin.reduce(deviations))
-    if hardly.any() and not hardly.all():
+    if len(names) > n_residuals:
+        text = f"{len(names)} parameters are to be found from {n_residuals} residuals. Many theta fit equally well"
+    elif hardly.any() and not hardly.all():
         listed = [names[i] for i in np.flatnonzero(hardly)]
-        yield ModelWarning(
-            f"the parameters {listed} hardly move the measured modes and are not determined. Leave them out, or "
-            "give a prior",
-            "underdetermined",
-        )
+        text = f"the parameters {listed} hardly move the measured modes, and are not determined"
+    else:
+        return []
+    return [ResultWarning(f"{text}. Use fewer parameters, shapes, or a prior", "undetermined")]
 
 
 def at_bounds(theta: Array, bounds: Array) -> NDArray[np.bool_]:
@@ -168,14 +158,14 @@ def _swapped(model: Any, theta: Array) -> NDArray[np.bool_]:
 
 def doubtful_draws(
     outcomes: Sequence[Outcome], names: Sequence[str], bounds: Array, residuals: Residuals
-) -> Iterator[ModelWarning]:
+) -> Iterator[SkthermoWarning]:
     """Warnings about models that were drawn."""
     n = len(outcomes)
     if unconverged := sum(not outcome.success for outcome in outcomes):
         yield ModelWarning(
             f"the search has not converged for {unconverged} of {n} drawn models. They may be improbable. Raise "
             "max_iter, or narrow the bounds to where the model has modes",
-            "not-converged",
+            "poor-fit",
         )
     at_bound = np.sum([at_bounds(one.theta, bounds) for one in outcomes], axis=0)
     if (at_bound > 0.1 * n).any():  # 5 % are at a bound of two standard deviations
@@ -187,7 +177,7 @@ def doubtful_draws(
         )
     mismatched = sum(any(false_matches(residuals.model, residuals.measured, one.theta)) for one in outcomes)
     if mismatched:
-        yield ModelWarning(
+        yield RecordsWarning(
             f"modes change their order in {mismatched} of {n} drawn models. A measured mode is fitted with another "
             "one there. Use a model with track=True, or give shapes",
             "mode-order",

@@ -106,7 +106,7 @@ def _real_shapes(shapes: NDArray) -> tuple[Array, list[SkthermoWarning]]:
         f"shapes are complex: each is rotated to its largest real part, and the rest, up to {lost.max():.1%} of a "
         "shape's length, is dropped. If that is more than a few percent, check how the shape was identified"
     )
-    return np.where(np.isnan(shapes), np.nan, turned.real), [RecordsWarning(text, "complex-shapes")]
+    return np.where(np.isnan(shapes), np.nan, turned.real), [RecordsWarning(text, "doubtful-shapes")]
 
 
 def _given(shapes: Array) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ PLACES = {
     "monitoring._retraining": ["begun_again", "retrained"],
     "monitoring._sensors": ["SensorWatch"],
     "monitoring._threshold": ["estimate_false_alarms"],
-    "preprocessing.checks._record_findings": ["ASIDE_KINDS"],
+    "preprocessing.checks._record_findings": ["ASIDE_REASONS"],
 }
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, shown, tower_records, z24_records
-from inside import ASIDE_KINDS
+from inside import ASIDE_REASONS
 from structures import slow_soil
 
 from skthermo.datasets import load_z24, make_fleet, make_kw51_campaign, make_truss_campaign
@@ -22,7 +22,7 @@ from skthermo.preprocessing import HampelFilter, check_records
 OUTLIERS = (0.8, 1.25)
 """Factors of a frequency of the wrong pole."""
 
-ALSO = {"no-rows", "few-rows", "unsorted-stamps"}
+ALSO = {"few-records", "wrong-stamps"}
 """Findings that are right beside others."""
 
 Z24_BASELINE = 2240
@@ -83,20 +83,20 @@ def faults(T, F, seed):
     stuck.iloc[month, 0] = float(F.iloc[:, 0].mean())
     yield "stuck", "thermometer stuck at 20 degrees for a month", (at_20, F)
     yield "stuck", "mode stuck for a month", (T, stuck)
-    yield "time-shift", "temperatures 60 rows late", (T, F.shift(-60))
-    yield "time-shift", "temperatures 60 rows early", (T, F.shift(60))
+    yield "different-rows", "temperatures 60 rows late", (T, F.shift(-60))
+    yield "different-rows", "temperatures 60 rows early", (T, F.shift(60))
     shuffled = T.iloc[random.permutation(n_rows)].set_axis(T.index)
-    yield "no-thermal-effect", "temperatures shuffled", (shuffled, F)
+    yield "different-rows", "temperatures shuffled", (shuffled, F)
     if F.shape[1] > 3:
         for share in (0.5, 0.1, 0.02):
             rows, swapped = random.random(n_rows) < share, F.to_numpy().copy()
             swapped[np.ix_(rows, [2, 3])] = swapped[np.ix_(rows, [3, 2])]
-            yield "exchanged-modes", f"modes 3 and 4 exchanged in {share:.0%}", (T, table_like(F, swapped))
+            yield "mode-order", f"modes 3 and 4 exchanged in {share:.0%}", (T, table_like(F, swapped))
     for share in (0.01, 0.003):
         wrong = random.random(F.shape) < share
         wrong[n_rows // 2, 0] = True
         yield (
-            "frequency-outliers",
+            "doubtful-values",
             f"outliers, {share:.1%}",
             (T, F * np.where(wrong, random.choice(OUTLIERS, F.shape), 1.0)),
         )
@@ -140,31 +140,31 @@ def gross_errors(T, F, seed):
     for value, share, rows in ((0.0, "2 %", some), (0.0, "a third", third), (-1.0, "2 %", some)):
         yield f"mode is {value:g} in {share} of the rows", {"placeholders"}, in_F, of_mode(rows, value)
     here = T.iloc[:, sensor]
-    yield "kelvin", {"kelvin"}, set(T), (T + 273.15, F)
-    yield "kelvin in one sensor", {"kelvin"}, in_T, of_sensor(both, here + 273.15)
-    yield "kelvin in a third of the rows", {"kelvin"}, in_T, of_sensor(third, here.iloc[third] + 273.15)
-    yield "Fahrenheit", {"unit-of-temperatures"}, set(T), (1.8 * T + 32, F)
-    yield "tenths of a degree", {"unit-of-temperatures"}, set(T), ((10 * T).round(), F)
+    yield "kelvin", {"wrong-unit"}, set(T), (T + 273.15, F)
+    yield "kelvin in one sensor", {"wrong-unit"}, in_T, of_sensor(both, here + 273.15)
+    yield "kelvin in a third of the rows", {"wrong-unit"}, in_T, of_sensor(third, here.iloc[third] + 273.15)
+    yield "Fahrenheit", {"wrong-unit"}, set(T), (1.8 * T + 32, F)
+    yield "tenths of a degree", {"wrong-unit"}, set(T), ((10 * T).round(), F)
     if T.shape[1] > 1:
-        yield "Fahrenheit in one sensor", {"unit-of-temperatures"}, in_T, of_sensor(both, 1.8 * here + 32)
-        yield "tenths of a degree in one sensor", {"unit-of-temperatures"}, in_T, of_sensor(both, 10 * here)
+        yield "Fahrenheit in one sensor", {"wrong-unit"}, in_T, of_sensor(both, 1.8 * here + 32)
+        yield "tenths of a degree in one sensor", {"wrong-unit"}, in_T, of_sensor(both, 10 * here)
         either = in_T if T.shape[1] > 2 else set(T)
-        yield "one sensor of opposite sign", {"unit-of-temperatures"}, either, of_sensor(both, -here)
-        yield "equal sensors", {"equal-columns"}, set(T), of_sensor(both, T.iloc[:, sensor - 1])
-    yield "constant sensor", {"constant"}, in_T, of_sensor(both, 12.5)
-    yield "sensor without a value", {"missing-column"}, in_T, of_sensor(both, np.nan)
-    yield "constant mode", {"constant"}, in_F, of_mode(both, 5.0)
-    yield "mode without a value", {"missing-column"}, in_F, of_mode(both, np.nan)
+        yield "one sensor of opposite sign", {"wrong-unit"}, either, of_sensor(both, -here)
+        yield "equal sensors", {"useless-column"}, set(T), of_sensor(both, T.iloc[:, sensor - 1])
+    yield "constant sensor", {"useless-column"}, in_T, of_sensor(both, 12.5)
+    yield "sensor without a value", {"useless-column"}, in_T, of_sensor(both, np.nan)
+    yield "constant mode", {"useless-column"}, in_F, of_mode(both, 5.0)
+    yield "mode without a value", {"useless-column"}, in_F, of_mode(both, np.nan)
     middle = F.iloc[:, mode].median()
     coarse = middle * (1 + 0.02 * (F.iloc[:, mode] > middle)).where(F.iloc[:, mode].notna())
-    yield "mode of two values", {"few-values"}, in_F, of_mode(both, coarse)
+    yield "mode of two values", {"useless-column"}, in_F, of_mode(both, coarse)
     if F.shape[1] > 1:
-        yield "equal modes", {"equal-columns"}, set(F), of_mode(both, F.iloc[:, mode - 1])
+        yield "equal modes", {"useless-column"}, set(F), of_mode(both, F.iloc[:, mode - 1])
     yield "exchanged tables", {"exchanged-tables"}, {""}, (F, T)
     yield "frequencies as temperatures", {"exchanged-tables"}, set(F), (F, F)
     yield "infinite values", {"placeholders"}, in_T, of_sensor(some, np.inf)
-    yield "no rows", {"no-rows"}, {""}, (T[:0], F[:0])
-    yield "one row", {"no-rows"}, {""}, (T[:1], F[:1])
+    yield "no rows", {"few-records"}, {""}, (T[:0], F[:0])
+    yield "one row", {"few-records"}, {""}, (T[:1], F[:1])
     yield from wrong_rows(T, F, random)
     yield from no_tables(T, F)
 
@@ -175,16 +175,16 @@ def wrong_rows(T, F, random):
     again = np.sort(np.append(np.arange(n_rows), random.integers(n_rows, size=5)))
     unsorted = random.permutation(n_rows)
     text = stamps.strftime("%Y-%m-%d %H:%M")
-    yield "stamps twice", {"repeated-stamps"}, {""}, (T.iloc[again], F.iloc[again])
-    yield "stamps in disorder", {"unsorted-stamps"}, {""}, (T.iloc[unsorted], F.iloc[unsorted])
-    for name, kind, index in (
-        ("equal stamps", "wrong-stamps", pd.DatetimeIndex([stamps[0]] * n_rows)),
-        ("a missing stamp", "wrong-stamps", stamps.where(np.arange(n_rows) != 7)),
-        ("seconds read as nanoseconds", "wrong-stamps", pd.to_datetime(stamps.as_unit("s").asi8)),
-        ("20230101 read as nanoseconds", "wrong-stamps", pd.to_datetime(stamps.strftime("%Y%m%d").astype(int))),
-        ("stamps-as-text", "stamps-as-text", text),
+    yield "stamps twice", {"wrong-stamps"}, {""}, (T.iloc[again], F.iloc[again])
+    yield "stamps in disorder", {"wrong-stamps"}, {""}, (T.iloc[unsorted], F.iloc[unsorted])
+    for name, index in (
+        ("equal stamps", pd.DatetimeIndex([stamps[0]] * n_rows)),
+        ("a missing stamp", stamps.where(np.arange(n_rows) != 7)),
+        ("seconds read as nanoseconds", pd.to_datetime(stamps.as_unit("s").asi8)),
+        ("20230101 read as nanoseconds", pd.to_datetime(stamps.strftime("%Y%m%d").astype(int))),
+        ("stamps as text", text),
     ):
-        yield name, {kind, "wrong-stamps"}, {""}, (T.set_axis(index), F.set_axis(index))
+        yield name, {"wrong-stamps"}, {""}, (T.set_axis(index), F.set_axis(index))
     late = T.set_axis(stamps + pd.Timedelta("1D"))
     yield "tables of other times", {"different-rows"}, {""}, (late, F)
     yield "tables of other lengths", {"different-rows"}, {""}, (T[:-3], F)
@@ -244,7 +244,7 @@ def healthy_table(records):
     rows = {}
     for name, (T, F) in records:
         cleaned = check_records(T, F)
-        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(ASIDE_KINDS), 0).sum()
+        n_values = cleaned.table["n_rows"].where(cleaned.table["what"].isin(ASIDE_REASONS), 0).sum()
         counts = (1, bool(found(T, F) - ALSO), np.size(T) + np.size(F), n_values, len(cleaned.left_out))
         rows.setdefault(name, []).append(counts)
     columns = ["records", "with a false finding", "values", "of these set aside", "columns left out"]

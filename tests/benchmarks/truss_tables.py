@@ -63,7 +63,7 @@ class SingleRecords:
         given = {"informed": DataInformedFEM(self.model)} if chains is None else chains
         self.fems = {name: clone(chain).set_params(random_state=seed) for name, chain in given.items()}
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message=".*(outside-training-weather|uncalibrated-model|outside-bounds)")
+            warnings.filterwarnings("ignore", message=".*(other-weather|uncalibrated-model|outside-bounds|poor-fit)")
             for fem in self.fems.values():
                 fem.fit(self.baseline.temperatures, self.baseline.frequencies)
         self.regression = TemperatureMapper().fit(self.baseline.temperatures, self.baseline.frequencies)

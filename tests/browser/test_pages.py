@@ -11,7 +11,7 @@ from tests.reporting.pages import HOSTILE, fitted_chain, run_study
 from tests.studies.identified import identified
 
 pytest.importorskip("matplotlib")
-pytestmark = pytest.mark.filterwarnings("ignore:.*few-baseline-records")
+pytestmark = pytest.mark.filterwarnings("ignore:.*few-records")
 
 BREAKABLE = """
 return [...document.querySelectorAll("tr, img, .state")]

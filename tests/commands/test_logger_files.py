@@ -382,7 +382,7 @@ def assert_read(found, truth):
     )  # fmt: skip
 
 
-@pytest.mark.filterwarnings("ignore:.*unfinished-file")
+@pytest.mark.filterwarnings("ignore:.*read-as")
 @pytest.mark.parametrize("kind", UNDERSTOOD)
 def test_what_loggers_write_is_read_as_it_was_meant(kind, tmp_path):
     one = UNDERSTOOD[kind]()

@@ -102,7 +102,7 @@ def test_python_reads_what_init_reads_and_says_what_it_leaves_out(tmp_path):
     other = tmp_path / "other.csv"
     RECORDS[expected[1:]][10:].to_csv(other, index_label="time")
     RECORDS[expected[:1]].to_csv(file, index_label="time")
-    with pytest.warns(UserWarning, match="unmatched-stamps"):
+    with pytest.warns(UserWarning, match="different-rows"):
         T, F = read_records(file, other)
     assert T.index.equals(F.index)
     assert len(T) == len(RECORDS) - 10

@@ -152,7 +152,7 @@ def test_a_file_that_may_be_cut_off_is_reported(bridge, records, tmp_path):
     done = bridge("update", "--now", records.index[FIRST + 11], new=text)
     assert done.code == HEALTHY
     assert done.err.startswith("warning: ")
-    assert "unfinished-file" in done.err
+    assert "read-as" in done.err
 
 
 def test_records_that_are_set_aside_are_not_healthy(bridge, records):

@@ -17,7 +17,7 @@ from tests.nights import by_day
 FUZZ = settings(
     max_examples=by_day(25, at_night=60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*other-kw51-file:UserWarning")
+NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*read-as:UserWarning")
 HOUR = pd.Timedelta("1h")
 
 
@@ -61,7 +61,7 @@ def test_a_file_is_read_as_it_was_written(file, compressed):
 def test_a_zip_file_says_that_it_is_not_the_published_one(tmp_path):
     file = tmp_path / "trackedmodes.zip"
     fields = write_kw51(file)
-    with pytest.warns(UserWarning, match=r"trackedmodes\.zip.*other-kw51-file") as caught:
+    with pytest.warns(UserWarning, match=r"trackedmodes\.zip.*read-as") as caught:
         data = load_kw51(file)
     assert len(caught) == 1
     assert caught[0].filename == __file__
@@ -161,7 +161,7 @@ def test_bad_content_names_file_field_and_place(tmp_path):
 
 def test_a_doubtful_weather_channel_does_not_hide_the_rest(tmp_path):
     file = write(tmp_path / "modes.mat", kw51_fields() | replaced("env", (4, 5), -999))
-    with pytest.warns(UserWarning, match=r"'env' .*row 4, column 'grVL'.*-999.*\[placeholders\]"):
+    with pytest.warns(UserWarning, match=r"'env' .*row 4, column 'grVL'.*-999.*\[doubtful-values\]"):
         data = load_kw51(file)
     assert data.temperatures["grVL"].iloc[4] == -999
 

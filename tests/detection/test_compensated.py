@@ -22,7 +22,7 @@ from skthermo.detection import (
 )
 from skthermo.preprocessing import BlockedKFold
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*(weather-of-one-fold|few-baseline-records|outside-training-weather)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(other-weather|few-records)")
 
 
 def truss(seed=0, **options):

@@ -32,8 +32,8 @@ from tests.detection.compensated import (
 
 # The chain's linear inverse scatters with the noise, and folds of few records predict weather not seen.
 pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)"),
-    pytest.mark.filterwarnings("ignore:.*weather-of-one-fold"),
+    pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)"),
+    pytest.mark.filterwarnings("ignore:.*other-weather"),
 ]
 
 
@@ -60,7 +60,7 @@ def test_lags_within_go_by_time():
     lagged = make_pipeline(LagFeatures(3), LinearRegression())
     order = np.random.default_rng(0).permutation(len(X))
     expected = compensator(lagged).fit(X).transform(X)
-    with pytest.warns(UserWarning, match="unsorted-stamps"):
+    with pytest.warns(UserWarning, match="wrong-stamps"):
         shuffled = compensator(lagged).fit(X.iloc[order]).transform(X.iloc[order])
     np.testing.assert_allclose(shuffled.loc[X.index], expected, rtol=0, atol=1e-9)
     assert list(compensator(lagged).fit(X).estimator_[0].feature_names_in_) == list(T.columns)
@@ -107,7 +107,7 @@ def test_targets_that_are_never_there_together_are_compensated():
     np.testing.assert_array_equal(residuals.isna(), holed[MODES].isna())
 
 
-EMPTY = "ignore:.*not-predicted"
+EMPTY = "ignore:.*not-evaluated"
 
 
 @pytest.mark.nightly
@@ -134,7 +134,7 @@ def test_a_fold_without_a_temperature_is_missing():
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*filled-temperatures")
+@pytest.mark.filterwarnings("ignore:.*faulty-sensor")
 @pytest.mark.parametrize(
     "estimator",
     [

@@ -7,11 +7,11 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
-from skthermo.residuals.weather import unpredicted_text
+from skthermo.residuals.weather import unpredicted_findings
 
 MODES = ["f1", "f2"]
 EFFECT = np.array([[-0.02, 0.01], [-0.03, -0.04], [0.0, -0.02]])
-FILLED = pytest.mark.filterwarnings("ignore:.*filled-temperatures")
+FILLED = pytest.mark.filterwarnings("ignore:.*faulty-sensor")
 
 
 def campaign(n_rows=4000, seed=0, noise=0.02):
@@ -72,8 +72,10 @@ def test_rows_that_have_every_temperature_are_untouched(detector):
 
 def test_what_a_row_needs_is_said_of_its_own_cause_alone():
     unknown, nothing, known = np.ones(2, dtype=bool), np.full((2, 1), np.nan), np.zeros((2, 1))
-    without, before = ((unpredicted_text(unknown, one)).split(". ")[1:] for one in (nothing, known))
-    both = unpredicted_text(unknown, np.array([[np.nan], [0.0]])).split(". ")[1:]
+    without, before, both = (
+        unpredicted_findings(unknown, weather)[0].args[0].split(". ")[1:]
+        for weather in (nothing, known, np.array([[np.nan], [0.0]]))
+    )
     assert without != before
     assert both == [*without, *before]
 

@@ -21,11 +21,10 @@ from skthermo.detection import (
 from skthermo.preprocessing import BlockedKFold
 
 pytestmark = [  # folds of few records predict weather not seen, and raw frequencies follow the season
-    pytest.mark.filterwarnings("ignore:.*weather-of-one-fold"),
-    pytest.mark.filterwarnings("ignore:.*outside-training-weather"),
-    pytest.mark.filterwarnings("ignore:.*few-baseline-records"),
-    pytest.mark.filterwarnings("ignore:.*frequency-outliers"),
-    pytest.mark.filterwarnings("ignore:.*filled-temperatures"),
+    pytest.mark.filterwarnings("ignore:.*other-weather"),
+    pytest.mark.filterwarnings("ignore:.*few-records"),
+    pytest.mark.filterwarnings("ignore:.*doubtful-values"),
+    pytest.mark.filterwarnings("ignore:.*faulty-sensor"),
 ]
 
 BASELINE, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
@@ -62,7 +61,7 @@ def test_with_gaps_it_is_that_of_the_modes_that_are_there():
     assert detector.score(HOLED[MODES]) == pytest.approx(expected)
     half = NEW[MODES].copy()
     half.iloc[: len(half) // 2 + 1] = np.nan
-    with pytest.warns(UserWarning, match="rows-not-scored"):
+    with pytest.warns(UserWarning, match="not-evaluated"):
         assert detector.score(half) == pytest.approx(detector.score(half.dropna()))
 
 
@@ -93,7 +92,7 @@ def test_a_search_without_damage_chooses_what_predicts_best():
 def test_rows_that_nothing_predicts_are_not_scored():
     fitted, blind = pipeline().fit(X), NEW.copy()
     blind.iloc[:3, :3] = np.nan
-    with pytest.warns(UserWarning, match="not-predicted"):
+    with pytest.warns(UserWarning, match="not-evaluated"):
         score = fitted.score(blind)
     assert score == pytest.approx(fitted.score(NEW.iloc[3:]))
 

@@ -88,7 +88,7 @@ def test_bad_baselines_are_named(X, message):
         MahalanobisDetector().fit(X)
 
 
-@pytest.mark.filterwarnings("ignore:.*few-baseline-records")
+@pytest.mark.filterwarnings("ignore:.*few-records")
 def test_few_records_do_with_a_shrunk_covariance():
     detector = MahalanobisDetector(covariance=LedoitWolf(), threshold="quantile").fit(F[:3])
     relative = F[:3] / F[:3].mean(axis=0)

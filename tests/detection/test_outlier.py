@@ -118,7 +118,7 @@ class Recorder(FromZero):
         return self
 
 
-@pytest.mark.filterwarnings("ignore:.*few-baseline-records")
+@pytest.mark.filterwarnings("ignore:.*few-records")
 def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_records_far_in_time():
     memory = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).normal(size=1000))
     Recorder.seen.clear()
@@ -132,7 +132,7 @@ def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_records_far_in_t
 
 
 @pytest.mark.parametrize("block", [24, "1D", pd.Timedelta("1D")])
-@pytest.mark.filterwarnings("ignore:.*few-baseline-records")
+@pytest.mark.filterwarnings("ignore:.*few-records")
 def test_blocks_as_long_as_wanted_are_left_out_and_nothing_else(block):
     rows = pd.DataFrame({"score": np.arange(400.0), "number": np.arange(400)}, STAMPS)
     rows.loc[STAMPS[[5, 100]], "score"] = np.nan

@@ -12,7 +12,7 @@ from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 from skthermo.detection import DirectionalDetector, MahalanobisDetector
 from skthermo.residuals.numbers import independent_records
 
-TOO_FEW = pytest.mark.filterwarnings("ignore:.*few-baseline-records")
+TOO_FEW = pytest.mark.filterwarnings("ignore:.*few-records")
 
 
 def records(n_rows=120, n_modes=4, seed=0):
@@ -117,10 +117,10 @@ def test_false_alarms_are_near_what_is_asked_where_records_remember_those_before
 
 
 def test_few_independent_records_are_reported():
-    with pytest.warns(UserWarning, match="few-baseline-records"):
+    with pytest.warns(UserWarning, match="few-records"):
         detector = MahalanobisDetector().fit(np.repeat(records(12, 3), 40, axis=0) + 0.1 * records(480, 3, 1))
     assert detector.n_independent_ < 49
-    assert [finding.kind for finding in detector.findings_] == ["few-baseline-records"]
+    assert [finding.kind for finding in detector.findings_] == ["few-records"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert MahalanobisDetector().fit(records(600)).n_independent_ > 100

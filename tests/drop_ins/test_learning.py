@@ -61,7 +61,7 @@ def test_chains_of_trees_predict_and_leave_gaps(trees, name):
     assert mape(later.clean_frequencies, predicted).mean() < 0.6
     holed = later.temperatures.copy()
     holed.iloc[3] = np.nan
-    with pytest.warns(UserWarning, match="not-predicted"):
+    with pytest.warns(UserWarning, match="not-evaluated"):
         predicted = chain.predict(holed)
     assert np.isnan(predicted).all(axis=1).tolist() == [row == 3 for row in range(len(holed))]
 

@@ -17,7 +17,7 @@ SIZE = EXAMPLE.Size(simulations=100, fresh=20, days=60)
 pytestmark = pytest.mark.filterwarnings(
     "ignore::sklearn.exceptions.ConvergenceWarning",
     "ignore:Got `batch_size` less than 1 or larger",
-    "ignore:.*(outside-training-weather|outside-reduced-bounds)",
+    "ignore:.*(other-weather|outside-bounds)",
 )
 
 

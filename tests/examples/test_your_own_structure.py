@@ -12,12 +12,12 @@ SAID = {
     "rad/s instead of Hz": "are about those in rad/s",
     "frequencies 1.5 times too high": "uncalibrated-model",
     "two modes swapped": "mode-order",
-    "a thermometer that died": "filled-temperatures",
+    "a thermometer that died": "faulty-sensor",
     "a thermometer that got stuck": "'T1' is 10 °C in 250 of 400 rows",
-    "30 records": "few-rows",
-    "kelvin in fit": "look like kelvin",
-    "kelvin in predict": "outside-training-weather",
-    "Fahrenheit in predict": "outside-training-weather",
+    "30 records": "few-records",
+    "kelvin in fit": "as in kelvin",
+    "kelvin in predict": "other-weather",
+    "Fahrenheit in predict": "other-weather",
 }
 
 

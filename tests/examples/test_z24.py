@@ -13,9 +13,9 @@ from tests.examples.pages import recipes, run
 Z24, DAMAGE, COMPARISON = recipes("z24"), recipes("z24_damage"), recipes("z24_detector")
 
 pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*outside-training-weather"),
+    pytest.mark.filterwarnings("ignore:.*other-weather"),
     pytest.mark.filterwarnings("ignore:.*(indistinguishable|unobservable)-groups"),
-    pytest.mark.filterwarnings("ignore:.*few-baseline-records"),  # 240 of them, and windows in ten days
+    pytest.mark.filterwarnings("ignore:.*few-records"),  # 240 of them, and windows in ten days
 ]
 
 FEW = ("raw, Mahalanobis", "raw, 20 neighbours", "piecewise-linear", "piecewise-linear, regimes", "linear regression")

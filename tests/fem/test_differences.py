@@ -82,7 +82,7 @@ def test_a_change_larger_than_stated_names_the_parameter(factor, stated):
 @pytest.mark.parametrize(("factor", "stated"), [(1.5, 2.0), (2.0, 4.0), (0.75, 0.5)])
 def test_a_change_smaller_than_stated_is_doubted_with_the_factor_that_fits(factor, stated):
     stiffness = cantilever(), {"deck": cantilever(modulus=factor)}
-    with pytest.warns(ModelWarning, match=f"'deck'.* {factor:g} .*{stated:g}.*doubtful-matrices"):
+    with pytest.warns(ModelWarning, match=f"'deck'.* {factor:g} .*{stated:g}.*doubtful-factor"):
         difference_terms(*stiffness, factor=stated)
 
 

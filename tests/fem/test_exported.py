@@ -51,7 +51,7 @@ def test_a_lone_stiffness_is_a_term_though_it_is_called_k(tmp_path):
 @pytest.mark.parametrize("form", ["mat", "mtx sparse"])
 def test_terms_that_are_not_named_stay_constant_where_the_total_is_there(tmp_path, form):
     file = WRITERS[form](tmp_path, MATRICES)
-    with pytest.warns(UserWarning, match=r"'K0' is more than the sum of \['E_2'\].*doubtful-matrices"):
+    with pytest.warns(UserWarning, match=r"'K0' is more than the sum of \['E_2'\].*doubtful-factor"):
         model = load_affine(file, stiffness=["E_2"], n_modes=4)
     assert_same(model, AffineModel({("E_2",): TERMS["E_2"], (): TOTAL - TERMS["E_2"]}, M, n_modes=4))
     base = load_affine(file, stiffness=["k_base", "E_2", "E_10"], n_modes=4)
@@ -77,7 +77,7 @@ def test_a_total_that_rounding_has_touched_is_still_the_total(tmp_path):
 @pytest.mark.parametrize("name", ["K_0", "Ktot"])
 def test_a_total_of_any_name_is_recognised_by_its_values(tmp_path, form, name):
     file = WRITERS[form](tmp_path, {name: TOTAL} | TERMS | {"M": M})
-    with pytest.warns(UserWarning, match=rf"'{name}' .*\['E_2', .*total='{name}'.*doubtful-matrices"):
+    with pytest.warns(UserWarning, match=rf"'{name}' .*\['E_2', .*total='{name}'.*doubtful-factor"):
         assert_same(load_affine(file, n_modes=4), EXPECTED)
     assert_same(load_affine(file, n_modes=4, total=name), EXPECTED)
     assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)

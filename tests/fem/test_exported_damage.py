@@ -48,7 +48,7 @@ def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):
     rest = spring(3, 3, 500.0)
     expected = AffineModel([((name,), matrix) for name, matrix in TERMS.items()] + [((), rest)], M, n_modes=4)
     file = write_mat(tmp_path, MATRICES | {"K0": TOTAL + rest}, sparse=True)
-    with pytest.warns(UserWarning, match=r"'K0' .*\['E_2', 'E_10', 'k_base'\].*doubtful-matrices"):
+    with pytest.warns(UserWarning, match=r"'K0' .*\['E_2', 'E_10', 'k_base'\].*doubtful-factor"):
         assert_same(load_affine(file, n_modes=4), expected)
     assert_same(load_affine(file, n_modes=4, total="K0"), expected)
     some = load_affine(file, stiffness=["E_2", "k_base"], total="K0", n_modes=4)
@@ -89,7 +89,7 @@ def test_matrices_may_share_a_parameter_and_damage_groups_cut_through_it(tmp_pat
 @pytest.mark.parametrize("form", ["mat sparse", "npz"])
 def test_a_term_that_looks_like_mass_or_damping_is_said(tmp_path, form, name, matrix, what):
     file = WRITERS[form](tmp_path, TERMS | {name: matrix, "M": M})
-    with pytest.warns(UserWarning, match=rf"model\..*'{name}' is {what}.*doubtful-matrices"):
+    with pytest.warns(UserWarning, match=rf"model\..*'{name}' is {what}.*doubtful-factor"):
         model = load_affine(file, n_modes=4)
     assert model.parameter_names == (*TERMS, name)
     assert_same(load_affine(file, n_modes=4, stiffness=list(TERMS)), EXPECTED)

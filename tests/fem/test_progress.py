@@ -82,7 +82,7 @@ def test_many_chunks_without_modes_are_one_warning(n_jobs):
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_a_reduced_model_says_once_that_it_is_left(n_jobs):
     reduced = TRUSS.reduced(0.1, random_state=0)
-    with pytest.warns(UserWarning, match="outside-reduced-bounds") as caught:
+    with pytest.warns(UserWarning, match="outside-bounds") as caught:
         sample(reduced, 0.2, 600, n_jobs=n_jobs, random_state=0)
     assert len(caught) == 1
     assert caught[0].filename == __file__

@@ -16,7 +16,7 @@ LEVELS = {  # threshold, release and number of events of monitors of version 0.2
     "z24": (4.46787049870998, 3.5971570058729503, 2),
     "kw51": (1.7780440805530546, 1.676511560763697, 2),
 }
-pytestmark = pytest.mark.filterwarnings("ignore:.*(short-baseline|baseline-peak|undetected-changes|not-evaluated)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(few-records|doubtful-values|undetected-changes|not-evaluated)")
 
 
 class GivenIndex(BaseEstimator):

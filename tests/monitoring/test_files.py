@@ -158,7 +158,7 @@ def test_a_missing_skops_is_named(monitor, tmp_path, monkeypatch):
             function(tmp_path / "bridge.skops")
 
 
-@pytest.mark.filterwarnings("ignore:.*(short-baseline|baseline-peak|few-baseline-records)")
+@pytest.mark.filterwarnings("ignore:.*(few-records|doubtful-values)")
 def test_a_file_of_version_0_2_is_refused_in_one_sentence_and_its_acknowledgements_are_kept(tmp_path):
     old = Path(__file__).with_name("monitor_of_0_2.joblib")
     with pytest.raises(ValueError, match=r"another version of skthermo; .* skthermo fit FOLDER --replace"):

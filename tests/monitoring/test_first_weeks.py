@@ -14,11 +14,9 @@ WEEKS, YEAR = 60, 365
 pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
-        "short-baseline",
-        "weather-of-one-fold",
-        "few-baseline-records",
-        "baseline-peak",
-        "outside-training-weather",
+        "few-records",
+        "other-weather",
+        "doubtful-values",
         "not-evaluated",
     )
 ]

@@ -248,7 +248,7 @@ def test_a_monitor_that_is_replaced_is_kept_beside_and_reported(tmp_path):
     fit_fleet(makers, records, monitor=watch, folder=tmp_path).update({"a": year(20, 30, "2026-01-01")})
     evaluated = next(tmp_path.glob("a-*.bridge")).read_bytes()
     makers = dict.fromkeys(makers, LinearRegression(positive=True))
-    with pytest.warns(UserWarning, match=r"fitted anew.*\(a\).*monitors-restarted"):
+    with pytest.warns(UserWarning, match=r"fitted anew.*\(a\).*changed-settings"):
         again = fit_fleet(makers, records, monitor=watch, folder=tmp_path)
     assert again.table["n_evaluated"].eq(0).all()
     assert [file.read_bytes() for file in tmp_path.glob("*.replaced")] == [evaluated]

@@ -28,7 +28,7 @@ TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
 N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
 ANSWER = ["state", "index", "threshold", "modes", "groups", "reason", "event"]
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*(short-baseline|few-baseline-records|baseline-peak|not-evaluated)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(few-records|doubtful-values|not-evaluated)")
 
 
 def campaign(n, seed, start="2025-01-01"):

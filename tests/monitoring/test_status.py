@@ -114,7 +114,7 @@ def test_batches_give_the_transitions_of_one_pass_each_once(monitor, records, af
     assert said(parts) == said(after.transitions())
 
 
-@pytest.mark.filterwarnings("ignore:.*(baseline-peak|undetected-changes)")
+@pytest.mark.filterwarnings("ignore:.*(doubtful-values|undetected-changes)")
 def test_what_an_owner_does_is_a_transition(monitor, records):
     monitor.update(records[FIRST : DAMAGED + 8])
     known = monitor.status().transition

@@ -141,6 +141,6 @@ def test_each_line_that_fits_warns_and_the_fitted_object_holds_what_is_doubtful(
         warnings.simplefilter("default")
         first = BiasAligner().fit(spoiled)
         second = BiasAligner().fit(spoiled.copy())
-    assert [one.message.kind for one in caught] == ["placeholders"] * 2
+    assert [one.message.kind for one in caught] == ["doubtful-values"] * 2
     assert caught[0].lineno + 1 == caught[1].lineno
     assert [str(one) for one in first.findings_] == [str(one) for one in second.findings_] == [str(caught[0].message)]

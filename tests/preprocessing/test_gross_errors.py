@@ -84,13 +84,13 @@ class TestValues:
     @pytest.mark.parametrize(
         ("tables", "expected"),
         [
-            ((T.assign(T2=12.5), F), ("constant", "T2")),
-            ((T, F.assign(f2=5.0)), ("constant", "f2")),
-            ((T, F.assign(f2=(F["f2"] > 27) + 27.0)), ("few-values", "f2")),
-            ((T.assign(T2=np.nan), F), ("missing-column", "T2")),
-            ((T, F.assign(f2=np.nan)), ("missing-column", "f2")),
-            ((T.assign(T3=T["T1"]), None), ("equal-columns", "T3")),
-            ((T, F.assign(f4=F["f2"])), ("equal-columns", "f4")),
+            ((T.assign(T2=12.5), F), ("useless-column", "T2")),
+            ((T, F.assign(f2=5.0)), ("useless-column", "f2")),
+            ((T, F.assign(f2=(F["f2"] > 27) + 27.0)), ("useless-column", "f2")),
+            ((T.assign(T2=np.nan), F), ("useless-column", "T2")),
+            ((T, F.assign(f2=np.nan)), ("useless-column", "f2")),
+            ((T.assign(T3=T["T1"]), None), ("useless-column", "T3")),
+            ((T, F.assign(f4=F["f2"])), ("useless-column", "f4")),
         ],
     )
     def test_columns_that_say_nothing(self, tables, expected):
@@ -105,8 +105,12 @@ class TestValues:
 class TestUnits:
     def test_kelvin_everywhere_in_a_sensor_and_in_some_rows(self):
         assert check_records(T + 273.15).table["column"].tolist() == list(T)
-        assert only(check_records(T.assign(T2=T["T2"] + 273.15)))[:3] == ("kelvin", "T2", 365)
-        assert only(check_records(changed(T, slice(0, 100), 1, T.iloc[:100, 1] + 273.15)))[:3] == ("kelvin", "T2", 100)
+        assert only(check_records(T.assign(T2=T["T2"] + 273.15)))[:3] == ("wrong-unit", "T2", 365)
+        assert only(check_records(changed(T, slice(0, 100), 1, T.iloc[:100, 1] + 273.15)))[:3] == (
+            "wrong-unit",
+            "T2",
+            100,
+        )
 
     @given(column=SENSOR)
     @often
@@ -118,11 +122,11 @@ class TestUnits:
             ("another sign", -T[name]),
         ):
             found = check_records(T.assign(**{name: values}))
-            assert only(found)[:2] == ("unit-of-temperatures", name)
+            assert only(found)[:2] == ("wrong-unit", name)
             assert hint in found.table["detail"][0]
 
     def test_tenths_of_a_degree(self):
-        assert kinds(check_records((10 * T).round())) == {"unit-of-temperatures"}
+        assert kinds(check_records((10 * T).round())) == {"wrong-unit"}
 
     @pytest.mark.one_case
     @pytest.mark.parametrize(
@@ -139,21 +143,21 @@ class TestUnits:
     )
     def test_findings_are_the_same_in_fahrenheit_but_for_the_unit(self, spoil):
         expected, found = (check_records(*spoil(unit, F)).table for unit in (T, 1.8 * T + 32))
-        assert set(found["what"]) - set(expected["what"]) == {"unit-of-temperatures"}
-        same = found[found["what"] != "unit-of-temperatures"].reset_index(drop=True)
+        assert set(found["what"]) - set(expected["what"]) == {"wrong-unit"}
+        same = found[found["what"] != "wrong-unit"].reset_index(drop=True)
         pd.testing.assert_frame_equal(same[PLACE], expected[PLACE], check_dtype=False)
 
     @pytest.mark.parametrize("factor", [2 * np.pi, 1e-3, 60.0])
     def test_frequencies_in_another_unit_than_the_model(self, factor):
         model = make_truss()
         assert check_records(T, F, model=model).table.empty
-        assert kinds(check_records(None, factor * F, model=model)) == {"unit-of-frequencies"}
-        assert only(check_records(None, F.assign(f2=factor * F["f2"]), model=model))[:2] == ("unit-of-a-mode", "f2")
+        assert kinds(check_records(None, factor * F, model=model)) == {"wrong-unit"}
+        assert only(check_records(None, F.assign(f2=factor * F["f2"]), model=model))[:2] == ("wrong-unit", "f2")
         assert check_records(None, factor * F).table.empty
 
     def test_periods_and_modes_too_few(self):
-        assert kinds(check_records(None, 1 / F, model=make_truss())) == {"unit-of-frequencies"}
-        assert kinds(check_records(None, F.iloc[:, 1:], model=make_truss())) == {"unit-of-frequencies"}
+        assert kinds(check_records(None, 1 / F, model=make_truss())) == {"wrong-unit"}
+        assert kinds(check_records(None, F.iloc[:, 1:], model=make_truss())) == {"mode-order"}
 
 
 class TestTables:
@@ -169,9 +173,9 @@ class TestTables:
             (T.index.where(np.arange(365) != 7), "wrong-stamps"),
             (pd.to_datetime(T.index.strftime("%Y%m%d").astype(int)), "wrong-stamps"),
             (pd.to_datetime(T.index.as_unit("s").asi8), "wrong-stamps"),
-            (T.index.strftime("%Y-%m-%d"), "stamps-as-text"),
-            (pd.Index(T.index.strftime("%Y%m%d").astype(int)), "stamps-as-text"),
-            (T.index - T.index[0], "stamps-as-text"),
+            (T.index.strftime("%Y-%m-%d"), "wrong-stamps"),
+            (pd.Index(T.index.strftime("%Y%m%d").astype(int)), "wrong-stamps"),
+            (T.index - T.index[0], "wrong-stamps"),
         ],
     )
     def test_wrong_times(self, stamps, kind):
@@ -179,16 +183,16 @@ class TestTables:
 
     def test_repeated_times_and_disorder(self):
         rows = [0, 0, *range(1, 365), 364]
-        assert only(check_records(T.iloc[rows], F.iloc[rows])) == ("repeated-stamps", "", 2, T.index[0], T.index[-1])
-        assert kinds(check_records(T[::-1], F[::-1])) == {"unsorted-stamps"}
+        assert only(check_records(T.iloc[rows], F.iloc[rows])) == ("wrong-stamps", "", 2, T.index[0], T.index[-1])
+        assert kinds(check_records(T[::-1], F[::-1])) == {"wrong-stamps"}
         assert check_records(T.to_period("D"), F.to_period("D")).table.empty
 
     def test_rows_and_names(self):
         late = T.set_axis(T.index + pd.Timedelta("1D"))
         assert only(check_records(late, F))[:3] == ("different-rows", "", 365)
         assert only(check_records(T[:-5], F))[:3] == ("different-rows", "", 5)
-        assert kinds(check_records(T[:0], F[:0])) == {"no-rows"}
-        assert kinds(check_records(T[:1], F[:1])) == {"no-rows"}
+        assert kinds(check_records(T[:0], F[:0])) == {"few-records"}
+        assert kinds(check_records(T[:1], F[:1])) == {"few-records"}
         twice = T.set_axis(["T1", "T1", "T3"], axis=1)
         assert only(check_records(twice, F))[:2] == ("no-table", "T1")
         tuples = pd.MultiIndex.from_product([["a"], list(T)])
@@ -198,7 +202,7 @@ class TestTables:
 
     def test_an_array_beside_a_frame_has_its_times(self):
         found = check_records(T[::-1], changed(F, [10], 0, 30.0).to_numpy()[::-1])
-        assert kinds(found) == {"unsorted-stamps", "another-level"}
+        assert kinds(found) == {"wrong-stamps", "another-level"}
         assert np.argwhere(found.outliers.to_numpy()).tolist() == [[354, 0]]
         assert found.table.iloc[1]["from"] == T.index[10]
 
@@ -230,7 +234,7 @@ def test_nothing_fails_whatever_is_given(temperatures, frequencies):
     assert len(list(found.warnings())) <= len(kinds(found))
     assert isinstance(str(found), str)
     alone = check_records(temperatures), check_records(None, frequencies)
-    of_any_table = {"no-table", "kelvin"}  # also of exchanged or equal tables
+    of_any_table = {"no-table"}  # also of exchanged or equal tables
     assert set().union(*map(kinds, alone)) & of_any_table <= kinds(found)
 
 
@@ -249,7 +253,7 @@ class TestFindings:
         rows, sensors = random.sample(range(365), 365), random.sample(list(T), 3)
         expected = check_records(wrong, F).table
         found = check_records(wrong.iloc[rows][sensors], F.iloc[rows]).table
-        found = found[found["what"] != "unsorted-stamps"]
+        found = found[found["what"] != "wrong-stamps"]
         pd.testing.assert_frame_equal(*(one.sort_values("column").reset_index(drop=True) for one in (found, expected)))
 
     def test_one_error_lists_all_that_is_meaningless_and_nothing_that_is_doubtful(self):

@@ -38,7 +38,7 @@ def test_shapes_find_nearly_all_modes_among_spurious_poles(follow):
     assert right(ModeTracker(reference, follow=follow).fit_transform(records).poles, true) > 99.8
 
 
-@pytest.mark.filterwarnings("ignore:.*similar-modes")
+@pytest.mark.filterwarnings("ignore:.*mode-order")
 def test_shapes_beat_frequency_and_frequency_beats_sorting():
     records, true, reference = simulated_poles(500, n_sensors=6)
     shares = {way: right(poles, true) for way, poles in ways(records, reference, 0.15).items()}

@@ -13,7 +13,7 @@ from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*few-baseline-records")
+pytestmark = pytest.mark.filterwarnings("ignore:.*few-records")
 LOUD, FAILING = "loud, 40 %", "too many components"
 
 

@@ -33,7 +33,7 @@ plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
 pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*few-baseline-records"),
+    pytest.mark.filterwarnings("ignore:.*few-records"),
 ]
 STYLE = files("skthermo.reporting").joinpath("page.css").read_text(encoding="utf-8")
 ALWAYS = ["answer", "monitored", "model", "found", "settings"]
@@ -177,7 +177,7 @@ def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(s
     assert "Identified damage: the causes that were sought do not" in page.text[page.text.rindex("Warnings") :]
 
 
-@pytest.mark.filterwarnings("ignore:.*time-shift")  # north_lag3 stands alone
+@pytest.mark.filterwarnings("ignore:.*different-rows")  # north_lag3 stands alone
 @pytest.mark.usefixtures("blank_drawings")
 def test_lags_are_no_sensors():
     fem, T, F = fitted_chain()
@@ -222,10 +222,10 @@ def test_studies_without_a_family_that_has_a_smallest_damage(chain):
 @pytest.mark.usefixtures("blank_drawings")
 def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
     fem, T, _ = chain
-    with pytest.warns(UserWarning, match="(outside-bounds|outside-training-weather)") as caught:
+    with pytest.warns(UserWarning, match="(outside-bounds|other-weather)") as caught:
         study = run_study(fem, T + 60, [Scenario("healthy")])
     texts = [str(warning.message) for warning in caught]
-    assert study.warnings_ == [text for text in texts if "few-baseline-records" not in text]
+    assert study.warnings_ == [text for text in texts if "few-records" not in text]
     text = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
     assert all(warning in text for warning in study.warnings_)
     assert "There was no warning" not in text

@@ -75,7 +75,7 @@ def test_healthy_sensors_are_not_warned_of(n_rows):
 
 def departing(sensors, T):
     """Names of the sensors that are found to depart from the others."""
-    return [str(one).split("'")[1] for one in sensors.doubts(T) if one.kind == "sensor-disagrees"]
+    return [str(one).split("'")[1] for one in sensors.doubts(T) if one.kind == "faulty-sensor"]
 
 
 def test_a_sensor_that_drifts_is_named():
@@ -122,4 +122,4 @@ def test_compensator_and_chain_warn_of_a_sensor_that_departs():
     for evaluate in (lambda: compensator.transform(new), lambda: chain.predict(new[year.temperatures.columns])):
         with pytest.warns(RecordsWarning, match=f"'{name}'") as caught:
             evaluate()
-        assert sum(warning.message.kind == "sensor-disagrees" for warning in caught) == 1
+        assert sum(warning.message.kind == "faulty-sensor" for warning in caught) == 1

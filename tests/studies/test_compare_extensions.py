@@ -24,7 +24,7 @@ def study(fem):
 
 @pytest.fixture(scope="module")
 def table(study):
-    with pytest.warns(UserWarning, match="mode 8.*undetermined-mode"):
+    with pytest.warns(UserWarning, match="mode 8.*undetermined"):
         return compare_extensions(study, WEATHER, baseline_factors=(2.0, 2.5))
 
 

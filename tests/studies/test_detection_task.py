@@ -126,7 +126,7 @@ def test_no_lag_and_no_window_reaches_from_one_state_into_another(fem, task, win
     assert np.isnan(found).any()
     assert not np.isnan(found).all()
     apart = WEATHER.index + pd.Timedelta(days=10000)
-    warnings.filterwarnings("ignore", ".*not-predicted")  # the first rows alone; pytest restores the filters
+    warnings.filterwarnings("ignore", ".*not-evaluated")  # the first rows alone; pytest restores the filters
     for start in range(0, len(found), 120):
         alone = pd.DataFrame(task.X[365:].iloc[start : start + 120].to_numpy(), apart, task.X.columns)
         np.testing.assert_allclose(found[start : start + 120], detector.decision_function(alone), rtol=1e-9)
@@ -143,7 +143,7 @@ def test_rows_without_stamps_are_consecutive_within_a_state(fem_of_arrays):
     task = task_of(fem_of_arrays, T=T)
     assert list(task.X.index) == list(range(365 + 6 * 120))
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*(no-earlier-records|weather-of-one-fold)")
+        warnings.filterwarnings("ignore", ".*(no-earlier-records|other-weather)")
         detector = task.refit(with_memory(3, targets=[3, 4, 5, 6, 7, 8]))
         found = task.scoring.decisions(detector, task.X[365:]).values
         for start in range(0, len(found), 120):
@@ -235,7 +235,7 @@ def test_other_detectors_are_evaluated_too(fem, detector):
 def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     grid = {"window": ["1D", "7D"]}
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*(weather-of-one-fold|not-predicted|trend)")
+        warnings.filterwarnings("ignore", ".*(other-weather|not-evaluated|trend)")
         search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
     with pytest.warns(UserWarning, match="search-refits"):
         best = task.refit(search)
@@ -278,7 +278,7 @@ def test_confirmation_evaluates_fresh_noise_and_weather(fem):
 
 def test_confirmation_in_the_same_weather_says_so(fem):
     task = task_of(fem, columns=MODES)
-    with pytest.warns(UserWarning, match="same-weather"):
+    with pytest.warns(UserWarning, match="other-weather"):
         table = task.confirm(MahalanobisDetector(), WEATHER, random_state=3)
     assert table["optimism"].item() != 0  # also with the seed of the task, the noise is fresh
 

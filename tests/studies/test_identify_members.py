@@ -11,7 +11,7 @@ from skthermo.fem import Beam, ImportedStructure, Spring, Structure, add_noise
 from skthermo.studies import identify_damage
 from skthermo.surrogate import DataInformedFEM
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*indistinguishable-groups")
+pytestmark = pytest.mark.filterwarnings("ignore:.*undetermined")
 
 N = 12  # elements of the symmetric bridge
 SENSORS = [("deck", i) for i in range(1, N)]

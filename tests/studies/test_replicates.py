@@ -112,7 +112,7 @@ def test_replicates_that_fail_are_counted(fem, monkeypatch):
         n_replicates=4,
     )
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.25)
-    with pytest.warns(UserWarning, match="1 of 4 .*too warm.*failed-replicates"):
+    with pytest.warns(UserWarning, match="1 of 4 .*too warm.*no-solution"):
         study.run(years)
     assert len(study.replicates_.rates["MahalanobisDetector", "damage"]) == 3
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.05)

@@ -196,7 +196,7 @@ def test_records_that_cannot_be_evaluated_do_not_count():
     weather.iloc[5:15] = np.nan
     detector = OutlierDetector(IsolationForest())
     study = study_of(gappy, detector, [Scenario("healthy")])
-    with pytest.warns(UserWarning, match="without any temperature .*not-predicted") as caught:
+    with pytest.warns(UserWarning, match="without any temperature .*not-evaluated") as caught:
         results = study.run(weather)
     assert len(caught) == 1
     n_records, n_not_evaluated = results.loc[0, ["n_records", "n_not_evaluated"]]
@@ -208,11 +208,11 @@ def test_records_that_cannot_be_evaluated_do_not_count():
 @pytest.mark.filterwarnings("ignore:.*many-false-alarms")
 def test_weather_outside_the_training_range_is_said_once(fem):
     study = study_of(fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2)
-    with pytest.warns(UserWarning, match="(outside-bounds|outside-training-weather)") as caught:
+    with pytest.warns(UserWarning, match="(outside-bounds|other-weather)") as caught:
         study.run(WEATHER + 60)
     texts = [str(warning.message) for warning in caught]
     assert len(texts) == len(set(texts)) <= 3
-    assert sum("outside-training-weather" in text for text in texts) == 1
+    assert sum("other-weather" in text for text in texts) == 1
     assert caught[0].filename == __file__
 
 
@@ -264,7 +264,7 @@ def in_service():
         return chain(random_state=0).fit(T, F)
 
 
-@pytest.mark.filterwarnings("ignore:.*filled-temperatures", "ignore:.*not-evaluated")
+@pytest.mark.filterwarnings("ignore:.*faulty-sensor", "ignore:.*not-evaluated")
 def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_others(in_service):
     scenarios = [{}, {"bottom": 0.2}]
     study = study_of(in_service, compensated(), scenarios, n_repeats=3, gaps="fitted")

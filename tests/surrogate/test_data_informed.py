@@ -25,7 +25,7 @@ from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInver
 from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse, mapper, trained
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
-pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)")
 
 YEAR, LATER = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
 
@@ -129,7 +129,7 @@ def gappy():
     return holed, F.mask(rng.random(F.shape) < 0.05)
 
 
-FILLED = "ignore:.*(not-predicted|filled-temperatures)"
+FILLED = "ignore:.*(not-evaluated|faulty-sensor)"
 
 
 @pytest.mark.filterwarnings(FILLED)
@@ -189,7 +189,7 @@ def test_impossible_parameters_are_nan_with_a_warning():
             return theta
 
     model = chain(inverse=trained(), mapper=Wild(LinearRegression())).fit(T, F)
-    with pytest.warns(UserWarning, match="impossible-parameters"):
+    with pytest.warns(UserWarning, match="outside-bounds"):
         predicted = model.predict(T)
     np.testing.assert_array_equal(np.flatnonzero(predicted.isna().all(axis=1)), [2, 5])
 
@@ -230,7 +230,7 @@ def test_an_aligner_without_a_reference_gets_the_models():
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*round-trip-error")
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
     trees = ExtraTreesRegressor(3)
     parts = {

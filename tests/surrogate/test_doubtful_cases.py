@@ -51,5 +51,5 @@ def test_labels_that_have_no_order():
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_records_with_hardly_any_mode_are_named():
     gaps = np.random.default_rng(0).random(F.shape) < 0.85
-    with pytest.warns(UserWarning, match="few-rows"):
+    with pytest.warns(UserWarning, match="few-records"):
         DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.001), mapper=PLAIN).fit(T, F.mask(gaps))

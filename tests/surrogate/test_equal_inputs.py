@@ -63,7 +63,7 @@ def mapper(X, y, new):
 
 
 ESTIMATORS = [chain, paper, posterior, trained, mapper]
-pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-bounds|round-trip-error|few-rows)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-bounds|uncalibrated-model|few-records)")
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)

@@ -152,7 +152,7 @@ class TestFindings:
     def test_of_inverses(self, tmp_path):
         make = lambda memory: inverse(memory=memory).fit(F[:5]).transform(F[:5])  # noqa: E731
         first, again, fresh = (self.kinds(make, memory) for memory in (str(tmp_path), str(tmp_path), None))
-        assert first == again == fresh == ["few-teaching-records"]
+        assert first == again == fresh == ["few-records"]
 
     def test_of_chains(self, tmp_path):
         gaps = F.where(np.random.default_rng(0).uniform(size=F.shape) < 0.4)
@@ -163,7 +163,7 @@ class TestFindings:
             for memory in (str(tmp_path), str(tmp_path), None)
         )
         assert first == again == fresh
-        assert "few-rows" in first
+        assert "few-records" in first
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")

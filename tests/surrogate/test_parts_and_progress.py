@@ -78,7 +78,7 @@ def lines_of(text):
     return re.findall(r"\[(\w+)\] \.+ (\(.*), total= +\d+\.\d[a-z]+", text)
 
 
-@pytest.mark.filterwarnings("ignore:.*few-baseline-records")
+@pytest.mark.filterwarnings("ignore:.*few-records")
 def test_verbose_tells_the_stages(capsys):
     quiet = chain().fit(T, F)
     assert capsys.readouterr().out == ""

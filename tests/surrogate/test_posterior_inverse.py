@@ -275,7 +275,7 @@ def test_weight_of_a_parameter_without_its_mode_is_that_of_the_prior():
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*few-rows")
+@pytest.mark.filterwarnings("ignore:.*few-records")
 def test_years_with_gaps_teach():
     """A year that lacks three of ten values leaves errors as one with half of the records would."""
     later = make_truss_campaign(random_state=1)
@@ -322,14 +322,14 @@ def test_rows_where_the_model_fails_have_no_parameters_and_are_counted():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         theta = inverse.transform(measured)
-    assert [one.message.kind for one in caught if hasattr(one.message, "kind")].count("not-converged") == 1
+    assert [one.message.kind for one in caught if hasattr(one.message, "kind")].count("poor-fit") == 1
     assert (~inverse.invert(measured).converged).sum() == 2
     np.testing.assert_allclose(theta[:2, 0], [0.9, 1.0], rtol=1e-6)
     assert (np.isnan(theta[2:]) | (theta[2:] <= 1.1)).all()
 
 
 def test_few_records_are_named():
-    with pytest.warns(UserWarning, match="few-teaching-records"):
+    with pytest.warns(UserWarning, match="few-records"):
         PosteriorInverse(TRUSS).fit(F[:5])
 
 

@@ -17,7 +17,7 @@ from skthermo.preprocessing import BiasAligner, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
 # A linear or quadratic inverse scatters with the noise, and folds of contiguous rows predict weather not seen.
-pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-bounds|outside-training-weather)")
+pytestmark = pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)")
 
 TRUSS = make_truss()
 T = pd.DataFrame({"T1": np.linspace(-10, 40, 60), "T2": np.cos(np.arange(60))})

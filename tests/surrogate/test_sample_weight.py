@@ -53,7 +53,7 @@ def test_weights_reach_the_last_step(wrapped, routing):
     assert np.abs(unweighted.predict(T) / alone.predict(T) - 1).to_numpy().max() > 1e-5
 
 
-@pytest.mark.filterwarnings("ignore:.*weather-of-one-fold")  # of every third day
+@pytest.mark.filterwarnings("ignore:.*other-weather")  # of every third day
 def test_a_record_of_weight_0_counts_as_left_out():
     kept = WEIGHTS > 0.5
     fit = chain().fit(T, F, sample_weight=kept)

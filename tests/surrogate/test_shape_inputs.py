@@ -148,7 +148,6 @@ def test_missing_modes_and_missing_shapes_are_left_out():
 # What models and parameters may be
 
 
-@pytest.mark.filterwarnings("ignore:.*outside-reduced-model")
 def test_reduced_models_and_stored_inversions_give_the_same(tmp_path):
     model = portal(n_modes=3, track=True).with_parameters(["columns", "beams"])
     dofs = [40, 100, 160, 220]
@@ -280,7 +279,7 @@ def test_right_shapes_of_any_scale_and_phase_give_no_warning():
 def test_shapes_of_other_sensors_are_named(change):
     texts = chain_of(change)[1]
     assert any(
-        re.search(r"measured shapes of 'f\d' are unlike those of the model .*foreign-shapes", text) for text in texts
+        re.search(r"measured shapes of 'f\d' are unlike those of the model .*doubtful-shapes", text) for text in texts
     )
 
 

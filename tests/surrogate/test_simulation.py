@@ -48,9 +48,8 @@ def test_noise_is_what_draw_noise_gives(fem, weather, noise):
     np.testing.assert_allclose(found, clean * (1 + fem.recorder_.noise(fem.weather(weather), noise, random_state=3)))
 
 
-@pytest.mark.filterwarnings("ignore:60 of 60.*outside-reduced-model")
 def test_a_factor_in_percent_is_doubted(fem, weather):
-    with pytest.warns(UserWarning, match="'top' .*102.*large-factor"):
+    with pytest.warns(UserWarning, match="'top' .*102.*doubtful-factor"):
         fem.simulate(weather, parameters={"top": 102})
 
 

@@ -19,9 +19,8 @@ pytestmark = [
     pytest.mark.filterwarnings(f"ignore:.*{message}")
     for message in (
         "outside-(prior|training-weather)",
-        "weather-of-one-fold",
-        "few-rows",
-        "uncalibrated-model",
+        "other-weather",
+        "few-records",
         "uncalibrated-model",
         "few-(independent|baseline)-records",
     )

@@ -97,7 +97,7 @@ def test_a_chain_reports_the_round_trip_and_warns_where_records_scatter_less():
     healthy = TRUSS.frequencies(1 - 0.002 * (air - 10) * np.ones(4))
     linear = TemperatureMapper(LinearRegression())
     bad = InverseSurrogate(regressor=KNeighborsRegressor(), n_samples=100, bounds=0.2)
-    with pytest.warns(UserWarning, match=r"'f\d' .*round-trip-error"):
+    with pytest.warns(UserWarning, match=r"'f\d' .*uncalibrated-model"):
         rough = DataInformedFEM(TRUSS, inverse=bad, mapper=linear, random_state=0).fit(air, healthy)
     np.testing.assert_allclose(rough.report_.modes["round trip"], 100 * rough.inverse_.round_trip())
     assert "round trip (%)" in repr(rough.report_)
@@ -113,7 +113,7 @@ def test_models_that_cannot_be_recognised_are_not_remembered(tmp_path):
 
 
 def test_more_parameters_than_modes_warns():
-    with pytest.warns(UserWarning, match="more parameters than modes.*underdetermined"):
+    with pytest.warns(UserWarning, match="more parameters than modes.*undetermined"):
         InverseSurrogate(make_truss(n_modes=3), LinearRegression(), bounds=0.2, n_samples=20, random_state=0).fit()
 
 

@@ -138,13 +138,13 @@ def test_each_warning_counts_the_models():
         )
     with pytest.warns(UserWarning, match="optimum"):
         hasty = calibrated(max_iter=1)
-    with pytest.warns(UserWarning, match="5 of 5 .*not-converged"):
+    with pytest.warns(UserWarning, match="5 of 5 .*poor-fit"):
         hasty.sample_models(5, random_state=0)
     narrow = TRUSS.reduced(0.1, random_state=0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         updater = calibrated(narrow)
-    with pytest.warns(UserWarning, match="outside-reduced-bounds"):
+    with pytest.warns(UserWarning, match="outside-bounds"):
         updater.sample_models(6, random_state=0)
 
 

@@ -42,7 +42,7 @@ def test_a_false_match_of_swapped_modes_is_refused():
 
 
 def test_shapes_that_the_model_does_not_have_are_named():
-    with pytest.warns(UserWarning, match=r"\['f3'\] .*foreign-shapes"):
+    with pytest.warns(UserWarning, match=r"\['f3'\] .*doubtful-shapes"):
         ModelUpdater(oscillators(True)).fit(
             oscillators(True).frequencies([np.ones(3)]), shapes=[[1, 0, 1], [0, 1, 1], [0, 0, 0.3]], dofs=[0, 1, 2]
         )

@@ -920,7 +920,7 @@ class ReducedModel(AffineModel):
             f"theta of {names} is outside the bounds for which the model was reduced. Frequencies there may be wrong "
             f"by more than {self._tol:g}. Reduce the model for wider bounds, or use the full one"
         )
-        return [ModelWarning(text, "outside-reduced-bounds")]
+        return [ModelWarning(text, "outside-bounds")]
 
 
 def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:

@@ -121,7 +121,7 @@ def difference_terms(
 
 def doubtful_matrices(doubts: Sequence[str]) -> list[SkthermoWarning]:
     """One warning for all doubts about matrices."""
-    return [ModelWarning(". ".join(doubts), "doubtful-matrices")] if doubts else []
+    return [ModelWarning(". ".join(doubts), "doubtful-factor")] if doubts else []
 
 
 def read_differences(

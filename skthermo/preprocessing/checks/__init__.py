@@ -3,12 +3,11 @@
 from skthermo.preprocessing.checks._beside_weather import misplaced_columns
 from skthermo.preprocessing.checks._check_records import check_records, set_aside
 from skthermo.preprocessing.checks._columns import Plausible, equal_runs
-from skthermo.preprocessing.checks._record_findings import RecordFindings, SetAside, period_of
+from skthermo.preprocessing.checks._record_findings import RecordFindings, period_of
 
 __all__ = [
     "Plausible",
     "RecordFindings",
-    "SetAside",
     "check_records",
     "equal_runs",
     "misplaced_columns",

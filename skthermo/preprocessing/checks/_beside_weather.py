@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -81,7 +80,7 @@ def exchange_modes(F: Reading, values: Array, lines: Array, folds: Rows) -> None
             found.append((both, np.count_nonzero(known), exchanged | alone))
     for both, n_known, rows in found:
         names = f"{F.columns[both[0]]!r} and {F.columns[both[1]]!r}"
-        F.found("exchanged-modes", names, rows, f"{names} in {np.count_nonzero(rows)} of {n_known} rows")
+        F.found("mode-order", names, rows, f"{names} look exchanged in {np.count_nonzero(rows)} of {n_known} rows")
         values[np.ix_(rows, both)] = values[np.ix_(rows, both[::-1])]
 
 
@@ -110,7 +109,7 @@ def find_outliers(F: Reading, values: Array, lines: Array | None, folds: Rows | 
             f"{name!r} in {np.count_nonzero(far[:, place])} of {n_known} rows, the first "
             f"{values[first[0], place]:.4g}{F.unit} in {period_of(F.index, first)}"
         )
-        F.found("frequency-outliers", name, far[:, place], detail, period=False)
+        F.found("doubtful-values", name, far[:, place], detail, period=False)
     return far
 
 
@@ -149,17 +148,20 @@ def compare_times(
         late = "" if hours is None else abs(shift) * hours
         length = late and (f" (about {late:.3g} hours)" if late < 48 else f" (about {late / 24:.3g} days)")
         detail = (
-            f"those of {abs(shift)} rows {'before' if shift > 0 else 'after'}{length} explain {explained:.0%} of the "
-            f"variance in periods held out, those of the same rows {max(without, 0.0):.0%}"
+            f"temperatures of {abs(shift)} rows {'before' if shift > 0 else 'after'}{length} explain {explained:.0%} "
+            f"of the variance in periods held out, those of the same rows {max(without, 0.0):.0%}"
         )
         is_there = (np.arange(n_rows) >= shift) & (np.arange(n_rows) < n_rows + shift)
-        F.found("time-shift", "", is_there, detail, period=False)
+        F.found("different-rows", "", is_there, detail, period=False)
         return
     least = min(left(lines, 0, 0, n_parts).min(initial=1.0) for n_parts in (1, 4))
     if least > 0.98 and np.isnan(T.values[~np.isnan(T.before)]).mean() < 0.01:
         usable = ~np.isnan(values).all(axis=1) & ~np.isnan(places).any(axis=1)
-        detail = f"at most {max(1 - least, 0.0):.1%} of the variance of a mode, in periods held out"
-        F.found("no-thermal-effect", "", usable, f"{detail}, in {np.count_nonzero(usable)} rows", period=False)
+        detail = (
+            f"temperatures explain at most {max(1 - least, 0.0):.1%} of the variance of a mode, in periods held out, "
+            f"in {np.count_nonzero(usable)} rows"
+        )
+        F.found("different-rows", "", usable, detail, period=False)
 
 
 def unexplained(inputs: Array, values: Array, folds: Rows, n_parts: int = 1) -> Array:
@@ -202,16 +204,15 @@ def looks_exchanged(temperatures: Array, frequencies: Array) -> bool:
     return bool(np.median(vary[0]) < min(0.075, np.median(vary[1]) / 4))
 
 
-def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[RecordsWarning]:
-    """A warning about temperatures that behave like frequencies, and one about frequencies that behave like
-    temperatures.
+def misplaced_columns(temperatures: Table, frequencies: Table) -> list[RecordsWarning]:
+    """The finding of temperatures that behave like frequencies, and of frequencies that behave like temperatures.
 
     Frequencies are positive, vary by a few percent of their median, at most 15, and rise and fall together (rank
     correlation above .1). Temperatures in degrees Celsius vary five times as much, and are nearly equal (rank
     correlation above .6).
     """
     if len(temperatures) < 30:
-        return
+        return []
     T, F = TypicalColumns(temperatures, "T"), TypicalColumns(frequencies, "f")
     steady = F.variation[F.variation <= 0.15]
     usual = np.median(steady) if len(steady) else np.min(T.variation, initial=0.15)
@@ -219,27 +220,26 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> Iterator[Recor
     is_mode = (T.variation <= 3.0 * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
     is_mode &= T.variation <= 0.15
     if not is_mode.any() and not is_temperature.any():
-        return
+        return []
     ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=30).fillna(0).to_numpy()
     n_sensors = len(T.names)
     among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
     together = across[:, ~is_temperature].mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
     is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), 0.1)
     is_temperature &= ((across > 0.6) & T.nearly(F))[~is_mode].any(axis=0)
+    found = []
     if is_mode.any():
-        yield RecordsWarning(
+        found.append(
             f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
-            "A mode that predicts the others hides damage. Put all modes among the targets, and only temperatures "
-            "beside them",
-            "modes-among-temperatures",
+            "A mode that predicts the others hides damage"
         )
     if is_temperature.any():
-        yield RecordsWarning(
+        found.append(
             f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
-            "and are nearly equal to other temperatures. A detector would evaluate the weather. Give only frequencies "
-            "as targets",
-            "temperatures-among-modes",
+            "and are nearly equal to other temperatures. A detector would evaluate the weather"
         )
+    text = f"{', and '.join(found)}. Put all modes, and nothing else, among the targets"
+    return [RecordsWarning(text, "exchanged-tables")] if found else []
 
 
 class TypicalColumns:

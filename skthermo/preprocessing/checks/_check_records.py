@@ -3,7 +3,7 @@ records are named."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Hashable
 from operator import itemgetter
 from typing import Any
 
@@ -13,6 +13,7 @@ import pandas as pd
 from skthermo._core.arrays import check_model
 from skthermo._core.frames import as_stamps
 from skthermo._core.warnings import warn_each
+from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._beside_weather import look_at_both, looks_exchanged
 from skthermo.preprocessing.checks._columns import (
     Reading,
@@ -22,12 +23,10 @@ from skthermo.preprocessing.checks._columns import (
     put_stuck_aside,
 )
 from skthermo.preprocessing.checks._record_findings import (
-    ASIDE_KINDS,
-    LEFT_OUT_KINDS,
+    ASIDE_REASONS,
     WARNINGS,
     RecordFinding,
     RecordFindings,
-    SetAside,
     findings_table,
     period_of,
 )
@@ -58,9 +57,8 @@ def examine(
     copies = copies_found(tables)
     if is_pair and unit == "Hz" and not copies and looks_exchanged(*(reading.values for reading in tables)):
         detail = "the temperatures vary less, relative to their median, than the frequencies do"
-        copies = [
-            RecordFinding.in_rows(tables[0].index, "exchanged-tables", "", np.arange(len(tables[0].values)), detail)
-        ]
+        index, everywhere = tables[0].index, np.arange(len(tables[0].values))
+        copies = [RecordFinding.in_rows(index, "exchanged-tables", "", everywhere, detail, meaningless=True)]
     if "exchanged-tables" in map(itemgetter(0), copies):
         return readings, [*findings, *copies], False
     for reading in tables:
@@ -129,12 +127,12 @@ def check_records(
     No finding in 365 records.
     >>> late = year.frequencies.shift(60)
     >>> check_records(year.temperatures, late).table[["what", "n_rows"]]
-             what  n_rows
-    0  time-shift     305
+                 what  n_rows
+    0  different-rows     305
     >>> print(check_records(year.temperatures[["T1"]] + 273.15))
     1 finding in 365 records.
-    kelvin: 'T1' lies between 268.093 and 309.327 in 365 rows, 2025-01-01 to 2025-12-31
-        Bounds and reports are in degrees Celsius. Subtract 273.15
+    wrong-unit: 'T1' lies between 268.093 and 309.327, as in kelvin, in 365 rows, 2025-01-01 to 2025-12-31
+        They are read as degrees Celsius and Hz. Convert them, or order modes as the model does
     """
     readings, findings, belong_together = examine(temperatures, frequencies, unit, model)
     outliers, tables, left_out, n_rows = None, {}, {}, 0
@@ -144,8 +142,8 @@ def check_records(
         if reading.what == "frequencies":
             far = np.isnan(reading.values) & ~np.isnan(reading.before)
             if belong_together:
-                wrong_times = {"wrong-stamps", "stamps-as-text"}.intersection(map(itemgetter(0), findings))
-                far |= look_at_both(*readings, has_wrong_times=bool(wrong_times))
+                has_wrong_times = any(one.what == "wrong-stamps" and one.is_meaningless for one in findings)
+                far |= look_at_both(*readings, has_wrong_times=has_wrong_times)
             index = reading.given_index if reading.is_frame else None
             outliers = pd.DataFrame(
                 far[np.argsort(reading.order)], index, pd.Index(reading.columns, tupleize_cols=False)
@@ -163,7 +161,7 @@ def set_aside(
     exclude: Collection[str] = (),
     needs_all: bool = False,
     is_baseline: bool = True,
-) -> SetAside:
+) -> tuple[RecordFindings, list[RecordsWarning]]:
     """Put NaN in place of values that cannot be measurements.
 
     These are infinite values, numbers that loggers write for a missing value, frequencies that are not positive, values
@@ -181,8 +179,9 @@ def set_aside(
     model : FEModel, optional
         To whose nominal frequencies those in Hz are compared.
     exclude : collection of str, default=()
-        Kinds of findings that do no harm to what is done with the records, such as "stuck" where the rows need not
-        follow each other in time. Their values are not set aside.
+        Kinds of findings that are no error in these records and leave no column out, such as "few-records"; a column
+        of a baseline needs a value in any case. Or reasons for which no value is set aside, such as "stuck" where the
+        rows need not follow each other in time.
     needs_all : bool, default=False
         Whether columns that would be left out are an error.
     is_baseline : bool, default=True
@@ -192,8 +191,10 @@ def set_aside(
 
     Returns
     -------
-    SetAside
-        The tables, what was set aside, and which columns are left out.
+    RecordFindings
+        The tables, NaN where a value was set aside, and columns that are left out; its ``table`` has these alone.
+    list of RecordsWarning
+        What else is doubtful.
 
     Raises
     ------
@@ -216,39 +217,42 @@ def set_aside(
     >>> year.temperatures.loc["2025-03", "T1"] = 484.667
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore")
-    ...     found = set_aside(year.temperatures, year.frequencies)
+    ...     found, doubts = set_aside(year.temperatures, year.frequencies)
     >>> found.table[["what", "column", "n_rows"]]
                what column  n_rows
     0  placeholders     T1      31
     >>> int(found.temperatures["T1"].isna().sum())
     31
     """
-    unknown = set(exclude).difference(WARNINGS)
+    known = [*WARNINGS, *sorted(ASIDE_REASONS)]
+    unknown = set(exclude).difference(known)
     if unknown:
-        raise ValueError(f"exclude has {sorted(unknown)}; expected some of {[*WARNINGS]}")
+        raise ValueError(f"exclude has {sorted(unknown)}; expected some of {known}")
     readings, findings, _ = examine(temperatures, frequencies, unit, model)
-    kinds = (ASIDE_KINDS if is_baseline else {"placeholders"}).difference(exclude)
-    tables, left_out, n_rows = {"temperatures": None, "frequencies": None}, {}, 0
-    for reading in readings:
-        findings += reading.findings
-        n_rows = max(n_rows, len(reading.values))
-    table = findings_table(findings)
-    harmless = {*ASIDE_KINDS, *(() if needs_all else LEFT_OUT_KINDS), *exclude}
-    others = RecordFindings(table[~table["what"].isin(harmless)], n_rows)
+    reasons = (ASIDE_REASONS if is_baseline else {"placeholders"}).difference(exclude)
+    needs_change = "useless-column" not in exclude
+    needs = {"needs_change": needs_change, "needs_values": needs_change or is_baseline}
+    tables, left_out = dict[str, Any](), dict[Hashable, str]()
+    n_rows = max((len(reading.values) for reading in readings), default=0)
+    table = findings_table([*findings, *(one for reading in readings for one in reading.findings)])
+    what, is_meaningless = table["what"], table["severity"] == "meaningless"
+    is_useless = is_meaningless & (what == "useless-column")
+    is_harmless = what.isin(ASIDE_REASONS) | (is_meaningless & what.isin(list(exclude)))
+    others = RecordFindings(table[~(is_harmless if needs_all else is_harmless | is_useless)], n_rows)
     others.refuse_meaningless()
     for reading in readings:
-        reading.use(ASIDE_KINDS - kinds)
-        tables[reading.what], reasons = reading.cleaned(exclude)
-        left_out |= reasons
-        if reading.columns and set(reading.columns) == set(reasons):
+        reading.use(ASIDE_REASONS - reasons)
+        tables[reading.what], useless = reading.cleaned(**needs)
+        left_out |= useless
+        if reading.columns and set(reading.columns) == set(useless):
             raise ValueError(
-                f"no column of the {reading.what} can be used: {'; '.join(reasons.values())}; expected measurements"
+                f"no column of the {reading.what} can be used: {'; '.join(useless.values())}; expected measurements"
             )
     RecordFindings(table[:0], n_rows, left_out=left_out).refuse_meaningless(needs_all=needs_all)
-    aside = table[table["what"].isin(LEFT_OUT_KINDS | kinds)]
-    found = SetAside(**tables, table=aside, left_out=left_out, others=others)
+    aside = table[is_useless | what.isin(reasons)]
+    found = RecordFindings(aside, n_rows, **tables, left_out=left_out)
     warn_each(found.warnings())
-    return found
+    return found, list(others.warnings())
 
 
 def times_found(index: pd.Index) -> list[RecordFinding]:
@@ -259,27 +263,29 @@ def times_found(index: pd.Index) -> list[RecordFinding]:
     missing = np.flatnonzero(index.isna())
     if len(missing):
         detail = f"{len(missing)} of {n_rows} rows have no time, the first row {missing[0]}"
-        return [RecordFinding.in_rows(index, "wrong-stamps", "", missing, detail, period=False)]
+        return [RecordFinding.in_rows(index, "wrong-stamps", "", missing, detail, period=False, meaningless=True)]
     try:
         stamps = index.as_unit("ns").asi8
-    except ValueError:  # beyond the years that nanoseconds reach
-        return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, "beyond the years from 1678 to 2262")]
-    steps = np.diff(stamps)
-    if n_rows > 1 and not steps.any():
-        return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, f"all {n_rows} rows have one time")]
+    except ValueError:
+        detail = "beyond the years from 1678 to 2262, which nanoseconds reach"
+        return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail, meaningless=True)]
+    steps, detail = np.diff(stamps), ""
     is_early = n_rows > 1 and 0 <= stamps.max() < pd.Timestamp("1970-03-01").value
-    if is_early and np.median(np.abs(steps)) < pd.Timedelta("1min").value:
+    if n_rows > 1 and not steps.any():
+        detail = f"all {n_rows} rows have one time"
+    elif is_early and np.median(np.abs(steps)) < pd.Timedelta("1min").value:
         detail = f"{n_rows} rows are at the beginning of 1970, as numbers are that count nanoseconds"
-        return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail)]
+    if detail:
+        return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail, meaningless=True)]
     found, again, late = [], np.flatnonzero(index.duplicated()), 1 + np.flatnonzero(steps < 0)
     if len(again):
         again = again[np.argsort(stamps[again], kind="stable")]
         detail = f"{len(again)} of {n_rows} rows have the time of another"
-        found.append(RecordFinding.in_rows(index, "repeated-stamps", "", again, detail))
+        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", again, detail))
     if len(late):
         detail = f"{len(late)} of {n_rows} rows are earlier than the row before, the first row {late[0]}"
         detail = f"{detail} ({period_of(index, late[:1])})"
-        found.append(RecordFinding.in_rows(index, "unsorted-stamps", "", late, detail, period=False))
+        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", late, detail, period=False))
     return found
 
 
@@ -295,7 +301,7 @@ def labels_found(index: pd.Index) -> list[RecordFinding]:
     except Exception as error:  # labels of users may be anything
         detail = f"{str(error).partition(';')[0].replace('X has', 'the index has').replace('of X ', ''):.150}"
     everywhere = np.arange(len(index))
-    return [RecordFinding.in_rows(index, "stamps-as-text", "", everywhere, detail, period=False)] if detail else []
+    return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail, period=False)] if detail else []
 
 
 def rows_found(tables: list[Reading]) -> list[RecordFinding]:
@@ -304,18 +310,18 @@ def rows_found(tables: list[Reading]) -> list[RecordFinding]:
     here, there, n_findings = first.given_index, last.given_index, len(first.findings) + len(last.findings)
     if len(here) != len(there):
         detail = f"{len(here)} rows of {first.what} and {len(there)} of {last.what}"
-        found.append(RecordFinding("different-rows", "", abs(len(here) - len(there)), None, None, detail))
+        found.append(RecordFinding("different-rows", "", abs(len(here) - len(there)), None, None, detail, True))
     elif first.is_frame and last.is_frame and not here.equals(there):
         rows = np.array([row for row, pair in enumerate(zip(here, there, strict=True)) if pair[0] != pair[1]] or [0])
         detail = f"{len(rows)} of {len(here)} rows have different labels, the first row {rows[0]}"
         detail = f"{detail}: {here[rows[0]]} and {there[rows[0]]}"
-        found.append(RecordFinding.in_rows(here, "different-rows", "", rows, detail, period=False))
+        found.append(RecordFinding.in_rows(here, "different-rows", "", rows, detail, period=False, meaningless=True))
     n_rows = min(len(here), len(there))
     is_known = ~np.isnan(first.values[:n_rows]).all(axis=1) & ~np.isnan(last.values[:n_rows]).all(axis=1)
     known = np.flatnonzero(is_known)
     if len(known) < 50 and (len(known) or not n_findings):
-        what, detail = "few-rows" if len(known) > 1 else "no-rows", f"{len(known)} of {n_rows} rows have values"
-        found.append(RecordFinding.in_rows(first.index, what, "", known, detail))
+        detail, is_error = f"{len(known)} of {n_rows} rows have values", len(known) < 2
+        found.append(RecordFinding.in_rows(first.index, "few-records", "", known, detail, meaningless=is_error))
     return found
 
 
@@ -329,8 +335,10 @@ def copies_found(tables: list[Reading]) -> list[RecordFinding]:
             owner, other = seen.setdefault(content, (table, place))
             if owner is not table:
                 detail = f"{owner.columns[other]!r} of the temperatures equals {name!r}"
-                found.append(RecordFinding.in_rows(table.index, "exchanged-tables", name, everywhere, detail))
+                found.append(
+                    RecordFinding.in_rows(table.index, "exchanged-tables", name, everywhere, detail, meaningless=True)
+                )
             elif other != place:
                 detail = f"{name!r} equals {owner.columns[other]!r} in {len(everywhere)} rows"
-                found.append(RecordFinding.in_rows(table.index, "equal-columns", name, everywhere, detail))
+                found.append(RecordFinding.in_rows(table.index, "useless-column", name, everywhere, detail))
     return found

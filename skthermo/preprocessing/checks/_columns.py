@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import HUGE, Array, as_floats, median, spread_evenly
 from skthermo._core.frames import MISSING_CODES, columns_by_sensor, named_frame
-from skthermo.preprocessing.checks._record_findings import ASIDE_KINDS, LEFT_OUT_KINDS, RecordFinding
+from skthermo.preprocessing.checks._record_findings import ASIDE_REASONS, RecordFinding
 
 LOGGED = (*MISSING_CODES, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
 COLDEST, HOTTEST = -90.0, 100.0  # degrees Celsius that a structure in the open may have
@@ -46,10 +46,10 @@ class Reading:
             self.given_index, self.index = pd.RangeIndex(n_rows), beside.index if is_beside else pd.RangeIndex(n_rows)
         if reason or (is_series and what == "temperatures"):
             reason = reason or "are a Series, not a DataFrame"
-            self.findings.append(RecordFinding("no-table", "", 0, None, None, f"the {what} {reason}"))
+            self.findings.append(RecordFinding("no-table", "", 0, None, None, f"the {what} {reason}", True))
         elif not self.values.size:
             detail = f"the {what} have {n_rows} rows and {self.values.shape[1]} columns"
-            self.findings.append(RecordFinding("no-rows", "", n_rows, None, None, detail))
+            self.findings.append(RecordFinding("few-records", "", n_rows, None, None, detail, True))
         self.order = np.arange(n_rows)
         if isinstance(self.index, pd.DatetimeIndex) and not self.index.is_monotonic_increasing:
             self.order = self.order if self.index.hasnans else self.index.argsort(kind="stable")
@@ -73,15 +73,17 @@ class Reading:
                     self.values[:, place] = np.ravel(as_floats(frame.iloc[:, [place]]))
                 except Exception as error:  # objects of users may raise anything
                     detail = f"{str(error).partition(';')[0]:.150}"
-                    self.found("no-table", name, everywhere, detail, period=False)
+                    self.found("no-table", name, everywhere, detail, period=False, meaningless=True)
         kinds = set(map(type, names))
         if tuple in kinds or isinstance(names, pd.MultiIndex):
-            self.found("no-table", "", everywhere, f"the {self.what} have tuples such as {names[0]!r}", period=False)
+            detail = f"the {self.what} have tuples such as {names[0]!r}"
+            self.found("no-table", "", everywhere, detail, period=False, meaningless=True)
         if str in kinds and len(kinds) > 1:
-            self.found("no-table", "", everywhere, "some names of columns are text, others are not", period=False)
+            detail = "some names of columns are text, others are not"
+            self.found("no-table", "", everywhere, detail, period=False, meaningless=True)
         for name in names[names.duplicated()].unique():
             detail = f"{name!r} is the name of {np.sum(names == name)} columns"
-            self.found("no-table", name, everywhere, detail, period=False)
+            self.found("no-table", name, everywhere, detail, period=False, meaningless=True)
         return ""
 
     def _read_array(self, table: Any) -> str:
@@ -99,19 +101,20 @@ class Reading:
             return ""
         return f"are a {kind} of shape {values.shape}"
 
-    def found(self, what: str, column: Hashable, rows: NDArray[np.bool_], detail: str, *, period: bool = True) -> None:
-        """Add a finding in the rows of a mask."""
-        found = RecordFinding.in_rows(self.index, what, column, np.flatnonzero(rows), detail, period=period)
-        self.findings.append(found)
+    def found(self, what: str, column: Hashable, rows: NDArray[np.bool_], detail: str, **options: bool) -> None:
+        """Add a finding in the rows of a mask, with options of `RecordFinding.in_rows`."""
+        self.findings.append(RecordFinding.in_rows(self.index, what, column, np.flatnonzero(rows), detail, **options))
 
-    def found_in(self, what: str, place: int, detail: str, rows: NDArray[np.bool_] | None = None) -> None:
+    def found_in(
+        self, what: str, place: int, detail: str, rows: NDArray[np.bool_] | None = None, *, meaningless: bool = False
+    ) -> None:
         """Add a finding about a column, by default in all rows in which it has a value."""
         rows = ~np.isnan(self.values[:, place]) if rows is None else rows
         n_rows, n_found, name = len(rows), np.count_nonzero(rows), self.columns[place]
         share = f"{n_rows} rows" if n_found == n_rows else f"{n_found} of {n_rows} rows"
-        self.found(what, name, rows, f"{name!r} {detail} in {share}")
+        self.found(what, name, rows, f"{name!r} {detail} in {share}", meaningless=meaningless)
 
-    def put_aside(self, what: str, place: int, wrong: NDArray[np.bool_]) -> bool:
+    def put_aside(self, what: str, place: int, wrong: NDArray[np.bool_], *, is_kelvin: bool = False) -> bool:
         """Add a finding where values of a column are wrong; these, and single values between them, become NaN."""
         column = self.values[:, place]
         wrong = wrong & ~np.isnan(column)
@@ -119,35 +122,37 @@ class Reading:
             return False
         levels = np.unique(column[wrong])
         named = texts_of(levels) if len(levels) <= 3 else f"{levels[0]:.6g} to {levels[-1]:.6g}"
-        self.found_in(what, place, f"is {named}{self.unit}", wrong)
+        unit = ", as in kelvin," if is_kelvin else self.unit
+        self.found_in(what, place, f"is {named}{unit}", wrong, meaningless=is_kelvin)
         wrong[1:-1] |= wrong[:-2] & wrong[2:]
         self._aside.append((what, place, wrong))
         column[wrong] = np.nan
         return True
 
-    def use(self, kinds: Collection[str]) -> None:
-        """Use the values that were put aside for these kinds of findings as they were given."""
+    def use(self, reasons: Collection[str]) -> None:
+        """Use the values that were put aside for these reasons as they were given."""
         self.values = self.before.copy()
-        for kind, place, wrong in self._aside:
-            if kind not in kinds:
+        for reason, place, wrong in self._aside:
+            if reason not in reasons:
                 self.values[wrong, place] = np.nan
 
-    def cleaned(self, exclude: Collection[str] = ()) -> tuple[Any, dict[Hashable, str]]:
+    def cleaned(self, *, needs_values: bool = True, needs_change: bool = True) -> tuple[Any, dict[Hashable, str]]:
         """The values as they were given, NaN where some are put aside, and columns that cannot be used, with reasons.
 
-        These have no value or one, or most of their values were set aside.
+        Most of their values were set aside, or they have no value, or one, where such are needed.
         """
         n_known = np.count_nonzero(~np.isnan(self.before), axis=0)
         n_left = np.count_nonzero(~np.isnan(self.values), axis=0)
         reasons: dict[Hashable, str] = {}
         for place, name in enumerate(self.columns):
             aside, useless, n_elsewhere = [], [], 0
+            is_needed = needs_change if n_known[place] else needs_values
             for found in self.findings:
-                if found.column == name and found.what in ASIDE_KINDS:
+                if found.column == name and found.what in ASIDE_REASONS:
                     aside.append(found.detail)
                     n_elsewhere += found.n_rows if found.what == "another-level" else 0
-                elif found.column == name and found.what in LEFT_OUT_KINDS.difference(exclude):
-                    useless.append(f"{found.detail} ({found.what})")
+                elif found.column == name and found.is_useless_column and is_needed:
+                    useless.append(found.detail)
             # of two levels, it is not certain which one is right
             if n_left[place] < 0.5 * n_known[place] or n_elsewhere > 0.2 * n_known[place]:
                 reasons[name] = "; ".join(aside)
@@ -170,10 +175,12 @@ def look_at_temperatures(T: Reading) -> None:
         place, column = places[0], T.values[:, places[0]]
         known = np.sort(column[~np.isnan(column)])
         if known.size and known[0] > COLDEST + 273.15 and known[-1] < HOTTEST + 273.15:
-            T.found_in("kelvin", place, f"lies between {known[0]:.6g} and {known[-1]:.6g}")
+            detail = f"lies between {known[0]:.6g} and {known[-1]:.6g}, as in kelvin,"
+            T.found_in("wrong-unit", place, detail, meaningless=True)
             continue
         wrong = np.isin(column, marker_levels(known, 30.0, COLDEST, HOTTEST))
-        is_changed = T.put_aside("kelvin", place, wrong & (column > COLDEST + 273.15) & (column < HOTTEST + 273.15))
+        kelvin = wrong & (column > COLDEST + 273.15) & (column < HOTTEST + 273.15)
+        is_changed = T.put_aside("wrong-unit", place, kelvin, is_kelvin=True)
         if T.put_aside("placeholders", place, wrong) or is_changed:
             known = np.sort(column[~np.isnan(column)])
         low, high = usual_range(known, 10.0)  # a structure passes gaps while records are left out
@@ -261,11 +268,11 @@ def has_levels(table: Reading, place: int, known: Array) -> bool:
     is_coarse = len(levels) <= 4 and n_known >= 50
     if not n_known and not any(found.column == name for found in table.findings):
         rows = np.ones(len(table.values), dtype=bool)
-        table.found("missing-column", name, rows, f"{name!r} is NaN in all {len(rows)} rows")
+        table.found("useless-column", name, rows, f"{name!r} is NaN in all {len(rows)} rows", meaningless=True)
     elif len(levels) == 1 < n_known:
-        table.found_in("constant", place, f"is {levels[0]:.6g}{table.unit}")
+        table.found_in("useless-column", place, f"is {levels[0]:.6g}{table.unit}, constant,", meaningless=True)
     elif n_known and is_coarse:
-        table.found_in("few-values", place, f"has the {len(levels)} values {texts_of(levels)}{table.unit}")
+        table.found_in("useless-column", place, f"has only the values {texts_of(levels)}{table.unit}")
     if len(levels) < 2 or is_coarse:
         table.useless.add(place)
     return len(levels) > 1
@@ -314,7 +321,7 @@ def in_degrees(T: Reading, places: list[int]) -> list[int]:
         hint = hints.get(number, "beside others in such a unit" if is_rule else "")
         if hint:
             span = f"lies between {lowest[number]:.6g} and {highest[number]:.6g}"
-            T.found_in("unit-of-temperatures", place, f"{span}, {hint},")
+            T.found_in("wrong-unit", place, f"{span}, {hint},")
         else:
             celsius.append(place)
     return celsius
@@ -364,7 +371,8 @@ def compare_with_model(F: Reading, model: Any) -> None:
     nominal = np.ravel(model.frequencies(np.ones((1, len(model.parameter_names)))))
     everywhere = np.ones(len(F.values), dtype=bool)
     if len(nominal) != len(F.columns):
-        F.found("unit-of-frequencies", "", everywhere, f"{len(F.columns)} columns for {len(nominal)} modes")
+        detail = f"{len(F.columns)} columns for {len(nominal)} modes of the model"
+        F.found("mode-order", "", everywhere, detail, meaningless=True)
         return
     middles = median(F.values)
     units = {"rad/s": 2 * np.pi, "kHz": 1e-3, "mHz": 1e3, "cycles per minute": 60.0}  # how many of them are 1 Hz
@@ -378,13 +386,14 @@ def compare_with_model(F: Reading, model: Any) -> None:
     best = 1 + int(np.argmin(typical[1:]))
     if typical[best] < 0.2 and typical[0] > 0.5:
         detail = f"the medians {texts_of(middles)} beside {texts_of(nominal)} Hz of the model are about those in"
-        F.found("unit-of-frequencies", "", everywhere, f"{detail} {names[best]}; {len(everywhere)} rows")
+        detail = f"{detail} {names[best]}; {len(everywhere)} rows"
+        F.found("wrong-unit", "", everywhere, detail, meaningless=True)
         return
     for place in np.flatnonzero(off[0] > 0.5):
         fits = np.flatnonzero(off[1:, place] < 0.2)
         hint = f", as in {names[1 + fits[0]]}," if len(fits) else ""
         detail = f"has the median {middles[place]:.4g}, the model {nominal[place]:.4g} Hz{hint}"
-        F.found_in("unit-of-a-mode", place, detail)
+        F.found_in("wrong-unit", place, detail)
 
 
 @dataclass(frozen=True)

@@ -150,7 +150,7 @@ def _table(
             f"{file} does not end with a line break. Its last value may be cut off, and a last line with fewer values "
             "than names is left out. Rename files when they are complete"
         )
-        findings.append(RecordsWarning(text, "unfinished-file"))
+        findings.append(RecordsWarning(text, "read-as"))
     stamp_columns = list(form.stamp_columns) or names[:1]
     wanted = [name for name in names if name not in stamp_columns and name not in ignore]
     if len(names) < 2 or any(names.count(name) != 1 for name in [*wanted, *stamp_columns]):

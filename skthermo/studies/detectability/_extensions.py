@@ -322,7 +322,7 @@ def _doubtful_modes(fem: DataInformedFEM, ranks: Sequence[int], *, most: float =
         f"of the measured modes: {', '.join(doubtful)}. Their gain is doubtful. Measure such a mode once before its "
         "sensors are bought"
     )
-    return [ResultWarning(text, "undetermined-mode")] if doubtful else []
+    return [ResultWarning(text, "undetermined")] if doubtful else []
 
 
 def _with_sensors(

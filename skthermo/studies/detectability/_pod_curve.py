@@ -291,7 +291,7 @@ def fitted_curve(
         f"the curve lies outside the bounds of {curve.n_missed} of {len(s)} tested severities. a50, a90 and a90/95 may "
         "be wrong. Test more severities near a90, and fit those alone"
     )
-    return curve, [ResultWarning(text, "poor-curve-fit")]
+    return curve, [ResultWarning(text, "no-curve")]
 
 
 def _placed(curve: PODCurve) -> str:

@@ -16,7 +16,7 @@ from sklearn.exceptions import NotFittedError
 from skthermo._core.arrays import Array, as_random_state, check_jobs, check_probability, is_auto, positive_integer
 from skthermo._core.estimators import Stages, last_step, seeded
 from skthermo._core.parallel import run_jobs, single_blas_thread
-from skthermo._core.warnings import collected, warn_each
+from skthermo._core.warnings import collected, one_of_each_kind, warn_each
 from skthermo.exceptions import ModelWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
@@ -333,7 +333,7 @@ class DetectabilityStudy(BaseEstimator):
             for part in (decided.decisions, decided.calibration, decided.indices)
         )
         self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()
-        self.warnings_ = list({one.kind: str(one) for one in reversed(findings)}.values())[::-1]
+        self.warnings_ = list(map(str, one_of_each_kind(findings)))
         warn_each(findings)
         return results
 
@@ -830,7 +830,7 @@ def failures(failed: Sequence[str], n_replicates: int) -> list[ModelWarning]:
             "be refitted, or uncertainty='noise'"
         )
     text = f"{len(failed)} of {n_replicates} replicates failed, the first with {failed[:1]}. Bands are of the others"
-    return [ModelWarning(text, "failed-replicates")] if failed else []
+    return [ModelWarning(text, "no-solution")] if failed else []
 
 
 def many_false_alarms(results: pd.DataFrame) -> list[ResultWarning]:

@@ -131,11 +131,13 @@ class TaskScorer:
             raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
         order = np.argsort(rows, kind="stable")
         state, values = self.state[rows[order]], []
-        with collected() as findings:
-            for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
+        of_first_rows, findings = ("not-evaluated", "no-earlier-records"), list[SkthermoWarning]()
+        for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
+            with collected() as found:
                 values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
-        of_first_rows = "not-predicted", "no-earlier-records"
-        warn_each(one for one in findings if one.kind not in of_first_rows)
+            is_none = np.isnan(values[-1]).all()
+            findings += [finding for finding in found if is_none or finding.kind not in of_first_rows]
+        warn_each(findings)
         repeat, scenario = np.divmod(state, self.n_scenarios)
         return Decisions(np.concatenate(values), labels[order], scenario, repeat)
 
@@ -318,7 +320,7 @@ class DetectionTask(Bunch):
         fresh, findings = _task(self.fem, T, self.scenarios, self.baseline, self.measurement, limit, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
             text = "the weather is that of the task: the optimism is that of the noise alone. Give that of another year"
-            findings.append(WeatherWarning(text, "same-weather"))
+            findings.append(WeatherWarning(text, "other-weather"))
         rows = []
         for name, detector in named.items():
             fitted = self.refit(detector)
@@ -524,9 +526,9 @@ def _baseline(fem: DataInformedFEM, baseline: Table | None) -> tuple[pd.DataFram
     is_sensor = table.columns.isin(sensors_of(fem))
     T, F = (table.loc[:, chosen] if chosen.any() else None for chosen in (is_sensor, ~is_sensor))
     is_whole = table.shape[1] == len(sensors_of(fem)) + len(fem.mode_names_)
-    found = set_aside(T, F, model=fem.model if is_whole else None, needs_all=True)
+    found, doubts = set_aside(T, F, model=fem.model if is_whole else None, needs_all=True)
     tables = [one for one in (found.temperatures, found.frequencies) if one is not None]
-    return pd.concat(tables, axis=1)[list(table)], found.others.warnings()
+    return pd.concat(tables, axis=1)[list(table)], [*doubts]
 
 
 def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:

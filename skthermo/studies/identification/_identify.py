@@ -631,7 +631,7 @@ class IdentifiedDamage(Sentences):
             yield ResultWarning(
                 f"these modes do not show {listed(self._open, 'nor')}. Take records over a longer time, or measure "
                 "mode shapes or other modes",
-                "indistinguishable-groups",
+                "undetermined",
             )
         if self.explained[0].has_else or self.misfit_p_value < 0.05:
             yield ResultWarning(

@@ -144,14 +144,14 @@ def _findings(counts: dict[str, Any], left_out: dict[str, Array]) -> list[Skther
         text = f"{n_left:,} of {counted(counts['given'], 'record')} could not be compared: {_reasons(left_out)}"
         if left_out["far from the other records"][-3:].all():
             text += ". The last records are among them: the structure may have just changed. Identify these alone"
-        found.append(UnevaluatedRowsWarning(text, "not-compared"))
+        found.append(UnevaluatedRowsWarning(text, "not-evaluated"))
     if counts["independent"] < 3 or counts["independent of trained"] < 20:
         found.append(
             FewRecordsWarning(
                 f"the records are worth {counts['independent']:.3g} independent ones (expected 3 or more), the "
                 f"training records {counts['independent of trained']:.3g} (expected 20 or more). Probabilities and "
                 "standard errors are rough. Take records over a longer time",
-                "few-independent-records",
+                "few-records",
             )
         )
     return found
@@ -177,8 +177,9 @@ def _checked(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
         raise ValueError(
             f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
         )
-    kinds = {"no-rows", "missing-column", "constant"}
-    return as_floats(set_aside(T, F, model=fem.model, exclude=kinds, needs_all=True, is_baseline=False).frequencies)
+    kinds = {"few-records", "useless-column"}
+    found, _ = set_aside(T, F, model=fem.model, exclude=kinds, needs_all=True, is_baseline=False)
+    return as_floats(found.frequencies)
 
 
 @dataclass(frozen=True)
@@ -293,7 +294,7 @@ def _shape_changes(
                 f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below 0.5 with the "
                 f"model's, {names[np.flatnonzero(foreign)[0]]} the first. They are left out. Give shapes of the same "
                 "modes, with rows in the order of dofs",
-                "foreign-shapes",
+                "doubtful-shapes",
             )
         )
     return compared, (states[1].mean() - states[0].mean()).to_numpy(), variances, findings
