@@ -145,8 +145,8 @@ def test_gaps_of_temperatures_and_frequencies_are_filled_together_so_that_all_ro
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(no-earlier-records|uncalibrated-model|outside-bounds|outside-training-weather)")
-@pytest.mark.filterwarnings("ignore:.*(filled-temperatures|not-predicted)")
+@pytest.mark.filterwarnings("ignore:.*(no-earlier-records|uncalibrated-model|outside-bounds|other-weather)")
+@pytest.mark.filterwarnings("ignore:.*(faulty-sensor|not-evaluated)")
 def test_a_search_over_layers_lags_neighbours_and_aligners():
     grid = {
         "inverse__regressor__hidden_layer_sizes": [(16,), (32, 16)],
@@ -173,7 +173,7 @@ def on_kw51():
 
 
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(no-earlier-records|uncalibrated-model|few-rows|outside-bounds|round-trip-error)")
+@pytest.mark.filterwarnings("ignore:.*(no-earlier-records|uncalibrated-model|few-records|outside-bounds)")
 def test_a_reduced_model_gives_the_same_in_less_time():
     bridge, air, measured = on_kw51()
     chain = paper_chain(bridge, network="kw51", lags=3, n_samples=60, random_state=0)
