@@ -258,3 +258,30 @@ def test_the_cleaned_tables_are_those_of_set_aside():
     assert found.left_out == expected.left_out == {"T3": found.left_out["T3"]}
     pd.testing.assert_frame_equal(found.temperatures, expected.temperatures)
     pd.testing.assert_frame_equal(found.frequencies, expected.frequencies)
+
+
+def other_inputs(T):
+    """Beside temperatures: a flag, radiation in W/m2, wind, vehicles a day, powers of a temperature."""
+    random, n = np.random.default_rng(0), len(T)
+    others = {
+        "frost": (T["T1"] < 5).astype(float),
+        "radiation": np.maximum(800 * np.sin(np.arange(n)), 0.0),
+        "wind": random.gamma(2.0, 3.0, n),
+        "vehicles": random.poisson(20_000, n).astype(float),
+        "T1^3": T["T1"] ** 3,
+    }
+    return T.assign(**others)
+
+
+def test_inputs_that_are_no_temperatures_are_no_findings():
+    inputs = other_inputs(T)
+    found = check_records(inputs, F)
+    assert found.table.empty
+    pd.testing.assert_frame_equal(found.temperatures, inputs)
+
+
+def test_temperatures_among_other_inputs_are_still_looked_at():
+    inputs = other_inputs(T)
+    inputs["T1"] += 273.15
+    inputs.loc[inputs.index[7], "T2"] = 400.0
+    assert set(check_records(inputs, F).table["column"]) == {"T1", "T2"}

@@ -18,8 +18,8 @@ from skthermo.preprocessing.checks._beside_weather import look_at_both, looks_ex
 from skthermo.preprocessing.checks._columns import (
     Reading,
     compare_with_model,
+    look_at_inputs,
     look_at_responses,
-    look_at_temperatures,
     put_stuck_aside,
 )
 from skthermo.preprocessing.checks._record_findings import (
@@ -65,7 +65,7 @@ def examine(
         if len(reading.values) < 2:
             continue
         if reading.what == "temperatures":
-            look_at_temperatures(reading)
+            look_at_inputs(reading)
         else:
             look_at_responses(reading, in_hertz=unit == "Hz", beside_weather=is_pair)
             if model is not None and unit == "Hz":

@@ -3,6 +3,7 @@ units."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -168,10 +169,35 @@ def texts_of(levels: Array) -> str:
     return ", ".join(map("{:.6g}".format, levels))
 
 
-def look_at_temperatures(T: Reading) -> None:
+def are_temperatures(T: Reading) -> NDArray[np.bool_]:
+    """Which columns hold temperatures: those with such a name, and others whose values can be temperatures.
+
+    Inputs may be flags, radiation, wind or powers of temperatures too, which have no degrees.
+    """
+    found = np.ones(len(T.columns), dtype=bool)
+    for place, (name, column) in enumerate(zip(T.columns, T.values.T, strict=True)):
+        text = str(name).strip().lower()
+        is_named = re.search(r"temp|°c|deg ?c|celsius", text) or re.fullmatch(r"t[a-z]{0,2}[-_ .]?\d*", text)
+        known = column[~np.isnan(column) & ~np.isin(column, LOGGED)]
+        if not is_named and known.size:
+            could_be = [((known > COLDEST + zero) & (known < HOTTEST + zero)).mean() for zero in (0.0, 273.15)]
+            found[place] = max(could_be) > 0.8 and not np.isin(known, (0.0, 1.0)).all()
+    return found
+
+
+def look_at_inputs(T: Reading) -> None:
+    """Look at temperatures as such, and at other inputs as at responses of any unit."""
+    are_thermal = are_temperatures(T)
+    look_at_temperatures(T, np.flatnonzero(are_thermal))
+    look_at_responses(T, in_hertz=False, beside_weather=True, places=np.flatnonzero(~are_thermal))
+
+
+def look_at_temperatures(T: Reading, thermal: NDArray[np.intp]) -> None:
     """Put aside values that no thermometer in the open shows, and name columns in another unit or with another sign."""
     varying = []
     for places in columns_by_sensor(T).values():  # lags repeat what a sensor shows
+        if places[0] not in thermal:
+            continue
         place, column = places[0], T.values[:, places[0]]
         known = np.sort(column[~np.isnan(column)])
         if known.size and known[0] > COLDEST + 273.15 and known[-1] < HOTTEST + 273.15:
@@ -191,12 +217,15 @@ def look_at_temperatures(T: Reading) -> None:
         T.put_aside("implausible-values", place, (T.values[:, place] < COLDEST) | (T.values[:, place] > HOTTEST))
 
 
-def look_at_responses(F: Reading, *, in_hertz: bool, beside_weather: bool) -> None:
-    """Put aside values that are no frequencies, or no responses of another kind.
+def look_at_responses(
+    F: Reading, *, in_hertz: bool, beside_weather: bool, places: NDArray[np.intp] | None = None
+) -> None:
+    """Put aside values that are no frequencies, or no responses of another kind, of all columns or of some.
 
     Beside the weather, single values far from others are left to the search for exchanged modes and outliers.
     """
-    for place, column in enumerate(F.values.T):
+    for place in range(len(F.columns)) if places is None else places.tolist():
+        column = F.values[:, place]
         known = np.sort(column[~np.isnan(column)])
         rest = known[~np.isin(known, LOGGED) & ((known > 0) | (not in_hertz))]
         low, middle, high = np.quantile(rest, [0.1, 0.5, 0.9]) if rest.size else (0.0, 0.0, 0.0)
@@ -266,12 +295,13 @@ def has_levels(table: Reading, place: int, known: Array) -> bool:
     """Whether a column has more than one value; name it where it has few, one or none."""
     levels, n_known, name = known[equal_runs(known)[0]], len(known), table.columns[place]
     is_coarse = len(levels) <= 4 and n_known >= 50
+    is_flag = np.array_equal(levels, [0.0, 1.0])  # of frost, or of a closed lane
     if not n_known and not any(found.column == name for found in table.findings):
         rows = np.ones(len(table.values), dtype=bool)
         table.found("useless-column", name, rows, f"{name!r} is NaN in all {len(rows)} rows", meaningless=True)
     elif len(levels) == 1 < n_known:
         table.found_in("useless-column", place, f"is {levels[0]:.6g}{table.unit}, constant,", meaningless=True)
-    elif n_known and is_coarse:
+    elif n_known and is_coarse and not is_flag:
         table.found_in("useless-column", place, f"has only the values {texts_of(levels)}{table.unit}")
     if len(levels) < 2 or is_coarse:
         table.useless.add(place)
