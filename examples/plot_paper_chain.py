@@ -5,7 +5,7 @@ The paper's own chain on its truss
 Section 3 of Kamali, Ceravolo & Marzani (2026) with their own choices, networks and all:
 :func:`~skthermo.surrogate.paper_chain`. :doc:`plot_truss_study` has the same study with the choices of skthermo.
 
-Run it with ``python examples/plot_paper_chain.py``, which takes about half a minute. It needs
+Run it with ``python examples/plot_paper_chain.py``, which takes some ten seconds. It needs
 :download:`truss_recipes.py` and :download:`page_recipes.py` beside it. All tables: :doc:`/accuracy_paper`.
 """
 
