@@ -28,6 +28,7 @@ from skthermo.datasets._fleet_site import (
 from skthermo.datasets._fleet_structures import KINDS, Design, Kind
 from skthermo.datasets._results import FleetRecords
 from skthermo.fem import AffineModel
+from skthermo.fem.damage import LossKind
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,7 @@ class FleetBridge:
         *,
         samples_per_day: int = 1,
         damage: Mapping[str, float] | None = None,
+        kind: LossKind = "stiffness",
         noise: ArrayLike | None = None,
         gaps: float = 0.05,
         outliers: float = 0.002,
@@ -163,6 +165,8 @@ class FleetBridge:
             the temperatures inside the bridge, which follow with thermal inertia.
         damage : mapping of str to float, optional
             Severity by damage group, as in ``model.damaged``: 0.2 takes 20 % of its stiffness.
+        kind : {"stiffness", "section"}, default="stiffness"
+            What damage takes, as in ``model.damaged``.
         noise : float or array-like of shape (n_modes,), optional
             Relative standard deviation of the noise of frequencies, by default the bridge's own ``noise``. Of its
             variance 40 % lasts for two days.
@@ -198,7 +202,7 @@ class FleetBridge:
         gaps, outliers = check_share(gaps, "gaps"), check_share(outliers, "outliers")
         modes = [f"f{i + 1}" for i in range(KINDS[self.kind].n_modes)]
         level = self.noise if noise is None else check_noise(noise, len(modes))
-        model = self.truth.damaged({} if damage is None else damage)
+        model = self.truth.damaged({} if damage is None else damage, kind=kind)
         own = 0 if random_state is None else 1 + as_random_state(random_state).randint(2**31 - 1)
 
         def key(what: int) -> tuple[int, ...]:

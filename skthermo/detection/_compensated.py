@@ -108,7 +108,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
     >>> from skthermo.detection import CompensatedDetector, DirectionalDetector
     >>> year, damaged = (make_truss_campaign(damage=damage, random_state=0) for damage in (None, {"bottom": 0.05}))
     >>> baseline, later = (campaign.temperatures.join(campaign.frequencies) for campaign in (year, damaged))
-    >>> directional = DirectionalDetector(make_truss())
+    >>> directional = DirectionalDetector(make_truss().damage_directions(kind="stiffness"))
     >>> for window in (None, 7):
     ...     detector = CompensatedDetector(directional, targets=list(year.frequencies), window=window)
     ...     print(f"{(detector.fit(baseline).score_samples(later) < detector.offset_).mean():.0%}")
@@ -225,47 +225,56 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         return Z if isinstance(X, pd.DataFrame) else Z.to_numpy()
 
     @available_if(_detector_has("severities"))
-    def severities(self, X: ArrayLike) -> pd.DataFrame:
+    def severities(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Amounts of the directions by which the test explains each record, as `DirectionalDetector.severities`.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_features)
             Temperatures and frequencies, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
         DataFrame of shape (n_samples, n_directions)
             NaN where a record, or its window, has no mode.
         """
-        amounts = self._by_regime(X, lambda detector, Z: detector.severities(Z).to_numpy())
+        options = {} if kind == "stiffness" else {"kind": kind}  # a detector of your own may have no kinds
+        amounts = self._by_regime(X, lambda detector, Z: detector.severities(Z, **options).to_numpy())
         index = X.index if isinstance(X, pd.DataFrame) else None
-        return pd.DataFrame(amounts, index, self.detectors_[0].directions_.index)
+        names = self.detectors_[0].directions_.index
+        return pd.DataFrame(amounts, index, names[names.str.endswith(", section") == (kind == "section")])
 
     @available_if(_detector_has("explained"))
-    def explained(self, X: ArrayLike) -> Array:
+    def explained(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> Array:
         """Share of the departure of each record that the directions explain, as `DirectionalDetector.explained`.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_features)
             Temperatures and frequencies, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
         ndarray of shape (n_samples,)
             From 0 to 1; NaN where a record, or its window, has no mode.
         """
-        return self._by_regime(X, lambda detector, Z: detector.explained(Z))
+        options = {} if kind == "stiffness" else {"kind": kind}
+        return self._by_regime(X, lambda detector, Z: detector.explained(Z, **options))
 
     @available_if(_detector_has("pod"))
-    def pod(self, severities: ArrayLike) -> pd.DataFrame:
+    def pod(self, severities: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Probability of detection of records, or of full windows all of whose records have the loss.
 
         Parameters
         ----------
         severities : array-like of shape (n_severities,)
             Amounts of each direction, as `DirectionalDetector.pod` has them.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
@@ -273,16 +282,22 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             Share of records above the threshold, in the regimes as often as in the baseline.
         """
         check_is_fitted(self)
-        return sum(share * one.pod(severities) for share, one in zip(self.shares_, self.detectors_, strict=True))
+        options = {} if kind == "stiffness" else {"kind": kind}  # a detector of your own may have no kinds
+        rates = (one.pod(severities, **options) for one in self.detectors_)
+        return sum(share * rate for share, rate in zip(self.shares_, rates, strict=True))
 
     @available_if(_detector_has("minimum_detectable_damage"))
-    def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
+    def minimum_detectable_damage(
+        self, level: float = 0.9, *, kind: Literal["stiffness", "section"] = "stiffness"
+    ) -> pd.Series:
         """Smallest amount of each direction alone that is found in a share of the records or full windows.
 
         Parameters
         ----------
         level : float, default=0.9
             That share, between 0 and 1.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `DirectionalDetector.pod`.
 
         Returns
         -------
@@ -290,16 +305,16 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             As `DirectionalDetector.minimum_detectable_damage`, in the regimes as often as in the baseline.
         """
         check_is_fitted(self)
-        level, alone = (
-            check_probability(level, "level"),
-            [one.minimum_detectable_damage(level) for one in self.detectors_],
-        )
+        level, options = check_probability(level, "level"), {} if kind == "stiffness" else {"kind": kind}
+        alone = [one.minimum_detectable_damage(level, **options) for one in self.detectors_]
         if len(alone) == 1:
             return alone[0]
         highest = pd.concat(alone, axis=1).max(axis=1)
         found = {
             name: smallest_amount(
-                lambda sizes, k=name: self.pod(sizes)[k].to_numpy(), most if np.isfinite(most) else 1.0, level
+                lambda sizes, k=name: self.pod(sizes, kind=kind)[k].to_numpy(),
+                most if np.isfinite(most) else 1.0,
+                level,
             )
             for name, most in highest.items()
         }

@@ -23,16 +23,18 @@ class DirectionalDetector(MahalanobisDetector):
 
     The one-sided likelihood-ratio test against the cone of all non-negative combinations of the directions [Kud63]_,
     [Per69]_. The damage index is the length of the projection of a whitened record on that cone, in standard
-    deviations, or the *unsquared* Mahalanobis distance (omnibus) times ``omnibus_scale_``, whichever is larger.
+    deviations, or the *unsquared* Mahalanobis distance (omnibus) times ``omnibus_scale_``, whichever is larger. Losses
+    of section have a cone of their own, and its length counts times ``section_scale_``.
 
     Parameters
     ----------
     directions : "softening", FE model, fitted chain, DataFrame or array, default="softening"
         Relative changes of the frequencies:
 
-        - ``"softening"``: each frequency can only fall.
+        - ``"softening"``: each frequency only falls, as by any loss of stiffness; a loss of section raises some.
         - An FE model, or a fitted `~skthermo.surrogate.DataInformedFEM`: those by a loss of stiffness of each of its
-          damage groups.
+          damage groups and, where it knows their mass, by a loss of section, named as in "bottom, section". Nobody
+          knows beforehand which comes.
         - (n_directions, n_modes): relative changes by one unit of each direction, in any unit. The columns of a frame
           are matched by name where both have names, and its index names the directions.
     contamination : float, default=0.02
@@ -54,9 +56,10 @@ class DirectionalDetector(MahalanobisDetector):
         alarm by one may be by the other.
     sensitivities_ : Series of shape (n_directions,)
         By how many standard deviations one unit of each direction moves a record that has all modes.
-    omnibus_scale_ : float
-        Factor of the Mahalanobis distance beside the length in the cone: with it, both tests share the false alarms as
-        ``omnibus`` says.
+    omnibus_scale_, section_scale_ : float
+        Factors of the Mahalanobis distance, and of the length in the cone of losses of section, beside the length in
+        the cone of the other directions: with them, the tests share the false alarms as ``omnibus`` says, and both
+        cones alike. 0 without the test, and 1 for the only one.
     covariance_ : estimator
         Fitted: mean (``location_``) and covariance of the baseline.
     baseline_index_ : ndarray of shape (n_samples,)
@@ -96,18 +99,23 @@ class DirectionalDetector(MahalanobisDetector):
     >>> healthy, damaged = (make_truss_campaign(damage=damage, random_state=0) for damage in (None, {"bottom": 0.08}))
     >>> baseline, later = (campaign.temperatures.join(campaign.frequencies) for campaign in (healthy, damaged))
     >>> regression = TemperatureCompensator(TemperatureMapper(), targets=list(healthy.frequencies))
-    >>> for detector in (MahalanobisDetector(), DirectionalDetector(), DirectionalDetector(make_truss())):
-    ...     detector = make_pipeline(regression, detector).fit(baseline)
+    >>> of_stiffness = make_truss().damage_directions(kind="stiffness")
+    >>> for directions in (None, "softening", make_truss(), of_stiffness):
+    ...     last = MahalanobisDetector() if directions is None else DirectionalDetector(directions)
+    ...     detector = make_pipeline(regression, last).fit(baseline)
     ...     print(f"{(detector.predict(later) == -1).mean():.0%}")
     46%
     65%
+    59%
     85%
-    >>> detector[-1].minimum_detectable_damage().round(2)
+
+    Who looks for losses of section too finds those of stiffness less often. The smallest ones of the last detector:
+
+    >>> detector[-1].minimum_detectable_damage()[["bottom", "top", "diagonal"]].round(2)
     direction
     bottom      0.09
     top         0.11
     diagonal    0.06
-    vertical     inf
     dtype: float64
     """
 
@@ -149,82 +157,97 @@ class DirectionalDetector(MahalanobisDetector):
         self.sensitivities_ = pd.Series(np.linalg.norm(white, axis=0), self.directions_.index)
         self.indistinguishable_ = alike(white, self.directions_.index)
         is_conformal = self.threshold == "conformal"
-        indices = self._by_others(self._both, F, times) if is_conformal else self._both(normal_of(self.covariance_), F)
-        self.omnibus_scale_ = self._scale_of_omnibus(*indices.T)
-        return self._joined(*indices.T)
+        tests = self._by_others(self._tests, F, times) if is_conformal else self._tests(normal_of(self.covariance_), F)
+        self._scales = self._learned_scales(tests)
+        has_section = self.directions_.index.str.endswith(", section").any()
+        self.omnibus_scale_, self.section_scale_ = float(self._scales[0]), float(self._scales[-1] * has_section)
+        return self._joined(tests)
 
     def _index(self, F: Array) -> Array:
-        return self._joined(*self._both(normal_of(self.covariance_), F).T)
+        return self._joined(self._tests(normal_of(self.covariance_), F))
 
-    def _joined(self, omnibus: Array, cone: Array) -> Array:
-        if self.omnibus in (0, 1):
-            return omnibus if self.omnibus else cone
-        return np.maximum(cone, self.omnibus_scale_ * omnibus)
+    def _joined(self, tests: Array) -> Array:
+        return (tests * self._scales).max(axis=1)
 
-    def _scale_of_omnibus(self, omnibus: Array, cone: Array) -> float:
-        """Ratio of the thresholds that each index would have by itself, with its share of the false alarms."""
-        if self.omnibus in (0, 1):
-            return 1.0
-        rates = (1 - self.omnibus) * self.contamination, self.omnibus * self.contamination
-        return rare_level(cone, rates[0]) / rare_level(omnibus, rates[1])
+    def _learned_scales(self, tests: Array) -> Array:
+        """Ratios of the thresholds that each test would have by itself, with its share of the false alarms."""
+        n_cones = tests.shape[1] - 1
+        shares = np.array([self.omnibus, *n_cones * [(1 - self.omnibus) / n_cones]])
+        rates = shares * self.contamination
+        levels = [rare_level(own, rate) if rate else np.inf for own, rate in zip(tests.T, rates, strict=True)]
+        return (levels[0] if self.omnibus == 1 else levels[1]) / np.array(levels)
 
-    def _both(self, normal: Gaussian, F: Array) -> Array:
-        """Mahalanobis distance and length in the cone of each row, as if no mode were missing, (n_rows, 2)."""
-        lengths = project(normal, self.directions_.to_numpy(), F)[1]
+    def _tests(self, normal: Gaussian, F: Array) -> Array:
+        """Mahalanobis distance of each row and its length in each cone, as if no mode were missing."""
         present = ~np.isnan(F)
+        lengths = np.column_stack([project(normal, self.directions_.to_numpy()[c], F)[1] for c in self._cones])
         lengths[~present.any(axis=1)] = np.nan
-        lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))
+        lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))[:, np.newaxis]
         return np.column_stack([self._indices(normal, F), lengths])
 
-    def severities(self, X: ArrayLike) -> pd.DataFrame:
+    @property
+    def _cones(self) -> list[NDArray[np.intp]]:
+        """Numbers of the directions of each kind of loss, those of section last."""
+        are_section = self.directions_.index.str.endswith(", section")
+        return [np.flatnonzero(some) for some in (~are_section, are_section) if some.any()]
+
+    def severities(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Losses by which the test explains each record.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
             Frequencies in Hz, or residuals, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `pod`.
 
         Returns
         -------
         DataFrame of shape (n_samples, n_directions)
             The amounts of the directions, none of them negative, that are most likely: with an FE model the loss of
-            stiffness of each group, with "softening" the fall of each frequency, from 0 to 1, by effects in proportion
-            to it; else in the unit of the given directions. NaN where a record has no mode. Directions of
-            ``indistinguishable_`` share what either could explain.
+            each group, with "softening" the fall of each frequency, from 0 to 1, by effects in proportion to it; else
+            in the unit of the given directions. NaN where a record has no mode. Directions of ``indistinguishable_``
+            share what either could explain.
         """
         check_is_fitted(self)
-        amounts = project(normal_of(self.covariance_), self.directions_.to_numpy(), self._relative(X))[0]
+        directions = self.directions_.loc[[*self._directions_of(kind)]]
+        amounts = project(normal_of(self.covariance_), directions.to_numpy(), self._relative(X))[0]
         index = X.index if isinstance(X, pd.DataFrame) else None
-        return pd.DataFrame(np.minimum(amounts, self._largest), index, self.directions_.index)
+        return pd.DataFrame(np.minimum(amounts, self._largest), index, directions.index)
 
-    def explained(self, X: ArrayLike) -> Array:
+    def explained(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> Array:
         """Share of the departure of each record from the baseline that the directions explain.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
             Frequencies in Hz, or residuals, in the columns of `fit`.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `pod`.
 
         Returns
         -------
         ndarray of shape (n_samples,)
-            Of the squared Mahalanobis distance, from 0 to 1; small where another change than a loss of stiffness of the
-            groups has happened, such as of a bearing or a mass. NaN where a record has no mode.
+            Of the squared Mahalanobis distance, from 0 to 1; small where another change than a loss of the groups has
+            happened, such as of a bearing or a mass. NaN where a record has no mode.
         """
         F = self._relative(X)
-        lengths = project(normal_of(self.covariance_), self.directions_.to_numpy(), F)[1]
+        directions = self.directions_.to_numpy()[[*self._directions_of(kind).values()]]
+        lengths = project(normal_of(self.covariance_), directions, F)[1]
         distances = normal_of(self.covariance_).distances(F)
         shares = np.full(len(F), np.nan)
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
 
-    def pod(self, severities: ArrayLike) -> pd.DataFrame:
+    def pod(self, severities: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Probability of detection of single records, by drawing normal ones from the learned covariance.
 
         Parameters
         ----------
         severities : array-like of shape (n_severities,)
-            Amounts of each direction: losses of stiffness of each group, or falls of each frequency, from 0 to 1, or
-            amounts in the unit of the given directions.
+            Amounts of each direction: losses of each group, or falls of each frequency, from 0 to 1, or amounts in the
+            unit of the given directions.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions: losses of section, named as in "bottom, section", or all others.
 
         Returns
         -------
@@ -234,7 +257,7 @@ class DirectionalDetector(MahalanobisDetector):
         Raises
         ------
         ValueError
-            If a severity is negative, or a loss larger than 1.
+            If a severity is negative, a loss larger than 1, or there is no direction of the kind.
         """
         check_is_fitted(self)
         amounts = np.ravel(real_array(severities, "severities"))
@@ -242,38 +265,62 @@ class DirectionalDetector(MahalanobisDetector):
             expected = "losses from 0 to 1" if self._largest == 1 else "amounts that are not negative"
             raise ValueError(f"severities is {severities!r:.200}; expected {expected}")
         white = self._white_effects()
-        rates = {name: self._rates(white, n, amounts) for n, name in enumerate(self.directions_.index)}
+        rates = {name: self._rates(white, n, amounts) for name, n in self._directions_of(kind).items()}
         return pd.DataFrame(rates, pd.Index(amounts, name="severity"))
 
-    def minimum_detectable_damage(self, level: float = 0.9) -> pd.Series:
+    def minimum_detectable_damage(
+        self, level: float = 0.9, *, kind: Literal["stiffness", "section"] = "stiffness"
+    ) -> pd.Series:
         """Smallest amount of each direction alone that is found in a share of the records.
 
         Parameters
         ----------
         level : float, default=0.9
             That share, between 0 and 1.
+        kind : {"stiffness", "section"}, default="stiffness"
+            Which directions, as in `pod`.
 
         Returns
         -------
         Series of shape (n_directions,)
-            Loss of stiffness by group, or fall of each frequency, infinite where not even a whole loss is found; else
+            Loss by group, or fall of each frequency, infinite where not even a whole loss is found; else
             in the unit of the given directions.
         """
         check_is_fitted(self)
         level, white = check_probability(level, "level"), self._white_effects()
-        found = []
-        for direction, length in enumerate(np.linalg.norm(white, axis=0)):
+        lengths, found = np.linalg.norm(white, axis=0), {}
+        threshold = self.threshold_ / (self.section_scale_ or 1.0 if kind == "section" else 1.0)
+        for name, direction in self._directions_of(kind).items():
             # five standard deviations above the threshold, every record is found
-            highest = min((self.threshold_ + 5) / max(length, np.finfo(float).tiny), self._largest)
-            found.append(smallest_amount(lambda sizes, k=direction: self._rates(white, k, sizes), highest, level))
-        return pd.Series(found, pd.Index(self.directions_.index, name="direction"), dtype=float)
+            highest = min((threshold + 5) / max(lengths[direction], np.finfo(float).tiny), self._largest)
+            found[name] = smallest_amount(lambda sizes, k=direction: self._rates(white, k, sizes), highest, level)
+        return pd.Series(found, dtype=float).rename_axis("direction")
+
+    def _directions_of(self, kind: str) -> dict[str, int]:
+        """Names and numbers of the directions of one kind of loss."""
+        if kind not in ("stiffness", "section"):
+            raise ValueError(f"kind is {kind!r}; expected 'stiffness' or 'section'")
+        are_section = self.directions_.index.str.endswith(", section")
+        chosen = {
+            name: number
+            for number, (name, is_section) in enumerate(zip(self.directions_.index, are_section, strict=True))
+            if is_section == (kind == "section")
+        }
+        if not chosen:
+            raise ValueError(
+                f"directions are {list(self.directions_.index)}, none of a loss of {kind}; expected the other kind, or "
+                "an FE model that knows the mass of its groups, as Structure.assemble or group_mass gives it"
+            )
+        return chosen
 
     def _rates(self, white: Array, direction: int, amounts: Array, n_draws: int = 2000) -> Array:
         """Shares of normal records with each amount of a direction above the threshold."""
         draws = np.random.RandomState(0).standard_normal((n_draws, len(white)))
         moved = (draws + np.outer(amounts, white[:, direction])[:, np.newaxis]).reshape(-1, len(white))
-        cone = project_on_cones((white.T @ white)[np.newaxis], moved @ white, np.zeros(len(moved), dtype=np.intp))[1]
-        above = self._joined(np.linalg.norm(moved, axis=1), cone) > self.threshold_
+        tests = [np.linalg.norm(moved, axis=1)]
+        for own in (white[:, cone] for cone in self._cones):
+            tests.append(project_on_cones((own.T @ own)[np.newaxis], moved @ own, np.zeros(len(moved), dtype=int))[1])
+        above = self._joined(np.column_stack(tests)) > self.threshold_
         return above.reshape(len(amounts), -1).mean(axis=1)
 
     def _white_effects(self) -> Array:

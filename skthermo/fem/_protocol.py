@@ -35,7 +35,8 @@ class FEModel(Protocol):
     - ``local_modes(theta, follow=...)``, modes and their derivatives at one theta, as `LocalModes`, with ``n_dof``, and
       ``track``, whether a column follows its mode (True) or its rank (False);
     - ``groups`` and ``damaged(damage)``, damage groups by name, and a model with less stiffness in some;
-    - ``damage_directions(groups)``, relative changes of the frequencies per small loss of each group's stiffness;
+    - ``group_mass``, masses of damage groups, and ``damaged(damage, kind="section")``, a model with less of both;
+    - ``damage_directions(groups)``, relative changes of the frequencies per small loss of each group;
     - ``with_damage_parameters(groups)``, a model whose theta ends with 1 - severity of each group;
     - ``with_mass_parameters(masses)``, a model whose theta ends with 1 + the amount of each added mass;
     - ``with_added(stiffness, mass)``, a model with further stiffness and mass;

@@ -6,13 +6,13 @@ from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import Array, Label, Matrix, MatrixLike, real_array
-from skthermo.fem._terms import Key
+from skthermo.fem._terms import Key, PartsOfMass
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.elements import (
     ROTATIONS,
@@ -85,12 +85,14 @@ Target = tuple[str, str, tuple[str, ...]]
 
 
 class Assembled(NamedTuple):
-    """Terms of stiffness and mass, stiffness terms of each damage group, and members and properties of each."""
+    """Terms of stiffness and mass, stiffness terms of each damage group, members and properties of each, and the
+    masses of damage groups."""
 
     stiffness: list[tuple[Key, Matrix]]
     mass: list[tuple[Key, Matrix]] | Matrix
     scaled: dict[str, list[int]]
     contents: list[list[tuple[Hashable, Key]]]
+    parts: PartsOfMass
 
 
 class Structure:
@@ -221,7 +223,8 @@ class Structure:
             group)`` means the whole mass of a group.
         groups : sequence of str, or mapping of str to group or (property, group), optional
             Damage groups: the whole stiffness of a group, or the part of it that one property multiplies, as in
-            ``{"torsion": ("G", "girder")}``. By default all groups of the structure.
+            ``{"torsion": ("G", "girder")}``. By default all groups of the structure. With its section, a group loses
+            the mass of its members, or the part that the property multiplies; point masses stay.
         n_modes : int, optional
             How many of the lowest modes the model gives. By default six, or all if there are fewer.
         track : bool, default=False
@@ -240,20 +243,23 @@ class Structure:
         """
         bindings = self._read_bindings(parameters, "parameter")
         damageable = self._read_bindings(list(self._groups) if groups is None else groups, "damage group")
-        stiffness, mass, scaled, contents = self._assembled(bindings, damageable)
+        stiffness, mass, scaled, contents, parts = self._assembled(bindings, damageable)
+        scaled = {name: terms for name, terms in scaled.items() if terms or groups is not None}
+        known = {name: places for name, places in parts.groups.items() if name in scaled}
         return AffineModel(
             stiffness,
             mass,
             n_modes=n_modes,
             parameter_names=tuple(bindings),
-            groups={name: terms for name, terms in scaled.items() if terms or groups is not None},
+            groups=scaled,
+            group_mass=parts._replace(groups=known),
             track=track,
             dofs=self.dofs,
             contents=contents,
         )
 
     def _assembled(self, bindings: Mapping[str, Target], damageable: Mapping[str, Target]) -> Assembled:
-        stiffness, mass = TermAssembler(self.dofs), TermAssembler(self.dofs)
+        stiffness, mass, parts = (TermAssembler(self.dofs) for _ in range(3))
         for name, element in self._members.items():
             coordinates = np.array([self._coordinates[node] for node in element.nodes])
             dofs = element.dofs(self.dimension)
@@ -261,9 +267,14 @@ class Structure:
             matrices = check_matrices(name, element, element.stiffness(coordinates), len(dofs), "stiffness")
             stiffness.add(name, matrices, dofs, self._bound(name, bindings, "stiffness"), damage)
             masses = check_matrices(name, element, element.mass(coordinates), len(dofs), "mass")
-            mass.add(name, masses, dofs, self._bound(name, bindings, "mass"))
+            bound = self._bound(name, bindings, "mass")
+            mass.add(name, masses, dofs, bound)
+            if matrices and damage:
+                parts.add(name, masses, dofs, bound, damage)
         scaled = {name: stiffness.positions(name) for name in damageable}
-        return Assembled(stiffness.terms(), mass.terms(), scaled, stiffness.contents)
+        lost = {name: tuple(parts.positions(name)) for name in damageable}
+        groups_mass = PartsOfMass(parts.terms() if parts.contents else [], lost, parts.contents)
+        return Assembled(stiffness.terms(), mass.terms(), scaled, stiffness.contents, groups_mass)
 
     def divide(
         self, model: AffineModel | ReducedModel, groups: Mapping[str, Mapping[str, Collection[Hashable]]]
@@ -311,7 +322,9 @@ class Structure:
                 f"the model has {terms[0].shape[0]} degrees of freedom, but the structure {self.n_dof}; expected a "
                 "model that this structure has assembled"
             )
+        masses = model._parts_of_mass
         parts: dict[str, dict[int, MatrixLike]] = {}
+        lighter: dict[str, dict[int, MatrixLike]] = {}
         for group, named in groups.items():
             if group not in model.groups:
                 raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(model.groups)}")
@@ -325,17 +338,26 @@ class Structure:
             for position in model.groups[group]:
                 for name, matrix in self._sum_by_part(model.contents[position], part_of, terms[position]).items():
                     parts.setdefault(name, {})[position] = matrix
-        return model.with_parts(parts)
+            lighter |= {name: {} for name in named if group in masses.groups and masses.contents}
+            for position in masses.groups.get(group, ()) if masses.contents else ():
+                contents, mass = masses.contents[position], masses.terms[position][1]
+                for name, matrix in self._sum_by_part(contents, part_of, mass, "mass").items():
+                    lighter[name][position] = matrix
+        return model.with_parts(parts, lighter)
 
     def _sum_by_part(
-        self, contents: Sequence[tuple[Hashable, tuple[str, ...]]], part_of: Mapping[Hashable, str], term: Matrix
+        self,
+        contents: Sequence[tuple[Hashable, tuple[str, ...]]],
+        part_of: Mapping[Hashable, str],
+        term: Matrix,
+        what: Literal["stiffness", "mass"] = "stiffness",
     ) -> dict[str, Matrix]:
-        """Summed stiffness of the members of every part of a term, after a check that all members make up the term."""
+        """Summed matrices of the members of every part of a term, after a check that all members make up the term."""
         assembler = TermAssembler(self.dofs)
         for member, properties in contents:
             element = self._members.get(member)
             nodes = [] if element is None else [self._coordinates[node] for node in element.nodes]
-            matrices = {} if element is None else element.stiffness(np.array(nodes))
+            matrices = {} if element is None else getattr(element, what)(np.array(nodes))
             if element is None or properties not in matrices:
                 raise ValueError(
                     f"member {member!r} of the model is not in the structure; expected the model's structure"
@@ -505,7 +527,7 @@ class ImportedStructure(Structure):
     model : AffineModel
         Each member is one of its parameters, as `load_affine` gives them for a folder with one file for each member. A
         member may be one element or several, such as all shells between two cross beams. Stiffness of no member, and
-        the mass, stay as they are.
+        the mass, stay as they are; ``group_mass`` of members is the mass that groups of them lose with their section.
     nodes : mapping of node to coordinates
         (x, y) or (x, y, z) in m. Nodes at which neither members end nor supports are, are left out.
     members : mapping of str to node or sequence of nodes
@@ -574,6 +596,7 @@ class ImportedStructure(Structure):
         self._labels = model.dofs
         super().__init__(coordinates, {name: ImportedMember(ends[name]) for name in members}, supports or {}, groups)
         self._mass = model.matrices(np.ones(len(model.parameter_names)))[1]
+        self._masses: dict[Hashable, Matrix] = dict(model.group_mass.items())
 
     @property
     def n_dof(self) -> int:
@@ -587,31 +610,39 @@ class ImportedStructure(Structure):
         for member in self._members:
             key, damage = (tuple(self._bound(member, bound, "stiffness")) for bound in (bindings, damageable))
             members_of.setdefault((key, damage), []).append(member)
-        terms = [(key, self._sum_of(members)) for (key, _), members in members_of.items()]
+        terms = [(key, self._sum_of(members, self._matrices)) for (key, _), members in members_of.items()]
         contents: list[list[tuple[Hashable, Key]]] = [[(one, ()) for one in members] for members in members_of.values()]
         if self._rest.nnz:
             terms.append(((), self._rest))
             contents.append([])
         scaled = {name: [i for i, (_, damage) in enumerate(members_of) if name in damage] for name in damageable}
-        return Assembled(terms, self._mass, scaled, contents)
+        known = [name for name, (_, group, _) in damageable.items() if self._groups[group] <= self._masses.keys()]
+        masses = [((), self._sum_of(members, self._masses)) for members in members_of.values()]
+        parts = PartsOfMass(masses if known else [], {name: tuple(scaled[name]) for name in known}, contents)
+        return Assembled(terms, self._mass, scaled, contents, parts)
 
     def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> Sequence[Label]:
         self._fixed_dofs(supports)
         return self._labels
 
     def _sum_by_part(
-        self, contents: Sequence[tuple[Hashable, Key]], part_of: Mapping[Hashable, str], term: Matrix
+        self,
+        contents: Sequence[tuple[Hashable, Key]],
+        part_of: Mapping[Hashable, str],
+        term: Matrix,
+        what: Literal["stiffness", "mass"] = "stiffness",
     ) -> dict[str, Matrix]:
-        check_same(self._sum_of([member for member, _ in contents]), term, contents)
+        matrices = self._matrices if what == "stiffness" else self._masses
+        check_same(self._sum_of([member for member, _ in contents], matrices), term, contents)
         parts: dict[str, list[Hashable]] = {}
         for member, _ in contents:
             if member in part_of:
                 parts.setdefault(part_of[member], []).append(member)
-        return {name: self._sum_of(members) for name, members in parts.items()}
+        return {name: self._sum_of(members, matrices) for name, members in parts.items()}
 
-    def _sum_of(self, members: Sequence[Hashable]) -> Matrix:
-        matrices = (self._matrices[member] for member in members if member in self._matrices)
-        return reduce(add, matrices, scipy.sparse.csc_array((self.n_dof, self.n_dof)))
+    def _sum_of(self, members: Sequence[Hashable], matrices: Mapping[Hashable, Matrix]) -> Matrix:
+        known = (matrices[member] for member in members if member in matrices)
+        return reduce(add, known, scipy.sparse.csc_array((self.n_dof, self.n_dof)))
 
 
 def matrices_by_member(

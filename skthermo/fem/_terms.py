@@ -1,12 +1,12 @@
 """Rows of theta, and matrices that are affine in products of its parameters: how they are read, and summed."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import scipy.sparse
@@ -17,8 +17,21 @@ from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._factors import Elimination, elimination
 
 Key = tuple[str, ...]
+Content = tuple[Hashable, tuple[str, ...]]
 
 ROWS_PER_CHUNK = 256  # largest number of samples solved together
+
+
+class PartsOfMass(NamedTuple):
+    """Masses of damage groups, parts of a model's mass; groups with common members share some.
+
+    ``terms`` are the parts in kg with the parameters that multiply them, ``groups`` gives the positions of the parts of
+    each group, and ``contents`` the members of a structure, and their properties, whose masses each part sums.
+    """
+
+    terms: Sequence[tuple[Key, Matrix]]
+    groups: dict[str, tuple[int, ...]]
+    contents: Sequence[Sequence[Content]] = ()
 
 
 def failures(theta: Array, frequencies: Array) -> list[SkthermoWarning]:
@@ -191,10 +204,21 @@ class AffineTerms(ABC):
     def each_matrix(self) -> list[Matrix]:
         """The matrices of the terms."""
 
-    def with_terms(self, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
+    def with_terms(
+        self, matrices: Sequence[Matrix], exponents: NDArray[np.int64], factors: Array | None = None
+    ) -> "AffineTerms":
         """These terms and further ones; a row of zeros among the exponents makes a constant one."""
         terms = type(self).from_matrices([*self.each_matrix, *matrices], np.vstack([self.exponents, exponents]))
-        return terms.with_factors(np.append(self.factors, np.ones(len(matrices))))
+        return terms.with_factors(np.append(self.factors, np.ones(len(matrices)) if factors is None else factors))
+
+    def divided(self, parts: Sequence[tuple[int, Matrix]]) -> "AffineTerms":
+        """These terms and parts of them, each with its term's position, as further terms."""
+        matrices = self.each_matrix
+        for position, part in parts:
+            matrices[position] = matrices[position] - part
+        origin = [*range(len(matrices)), *(position for position, _ in parts)]
+        terms = self.from_matrices([*matrices, *(part for _, part in parts)], self.exponents[origin])
+        return terms.with_factors(self.factors[origin])
 
     @abstractmethod
     def projected(self, basis: Array) -> "DenseTerms":

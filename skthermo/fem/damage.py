@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ALL_GROUPS = "all groups"  # the name of an even change of all of them
+LossKind = Literal["stiffness", "section"]  # of what damage groups lose
 
 
 def read_groups(model: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | None) -> dict[str, list[str]]:
@@ -46,16 +47,51 @@ def _not_made_of_others(known: Mapping[str, Any]) -> list[str]:
     return kept
 
 
-def damage_directions(model: Any, groups: Sequence[str] | None = None) -> pd.DataFrame:
+def check_kind(kind: Any) -> None:
+    """Raise an error for what is no kind of loss."""
+    if not isinstance(kind, str) or kind not in get_args(LossKind):
+        raise ValueError(f"kind is {kind!r:.200}; expected 'stiffness' or 'section'")
+
+
+def kind_option(model: Any, kind: LossKind) -> dict[str, LossKind]:
+    """The argument of a model's methods for a kind of loss; none for stiffness, which every model can lose."""
+    check_kind(kind)
+    if kind == "section" and not hasattr(model, "group_mass"):
+        raise ValueError(
+            f"{model!r} does not know the mass of its damage groups, which a loss of section takes away; expected "
+            "kind='stiffness', or an AffineModel that knows it, as Structure.assemble or group_mass gives it"
+        )
+    return {} if kind == "stiffness" else {"kind": kind}
+
+
+def direction_name(group: str, kind: LossKind) -> str:
+    """The name of the loss of a group among directions and parameters."""
+    return group if kind == "stiffness" else f"{group}, section"
+
+
+def damage_directions(model: Any, groups: Sequence[str] | None = None, kind: LossKind | None = None) -> pd.DataFrame:
     """Directions of a model at its nominal state, exact where the model can have parameters for damage."""
+    slopes, names = [], []
+    for one, own in losses(model, groups, kind).items():
+        names += [direction_name(group, one) for group in own]
+        if hasattr(model, "with_damage_parameters"):
+            changed = model.with_damage_parameters(own, **kind_option(model, one))
+            theta = np.ones((1, len(changed.parameter_names)))
+            slopes += [*-changed.jacobian(theta)[0][:, -len(own) :].T / changed.frequencies(theta)[0]]
+        else:
+            slopes += [_difference(model, group, one) for group in own]
+    return as_directions(np.array(slopes), names, range(model.n_modes))
+
+
+def losses(model: Any, groups: Sequence[str] | None, kind: LossKind | None) -> dict[LossKind, list[str]]:
+    """Damage groups of each kind of loss; by default those that have mass are of both."""
     names = names_of_groups(model, groups)
-    if hasattr(model, "with_damage_parameters"):
-        changed = model.with_damage_parameters(names)
-        theta = np.ones((1, len(changed.parameter_names)))
-        slopes = -changed.jacobian(theta)[0][:, -len(names) :].T / changed.frequencies(theta)[0]
-    else:
-        slopes = np.array([_difference(model, name) for name in names])
-    return as_directions(slopes, names, range(model.n_modes))
+    if kind is not None:
+        check_kind(kind)
+        return {kind: names}
+    masses = getattr(model, "group_mass", {})
+    heavy = [name for name in names if name in masses and masses[name].nnz]
+    return {"stiffness": names, "section": heavy} if heavy else {"stiffness": names}
 
 
 def names_of_groups(model: Any, groups: Sequence[str] | None) -> list[str]:
@@ -63,18 +99,19 @@ def names_of_groups(model: Any, groups: Sequence[str] | None) -> list[str]:
     return list(read_groups(model, None if groups is None else check_names(groups, "groups")))
 
 
-def _difference(model: Any, group: str, step: float = 1e-3) -> Array:
+def _difference(model: Any, group: str, kind: LossKind, step: float = 1e-3) -> Array:
     """Central difference of the logarithms of the frequencies by the severity of a group."""
     nominal = np.ones((1, len(model.parameter_names)))
-    above, below = (np.log(as_floats(model.damaged({group: loss}).frequencies(nominal)))[0] for loss in (step, -step))
+    changed = (model.damaged({group: loss}, **kind_option(model, kind)) for loss in (step, -step))
+    above, below = (np.log(as_floats(one.frequencies(nominal)))[0] for one in changed)
     return (above - below) / (2 * step)
 
 
-def as_directions(slopes: Array, groups: Sequence[str], modes: Sequence[Any]) -> pd.DataFrame:
-    """A row for each group that moves a frequency, by more than rounding (1e-9)."""
+def as_directions(slopes: Array, names: Sequence[str], modes: Sequence[Any]) -> pd.DataFrame:
+    """A row for each loss that moves a frequency, by more than rounding (1e-9)."""
     import pandas as pd
 
     moved: Any = np.any(np.abs(slopes) > 1e-9, axis=1)
     if not moved.any():
-        raise ValueError(f"no loss of stiffness of the groups {groups} moves a frequency; expected one that does")
-    return pd.DataFrame(slopes[moved], [group for group, has in zip(groups, moved, strict=True) if has], list(modes))
+        raise ValueError(f"no loss of the groups {list(names)} moves a frequency; expected one that does")
+    return pd.DataFrame(slopes[moved], [name for name, has in zip(names, moved, strict=True) if has], list(modes))

@@ -27,7 +27,8 @@ def read_slopes(fem: Any, groups: Sequence[str] | Mapping[str, Sequence[str]] | 
     members = read_groups(fem.model, groups)
     if len(members) > 1:
         members[ALL_GROUPS] = list(dict.fromkeys(name for joined in members.values() for name in joined))
-    directions = fem.damage_directions(list(dict.fromkeys(name for joined in members.values() for name in joined)))
+    asked = list(dict.fromkeys(name for joined in members.values() for name in joined))
+    directions = fem.damage_directions(asked, kind="stiffness")
     slopes = [-directions.reindex(joined).fillna(0.0).sum().to_numpy() for joined in members.values()]
     return list(members), np.column_stack(slopes)
 

@@ -68,23 +68,33 @@ def _through(steps: list[Any], records: pd.DataFrame) -> Any:
 
 
 def directions_of(detector: Any) -> DirectionalDetector | None:
-    """The fitted detector that has directions of damage groups, if there is one."""
+    """The fitted detector that has directions of losses of stiffness of damage groups, if there is one."""
     last = parts_of(detector)[-1]
     one = last.detectors_[0] if isinstance(last, CompensatedDetector) else last
-    return one if isinstance(one, DirectionalDetector) and not isinstance(one.directions, str) else None
+    is_directional = isinstance(one, DirectionalDetector) and not isinstance(one.directions, str)
+    return one if is_directional and len(sensitivities_of(one)) else None
+
+
+def sensitivities_of(directional: DirectionalDetector) -> pd.Series:
+    """By how many standard deviations a whole loss of stiffness of each group moves a record."""
+    found = directional.sensitivities_
+    return found[~found.index.str.endswith(", section")]
 
 
 def losses_of(detector: Any) -> pd.DataFrame | None:
-    """Loss of each damage group that moves a record by one standard deviation, and the relative changes by it."""
+    """Loss of stiffness of each damage group that moves a record by one standard deviation, and the relative changes
+    by it."""
     directional = directions_of(detector)
     if directional is None:
         return None
-    seen = directional.sensitivities_[directional.sensitivities_ > 0]
+    known = sensitivities_of(directional)
+    seen = known[known > 0]
     return directional.directions_.loc[seen.index].div(seen, axis=0).assign(loss=1 / seen)
 
 
 def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
-    """Losses of the damage groups, as in column "loss top", and their effects in standard deviations, "effect top".
+    """Losses of stiffness of the damage groups, as in column "loss top", and their effects in standard deviations,
+    "effect top".
 
     NaN where they explain less than half of a record. Groups that cannot be distinguished are one, such as "top or
     bottom"; no columns without such directions.
@@ -96,15 +106,15 @@ def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
     with collected(drop_others=True):
         table = _through(steps, records)
         losses, shares = last.severities(table).set_axis(records.index), last.explained(table)
-    names = directional.directions_.index
+    sensitivities = sensitivities_of(directional)
+    names = sensitivities.index
     alike = pd.DataFrame(np.eye(len(names)), names, names)
     for one, other in directional.indistinguishable_:
-        alike.loc[one, other] = 1.0
+        if {one, other} <= {*names}:
+            alike.loc[one, other] = 1.0
     together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
     joined = {name: " or ".join(names[together == together[name]]) for name in names}
-    losses, effects = (
-        one.T.groupby(joined).sum().T for one in (losses, (losses * directional.sensitivities_).round(2))
-    )
+    losses, effects = (one.T.groupby(joined).sum().T for one in (losses, (losses * sensitivities).round(2)))
     is_explained = (effects > 0) & (np.round(shares, 4)[:, np.newaxis] >= 0.5)
     found = {"loss ": losses.round(6), "effect ": effects}
     return pd.concat([one.where(is_explained).add_prefix(prefix) for prefix, one in found.items()], axis=1)

@@ -120,6 +120,7 @@ def change_of(scenario: State | None) -> Row | None:
     damage = scenario.draws.mean().round(3) if is_uncertain else getattr(scenario, "damage", None)
     return {
         "damage": dict(damage) if damage is not None else {},
+        "kind": scenario.kind,
         "parameters": dict(getattr(scenario, "parameters", None) or {}),
         "added": [what for what in ("stiffness", "mass") if getattr(scenario, what, None) is not None],
         "is_uncertain": is_uncertain,

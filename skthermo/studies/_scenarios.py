@@ -16,6 +16,7 @@ from skthermo._core.arrays import HUGE, as_mapping, check_names, is_real, real_a
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import Table, row_times, time_of
 from skthermo.fem import FEModel
+from skthermo.fem.damage import LossKind, check_kind, direction_name
 from skthermo.surrogate import DataInformedFEM
 
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
@@ -32,6 +33,7 @@ class BaseScenario(ABC):
     damage: Mapping[str, float] | None
     family: str | None
     severity: float | None
+    kind: LossKind = "stiffness"
     onset: Any = None
     n_draws: int = 1
 
@@ -67,7 +69,8 @@ class BaseScenario(ABC):
         """
         if not isinstance(repeat, Integral) or isinstance(repeat, bool) or repeat < 0:
             raise ValueError(f"repeat is {repeat!r:.100}; expected the number of a repeat, from 0 on")
-        return self._changes(T, int(repeat))
+        changes = self._changes(T, int(repeat))
+        return changes | {"kind": self.kind} if self.kind != "stiffness" else changes
 
     @abstractmethod
     def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
@@ -105,10 +108,11 @@ def check_groups(groups: Sequence[str], known: Any) -> None:
         raise ValueError(f"damage groups {unknown} are unknown; expected some of {list(known)}")
 
 
-def check_name(name: Any) -> None:
-    """Raise an error if a scenario's name is not a text."""
+def check_name(name: Any, kind: LossKind) -> None:
+    """Raise an error if a scenario's name is not a text, or what damage takes is no kind of loss."""
     if not isinstance(name, str) or not name:
         raise ValueError(f"name is {name!r}; expected a text, such as 'bottom 20 %'")
+    check_kind(kind)
 
 
 def severities_of(damage: Any, name: str) -> dict[str, float]:
@@ -145,9 +149,12 @@ def mapping_of(values: object, what: str, expected: str) -> Mapping[str, Any]:
     return mapping
 
 
-def only_group(damage: Mapping[str, float]) -> tuple[str | None, float]:
-    """The damage group and its severity if there is only one, else None and NaN."""
-    return next(iter(damage.items())) if len(damage) == 1 else (None, np.nan)
+def only_group(damage: Mapping[str, float], kind: LossKind) -> tuple[str | None, float]:
+    """The family of a loss of a single damage group and its severity, else None and NaN."""
+    if len(damage) != 1:
+        return None, np.nan
+    group, severity = next(iter(damage.items()))
+    return direction_name(group, kind), severity
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,6 +178,9 @@ class Scenario(BaseScenario):
         default the damage group, if there is one alone.
     severity : float, optional
         Position on that curve. By default the severity of the damage group, if there is one alone, else NaN.
+    kind : {"stiffness", "section"}, default="stiffness"
+        What damage takes: stiffness alone or, with cross-section, mass too. The family of a loss of section is by
+        default named as in "bottom, section".
 
     Raises
     ------
@@ -194,9 +204,10 @@ class Scenario(BaseScenario):
     mass: Any = field(default=None, kw_only=True)
     family: str | None = field(default=None, kw_only=True)
     severity: float | None = field(default=None, kw_only=True)
+    kind: LossKind = field(default="stiffness", kw_only=True)
 
     def __post_init__(self) -> None:
-        check_name(self.name)
+        check_name(self.name, self.kind)
         damage = severities_of(self.damage, self.name)
         given = mapping_of(self.parameters, f"parameters of scenario {self.name!r}", "{parameter: factor}")
         wrong = [f for f in given.values() if not is_real(f) or not 0 < f < HUGE]
@@ -213,7 +224,7 @@ class Scenario(BaseScenario):
             if not np.isnan(self.severity):
                 check_severities(self.severity, self.family, self.name)
         alone = not (factors or self.stiffness is not None or self.mass is not None)
-        family, severity = only_group(damage) if alone else (None, np.nan)
+        family, severity = only_group(damage, self.kind) if alone else (None, np.nan)
         object.__setattr__(self, "damage", damage)
         object.__setattr__(self, "parameters", factors)
         object.__setattr__(self, "family", family if self.family is None else self.family)
@@ -269,7 +280,11 @@ def _short(value: object) -> str:
 
 
 def sweep(
-    model: FEModel, severities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5), groups: Sequence[str] | None = None
+    model: FEModel,
+    severities: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5),
+    groups: Sequence[str] | None = None,
+    *,
+    kind: LossKind = "stiffness",
 ) -> list[Scenario]:
     """The healthy structure, and damage of every group at every severity.
 
@@ -281,13 +296,15 @@ def sweep(
         Shares of the stiffness that are lost; negative ones are gained.
     groups : sequence of str, optional
         Damage groups; by default all.
+    kind : {"stiffness", "section"}, default="stiffness"
+        What damage takes, as in `Scenario`.
 
     Returns
     -------
     list of Scenario
-        With names such as "healthy" and "bottom 20 %". Each group is a family. If there are severities of both signs,
-        the strengthening of a group is a family of its own, such as "bottom strengthened", since no curve of detection
-        can hold both.
+        With names such as "healthy" and "bottom 20 %", or "bottom, section 20 %". Each group is a family. If there are
+        severities of both signs, the strengthening of a group is a family of its own, such as "bottom strengthened",
+        since no curve of detection can hold both.
 
     Raises
     ------
@@ -323,8 +340,9 @@ def sweep(
     has_both = min(severities, default=0) < 0 < max(severities, default=0)
 
     def scenario(group: str, severity: float) -> Scenario:
-        family = f"{group} strengthened" if has_both and severity < 0 else None
-        return Scenario(f"{group} {100 * severity:g} %", {group: severity}, family=family)
+        name = direction_name(group, kind)
+        family = f"{name} strengthened" if has_both and severity < 0 else None
+        return Scenario(f"{name} {100 * severity:g} %", {group: severity}, family=family, kind=kind)
 
     return [Scenario("healthy"), *(scenario(group, severity) for group in chosen for severity in severities)]
 
@@ -343,6 +361,8 @@ class ProgressiveDamage(BaseScenario):
         When damage begins: the number of a record counted from 0 or, for temperatures on a ``DatetimeIndex``, a time.
     end : int or time, optional
         When the final severity is reached; in between it grows linearly. By default damage is sudden.
+    kind : {"stiffness", "section"}, default="stiffness"
+        What damage takes, as in `Scenario`.
 
     Attributes
     ----------
@@ -372,11 +392,12 @@ class ProgressiveDamage(BaseScenario):
     end: Any = None
     family: str | None = field(init=False)
     severity: float = field(init=False)
+    kind: LossKind = field(default="stiffness", kw_only=True)
 
     def __post_init__(self) -> None:
-        check_name(self.name)
+        check_name(self.name, self.kind)
         damage = severities_of(self.damage, self.name)
-        family, severity = only_group(damage)
+        family, severity = only_group(damage, self.kind)
         object.__setattr__(self, "damage", damage)
         object.__setattr__(self, "family", family if self.end is None else None)
         object.__setattr__(self, "severity", severity)
@@ -403,6 +424,8 @@ class UncertainDamage(BaseScenario):
         Unique in a study.
     draws : DataFrame of shape (n_draws, n_groups)
         Severities; columns are damage groups of the model. Repeats beyond the last draw begin again with the first.
+    kind : {"stiffness", "section"}, default="stiffness"
+        What damage takes, as in `Scenario`.
 
     Attributes
     ----------
@@ -431,9 +454,10 @@ class UncertainDamage(BaseScenario):
     draws: pd.DataFrame
     family: None = field(init=False, default=None)
     severity: float = field(init=False)
+    kind: LossKind = field(default="stiffness", kw_only=True)
 
     def __post_init__(self) -> None:
-        check_name(self.name)
+        check_name(self.name, self.kind)
         if not isinstance(self.draws, pd.DataFrame) or not self.draws.size:
             raise ValueError(f"draws is {self.draws!r:.200}; expected a frame with a column for each damage group")
         if self.draws.columns.has_duplicates:
@@ -441,7 +465,7 @@ class UncertainDamage(BaseScenario):
         for group, severities in self.draws.items():
             check_severities(severities, group, self.name)
         means = {str(group): float(mean) for group, mean in self.draws.mean().items()}
-        object.__setattr__(self, "severity", only_group(means)[1])
+        object.__setattr__(self, "severity", only_group(means, self.kind)[1])
 
     @property
     def n_draws(self) -> int:  # type: ignore[override]
@@ -459,4 +483,5 @@ class UncertainDamage(BaseScenario):
 
     def __repr__(self) -> str:
         means = ", ".join(f"{group}={mean:.3g}" for group, mean in self.draws.mean().items())
-        return f"UncertainDamage({self.name!r}, {means}, {len(self.draws)} draws)"
+        kind = "" if self.kind == "stiffness" else f", kind={self.kind!r}"
+        return f"UncertainDamage({self.name!r}, {means}, {len(self.draws)} draws{kind})"

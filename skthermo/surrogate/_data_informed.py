@@ -63,6 +63,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
+from skthermo.fem.damage import LossKind
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, check_records
 from skthermo.preprocessing.checks import misplaced_columns
@@ -516,6 +517,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         X: ArrayLike,
         *,
         damage: Mapping[str, float | ArrayLike] | None = None,
+        kind: LossKind = "stiffness",
         parameters: Mapping[str, float] | None = None,
         stiffness: MatrixLike | None = None,
         mass: MatrixLike | None = None,
@@ -533,6 +535,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         damage : mapping of str to float or array-like of shape (n_samples,), optional
             Severity by damage group of the model: 0.5 halves the stiffness, -0.15 adds 15 %. A vector gives each row
             its own severity, for damage that grows.
+        kind : {"stiffness", "section"}, default="stiffness"
+            What damage takes: stiffness alone or, with cross-section, mass too, as `~skthermo.fem.AffineModel.damaged`
+            has it.
         parameters : mapping of str to float, optional
             Factor by parameter of the model, which multiplies the values that belong to the temperatures.
         stiffness : matrix of shape (n_dof, n_dof), optional
@@ -564,14 +569,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ------
         ValueError
             If a damage group or a parameter is unknown, a severity is 1 or more, a factor is not positive, or the model
-            cannot be changed in this way; if gaps or outliers are no shares.
+            cannot be changed in this way, or does not know the mass of a group; if gaps or outliers are no shares.
 
         Warns
         -----
         UserWarning
             If a factor is above 10, which may be meant in percent.
         """
-        changes = {"damage": damage, "parameters": parameters, "stiffness": stiffness, "mass": mass}
+        changes = {"damage": damage, "kind": kind, "parameters": parameters, "stiffness": stiffness, "mass": mass}
         with collected() as findings:
             weather = self.weather(X)
             frequencies = self.thermal_.simulated(weather, **changes)
@@ -598,26 +603,29 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         check_is_fitted(self)
         return self.thermal_.weather(X, validate_data(self, X, dtype=np.float64, reset=False))
 
-    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
-        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of each damage group, for small losses.
 
         Parameters
         ----------
         groups : sequence of str, optional
             Damage groups. By default all but those that other groups make up.
+        kind : {"stiffness", "section"}, optional
+            What is lost. By default stiffness and, of the groups whose mass the model knows, section.
 
         Returns
         -------
-        DataFrame of shape (n_groups, n_modes)
+        DataFrame of shape (n_directions, n_modes)
             Derivatives of ln f by the severity at the mean of the learned parameters, in the measured domain, with the
-            names of the modes. Groups that move no frequency are left out.
+            names of the modes. Rows are named as in `~skthermo.fem.AffineModel.damage_directions`; losses that move no
+            frequency are left out.
 
         Raises
         ------
         ValueError
-            If a group is unknown, or none moves a frequency.
+            If a group is unknown, none moves a frequency, or the mass of a group is not known.
         """
-        return damage_directions(self, groups)
+        return damage_directions(self, groups, kind)
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far the inputs of M2 are outside the training range, row by row.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, Reduce, is_auto, tolerance
 from skthermo.fem import FEModel, FrequencySurface, evaluate, linearise, linearise_modes
+from skthermo.fem.damage import LossKind, kind_option
 
 NO_BASIS = "no reduced model is accurate where the parameters of the records are"
 
@@ -89,29 +90,33 @@ class Simulator:
         models = [None if one is None else getattr(one, method)(*args, **options) for one in (self.model, self.reduced)]
         return replace(self, model=models[0], reduced=models[1])
 
-    def damaged(self, damage: Mapping[str, float] | None) -> Simulator:
+    def damaged(self, damage: Mapping[str, float] | None, kind: LossKind = "stiffness") -> Simulator:
         """The simulator of the damaged structure; itself without damage."""
-        return self.changed("damaged", damage) if damage else self
+        options = kind_option(self.model, kind)
+        return self.changed("damaged", damage, **options) if damage else self
 
-    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float) -> Simulator:
+    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float, kind: LossKind) -> Simulator:
         """The simulator whose rows of theta end with 1 - severity of each group.
 
         A reduced model is accurate for severities from the lowest to the highest, with a margin.
         """
         severities = (min(lowest, 0.0) - 0.02, min(max(highest, 0.0) + 0.02, 0.99))
-        changed = self.changed("with_damage_parameters", groups, severities=severities)
+        options = kind_option(self.model, kind)
+        changed = self.changed("with_damage_parameters", groups, severities=severities, **options)
         if self.box is None:
             return replace(changed, usual=None)
         factors = np.tile([1 - severities[1], 1 - severities[0]], (len(groups), 1))
         return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]), self.tol)
 
-    def with_columns(self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None) -> Simulator:
+    def with_columns(
+        self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None, kind: LossKind = "stiffness"
+    ) -> Simulator:
         """The simulator whose rows of theta end with 1 - severity of each group and 1 + amount of each mass.
 
         Within the box, (n_columns, 2), a reduced model is used, if there is a box.
         """
         model: Any = getattr(self.model, "full", self.model)
-        model = model.with_damage_parameters(groups) if groups else model
+        model = model.with_damage_parameters(groups, **kind_option(model, kind)) if groups else model
         model = model.with_mass_parameters(masses) if masses else model
         if box is None:
             return Simulator(model)

@@ -33,6 +33,7 @@ from skthermo._core.frames import Table, check_same_rows, column_names, frame_li
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, SkthermoWarning
+from skthermo.fem.damage import LossKind
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import TrainingRange, unpredicted_findings
 from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
@@ -206,6 +207,7 @@ class ThermalModel(SavesFrames):
         modes: Sequence[int] | None = None,
         *,
         damage: Mapping[str, float | ArrayLike] | None = None,
+        kind: LossKind = "stiffness",
         parameters: Mapping[str, float] | None = None,
         stiffness: MatrixLike | None = None,
         mass: MatrixLike | None = None,
@@ -221,10 +223,10 @@ class ThermalModel(SavesFrames):
             theta = theta * factors_of(parameters, self.parameter_names)
         if damage is not None:
             fixed, growing = split_damage(damage, weather.given)
-            simulator = simulator.damaged(fixed)
+            simulator = simulator.damaged(fixed, kind)
             if growing:
                 severities = np.column_stack(list(growing.values()))
-                simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max())
+                simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max(), kind)
                 theta = np.hstack([theta, 1 - severities])
         frequencies = simulator.frequencies(theta, self.n_jobs)
         return self.measured(frequencies, weather) if modes is None else frequencies
@@ -233,11 +235,11 @@ class ThermalModel(SavesFrames):
         """Frequencies of a model in the measured domain, times the discrepancy."""
         return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(weather.delta)
 
-    def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]]) -> list[Array]:
+    def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]], kind: LossKind) -> list[Array]:
         """Frequencies with one damage of the same groups after the other, solved together by one model."""
         groups, theta = list(draws[0]), np.tile(weather.theta, (len(draws), 1))
         severities = np.array([[draw[group] for group in groups] for draw in draws])
-        simulator = self.simulator.with_damage_parameters(groups, severities.min(), severities.max())
+        simulator = self.simulator.with_damage_parameters(groups, severities.min(), severities.max(), kind)
         theta = np.hstack([theta, np.repeat(1 - severities, len(weather), axis=0)])
         parts = np.split(simulator.frequencies(theta, self.n_jobs), len(draws))
         return [self.measured(part, weather) for part in parts]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import check_is_fitted
-from skthermo.fem.damage import as_directions, names_of_groups
+from skthermo.fem.damage import LossKind, as_directions, direction_name, losses
 
 HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 
@@ -21,21 +21,22 @@ HIGHEST_SEVERITY = 0.95  # largest loss of stiffness that is considered
 class StructuralChanges:
     """Effects of some amounts on theta, whose columns they multiply by 1 + direction * amount.
 
-    The columns are the model's parameters, then 1 - severity of each of the model's damage ``groups``. ``directions``
-    are (n_causes, n_columns), and ``bounds``, (n_causes, 2), the lowest and the highest amounts that reduced models
-    cover.
+    The columns are the model's parameters, then 1 - severity of each of the model's damage ``groups``, of losses of a
+    ``kind``. ``directions`` are (n_causes, n_columns), and ``bounds``, (n_causes, 2), the lowest and the highest
+    amounts that reduced models cover.
     """
 
     groups: Sequence[str]
     directions: Array
     bounds: Array
     near_share: float = 1 / 3  # of the bounds, up to which amounts have a reduced model; one for all would be large
+    kind: LossKind = "stiffness"
 
     @classmethod
-    def of_damage(cls, model: Any, groups: Sequence[str]) -> "StructuralChanges":
+    def of_damage(cls, model: Any, groups: Sequence[str], kind: LossKind = "stiffness") -> "StructuralChanges":
         """Severities of some groups of a model."""
         directions = np.hstack([np.zeros((len(groups), len(model.parameter_names))), -np.eye(len(groups))])
-        return cls(groups, directions, np.tile([0.0, HIGHEST_SEVERITY], (len(groups), 1)))
+        return cls(groups, directions, np.tile([0.0, HIGHEST_SEVERITY], (len(groups), 1)), kind=kind)
 
     @property
     def n_parameters(self) -> int:
@@ -103,7 +104,8 @@ class ChangedStructure:
     def with_amounts(self, theta: Array, amounts: Array) -> tuple[Any, Array]:
         """The simulator of the structure with one set of amounts, and its own rows of theta."""
         severities = zip(self.changes.groups, self.changes.severities(amounts).tolist(), strict=True)
-        simulator = self.fem.simulator_.damaged({group: severity for group, severity in severities if severity})
+        damage = {group: severity for group, severity in severities if severity}
+        simulator = self.fem.simulator_.damaged(damage, self.changes.kind)
         return simulator, theta * self.changes.factors(amounts)[: theta.shape[1]]
 
     @property
@@ -116,7 +118,7 @@ class ChangedStructure:
     @cached_property
     def _anywhere(self) -> Any:
         """The simulator that has the amounts as further columns of theta."""
-        return self.fem.simulator_.with_columns(self.changes.groups, {}, None)
+        return self.fem.simulator_.with_columns(self.changes.groups, {}, None, self.changes.kind)
 
     @cached_property
     def _near(self) -> Any:
@@ -125,7 +127,7 @@ class ChangedStructure:
         if box is None:
             box = self._bounds()
         box = np.vstack([box, np.ones((len(self.changes.groups), 2))]) * self.changes.near()
-        return self.fem.simulator_.with_columns(self.changes.groups, {}, box)
+        return self.fem.simulator_.with_columns(self.changes.groups, {}, box, self.changes.kind)
 
     def _bounds(self) -> Array:
         """Bounds of the parameters that the chain has learned, or of those ``around`` too, with a margin of 5 %."""
@@ -243,11 +245,14 @@ def amount_slopes(function: Callable[[Array], Array], amounts: Array, step: floa
     return np.stack([(function(amounts + h) - function(amounts - h)) / (2 * step) for h in steps], axis=-1)
 
 
-def damage_directions(fem: Any, groups: Sequence[str] | None = None) -> pd.DataFrame:
+def damage_directions(fem: Any, groups: Sequence[str] | None = None, kind: LossKind | None = None) -> pd.DataFrame:
     """Directions of a fitted chain, at the mean of its parameters, in the measured domain."""
     check_is_fitted(fem)
-    names = names_of_groups(fem.model, groups)
     mean = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
-    structure = ChangedStructure(fem, StructuralChanges.of_damage(fem.model, names), mean)
-    effects = FrequencyEffects.at(structure, mean, np.ones((1, len(fem.mode_names_))))
-    return as_directions(effects(np.zeros(len(names)))[1].T, names, fem.mode_names_)
+    slopes, names = [], []
+    for one, own in losses(fem.model, groups, kind).items():
+        structure = ChangedStructure(fem, StructuralChanges.of_damage(fem.model, own, one), mean)
+        effects = FrequencyEffects.at(structure, mean, np.ones((1, len(fem.mode_names_))))
+        slopes += [*effects(np.zeros(len(own)))[1].T]
+        names += [direction_name(group, one) for group in own]
+    return as_directions(np.array(slopes), names, fem.mode_names_)

@@ -146,7 +146,7 @@ def wrong(options):
             tables[name] = joined(make_truss_campaign(damage=damage, random_state=seed + 2000))
         right = DirectionalDetector(make_truss()).fit(baseline[modes_of(baseline)]).directions_
         random = np.random.RandomState(seed)
-        cases = {"right": right, "without the bottom chord": right.drop("bottom")}
+        cases = {"right": right, "without the bottom chord": right[~right.index.str.startswith("bottom")]}
         cases |= {
             f"off by {e:.0%} at random".replace("%", " %"): right * (1 + e * random.standard_normal(right.shape))
             for e in (0.2, 0.5)

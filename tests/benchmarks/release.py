@@ -54,6 +54,7 @@ PARTS = {
     "truss": Part("truss_tables.py", "--seeds 1"),
     "directions": Part("directions.py --parts truss fleet footbridge z24", **Z24),
     "smallest-losses": Part("directions.py --parts smallest"),
+    "section-losses": Part("section_losses.py"),
     "directions-wrong": Part("directions.py --parts wrong"),
     "field-detectors-z24": Part("field_detectors.py --parts z24 seasons", **Z24),
     "field-detectors": Part("field_detectors.py --parts years frost"),

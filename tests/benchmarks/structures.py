@@ -197,8 +197,8 @@ class Footbridge:
         wrong = random.random((len(theta), len(self.modes))) < 0.01
         self.wrong = np.where(wrong, random.choice([-1, 1], wrong.shape) * random.uniform(0.03, 0.08, wrong.shape), 0)
 
-    def frequencies(self, rows, damage, theta):
-        model = self.model.damaged(damage) if damage else self.model
+    def frequencies(self, rows, damage, theta, **kind):
+        model = self.model.damaged(damage, **kind) if damage else self.model
         clean = model.frequencies(theta) * (1 + self.slow[rows])
         F = add_noise(clean, self.noise, random_state=self.seed + rows.start)
         return pd.DataFrame(F, self.T.index[rows], self.modes)
@@ -211,10 +211,10 @@ class Footbridge:
             T = T.mask(self.lost[rows])
         return T.join(F)
 
-    def evaluated(self, damage):
+    def evaluated(self, damage, **kind):
         """The second year, without gaps and outliers."""
         rows = slice(self.n, 2 * self.n)
-        return self.T[self.n :].join(self.frequencies(rows, damage, self.theta[rows]))
+        return self.T[self.n :].join(self.frequencies(rows, damage, self.theta[rows], **kind))
 
 
 def lagged(regressor):

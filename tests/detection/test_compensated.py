@@ -144,12 +144,15 @@ def test_severities_are_those_of_the_record_and_nan_in_gaps():
     losses = detector.severities(truss(3, damage={"diagonal": 0.2}))
     assert losses["diagonal"].median() == pytest.approx(0.2, abs=0.05)
     assert list(losses.columns) == ["bottom", "top", "diagonal", "vertical"]
+    lost = detector.severities(truss(3, damage={"diagonal": 0.2}, kind="section"), kind="section")
+    assert lost.median().idxmax() == "diagonal, section"
     holed = LATER.copy()
     holed.loc[holed.index[:3], MODES] = np.nan
     with pytest.warns(UserWarning, match="not-evaluated"):
         assert (detector.predict(holed)[:3] == 0).all()
     assert detector.severities(holed).iloc[:3].isna().all(axis=None)
     assert np.isnan(detector.explained(holed)[:3]).all()
+    assert np.isnan(detector.explained(holed, kind="section")[:3]).all()
 
 
 def test_more_damage_is_never_less_alarm():

@@ -73,18 +73,19 @@ def test_directions_of_a_model_are_its_derivatives(fem):
     exact = DirectionalDetector(model).fit(F).directions_
     nominal = np.ones((1, 4))
     for group in GROUPS:
-        softer, stiffer = (model.damaged({group: size}).frequencies(nominal)[0] for size in (step, -step))
-        assert exact.loc[group].to_numpy() == pytest.approx(np.log(softer / stiffer) / (2 * step), abs=1e-6)
+        for name, kind in ((group, "stiffness"), (f"{group}, section", "section")):
+            softer, stiffer = (model.damaged({group: s}, kind=kind).frequencies(nominal)[0] for s in (step, -step))
+            assert exact.loc[name].to_numpy() == pytest.approx(np.log(softer / stiffer) / (2 * step), abs=1e-6)
     differences = DirectionalDetector(WithoutDerivatives(model)).fit(F).directions_
-    assert differences.to_numpy() == pytest.approx(exact.to_numpy(), abs=1e-5)
+    assert differences.to_numpy() == pytest.approx(exact.loc[GROUPS].to_numpy(), abs=1e-5)
     of_chain = DirectionalDetector(fem).fit(F).directions_
     assert list(of_chain.columns) == list(F)
     assert of_chain.to_numpy() == pytest.approx(exact.to_numpy(), abs=0.05)
 
 
 def test_it_finds_more_than_the_mahalanobis_distance_at_no_more_false_alarms():
-    rates = {}
-    for name, last in {"any": MahalanobisDetector(), "model": DirectionalDetector(make_truss())}.items():
+    rates, directions = {}, make_truss().damage_directions(kind="stiffness")
+    for name, last in {"any": MahalanobisDetector(), "model": DirectionalDetector(directions)}.items():
         rates[name] = []
         for seed in range(3):
             detector = compensated(last, seed=seed)
@@ -205,11 +206,13 @@ def test_rates_that_are_expected_are_those_of_shifted_normal_records():
         return level * (1 + random.standard_normal((n, 6)) @ root)
 
     detector = DirectionalDetector(make_truss()).fit(normal(3000))
-    for group in ("bottom", "diagonal"):
-        effect = detector.directions_.loc[group].to_numpy()
+    for name, kind in (("bottom", "stiffness"), ("diagonal", "stiffness"), ("diagonal, section", "section")):
+        effect = detector.directions_.loc[name].to_numpy()
         for loss in (0.0, 0.03, 0.06):
             true = (detector.predict(normal(4000) + loss * level * effect) == -1).mean()
-            assert detector.pod([loss])[group].iloc[0] == pytest.approx(true, abs=0.03)
+            assert detector.pod([loss], kind=kind)[name].iloc[0] == pytest.approx(true, abs=0.03)
+    of_section = detector.minimum_detectable_damage(kind="section")
+    assert list(of_section.index) == [f"{group}, section" for group in GROUPS]
     smallest = detector.minimum_detectable_damage()
     for group, loss in smallest[np.isfinite(smallest)].items():
         below, at = detector.pod([0.97 * loss, loss])[group]
@@ -218,6 +221,10 @@ def test_rates_that_are_expected_are_those_of_shifted_normal_records():
     assert (detector.minimum_detectable_damage(0.5) <= smallest).all()
     with pytest.raises(ValueError, match=r"1\.5"):
         detector.pod([1.5])
+    with pytest.raises(ValueError, match="none of a loss of section"):
+        DirectionalDetector().fit(F).minimum_detectable_damage(kind="section")
+    with pytest.raises(ValueError, match="kind is 'area'"):
+        detector.pod([0.1], kind="area")
 
 
 def test_groups_that_look_alike_are_named():
@@ -237,8 +244,12 @@ def test_losses_that_explain_records_are_those_that_have_moved_them():
     random = np.random.RandomState(0)
     baseline = level * (1 + 0.01 * random.standard_normal((2000, 6)))
     single = DirectionalDetector(make_truss()).fit(baseline)
-    losses = np.array([0.08, 0.0, 0.05, 0.0])
-    moved = np.tile(baseline.mean(axis=0) + level * (losses @ single.directions_.to_numpy()), (7, 1))
+    losses, effects = np.array([0.08, 0.0, 0.05, 0.0]), single.directions_.to_numpy()
+    moved = np.tile(baseline.mean(axis=0) + level * (losses @ effects[:4]), (7, 1))
+    lighter = np.tile(baseline.mean(axis=0) + level * (losses @ effects[4:]), (7, 1))
+    np.testing.assert_allclose(single.severities(lighter, kind="section").iloc[-1], losses, atol=2e-3)
+    assert single.explained(lighter, kind="section")[-1] == pytest.approx(1, abs=1e-3)
+    assert single.explained(lighter)[-1] < 0.99
     raised = np.tile(baseline.mean(axis=0) * 1.02, (7, 1))
     np.testing.assert_allclose(single.severities(moved).iloc[-1], losses, atol=2e-3)
     assert single.explained(moved)[-1] == pytest.approx(1, abs=1e-3)

@@ -16,7 +16,7 @@ def log_frequencies(group, loss):
 
 
 def test_rows_are_slopes_of_log_frequencies():
-    directions = TRUSS.damage_directions()
+    directions = TRUSS.damage_directions(kind="stiffness")
     assert list(directions.index) == list(TRUSS.groups)
     for group, row in directions.iterrows():
         slope = (log_frequencies(group, 1e-4) - log_frequencies(group, -1e-4)) / 2e-4
@@ -27,7 +27,7 @@ def test_a_function_has_the_directions_of_the_model_that_it_calls():
     model = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6, vectorized=True)
     asked = ["top", "bottom"]
     assert model.damage_directions(asked).to_numpy() == pytest.approx(
-        TRUSS.damage_directions(asked).to_numpy(), abs=1e-5
+        TRUSS.damage_directions(asked, kind="stiffness").to_numpy(), abs=1e-5
     )
 
 
@@ -37,16 +37,17 @@ def test_a_chain_names_its_modes():
     directions = fem.damage_directions(["diagonal"])
     assert list(directions.columns) == list(fem.mode_names_)
     theta = fem.parameters_.mean().to_numpy()[np.newaxis]
-    healthy, damaged = (
-        fem.aligner_.inverse_transform(model.frequencies(theta))[0]
-        for model in (TRUSS, TRUSS.damaged({"diagonal": 1e-4}))
-    )
-    assert directions.loc["diagonal"].to_numpy() == pytest.approx(np.log(damaged / healthy) / 1e-4, abs=1e-4)
+    for name, kind in (("diagonal", "stiffness"), ("diagonal, section", "section")):
+        healthy, damaged = (
+            fem.aligner_.inverse_transform(model.frequencies(theta))[0]
+            for model in (TRUSS, TRUSS.damaged({"diagonal": 1e-4}, kind=kind))
+        )
+        assert directions.loc[name].to_numpy() == pytest.approx(np.log(damaged / healthy) / 1e-4, abs=1e-4)
 
 
 def test_groups_that_move_nothing_are_refused():
     model = CallableModel(lambda row: [1.0, 2.0], ["E"], 2)
-    with pytest.raises(ValueError, match="no loss of stiffness"):
+    with pytest.raises(ValueError, match="no loss of the groups"):
         model.damage_directions()
     with pytest.raises(ValueError, match="unknown damage groups"):
         TRUSS.damage_directions(["sideways"])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import scipy.sparse
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from skthermo._core.arrays import (
     Array,
@@ -33,8 +34,10 @@ from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._terms import (
     AffineTerms,
+    Content,
     DenseTerms,
     Key,
+    PartsOfMass,
     SparseTerms,
     check_different,
     check_severities,
@@ -43,16 +46,15 @@ from skthermo.fem._terms import (
     read_terms,
 )
 from skthermo.fem.affine._basis import Basis, grow_basis
-from skthermo.fem.damage import damage_directions
+from skthermo.fem.damage import LossKind, check_kind, damage_directions, direction_name
 from skthermo.fem.modal import AffineCore, LocalModes, check_supported, count_modes
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Terms = Mapping[tuple[str, ...], MatrixLike] | Sequence[tuple[tuple[str, ...], MatrixLike]]
-Content = tuple[Hashable, tuple[str, ...]]
 Names = tuple[str, ...] | None
-Groups = dict[str, tuple[int, ...]] | None
+Groups = dict[str, tuple[int, ...]]
 
 
 class AffineModel:
@@ -75,6 +77,9 @@ class AffineModel:
     groups : mapping of str to list of (tuple of str or int), optional
         Damage group -> the stiffness terms that it scales, by key or by position. By default each parameter is a
         group: all stiffness terms that it multiplies.
+    group_mass : mapping of str to matrix, mapping or sequence of pairs, optional
+        Damage group -> its mass in kg, which ``mass`` includes and a loss of the group's section takes away, as
+        ``mass``: a single matrix is constant, and a key names the parameters of the mass that multiply it.
     track : bool, default=False
         True: column j is the j-th nominal mode, followed by mass-weighted MAC wherever modes swap. False: column j is
         the j-th lowest mode.
@@ -99,8 +104,8 @@ class AffineModel:
     Raises
     ------
     ValueError
-        If shapes disagree, a matrix is not symmetric or not finite, a name is unknown, the
-        nominal stiffness is singular (a mechanism), or there are fewer modes than ``n_modes``.
+        If shapes disagree, a matrix is not symmetric or not finite, a name is unknown, the nominal stiffness is
+        singular (a mechanism), a group has more mass than there is, or there are fewer modes than ``n_modes``.
 
     Notes
     -----
@@ -124,11 +129,21 @@ class AffineModel:
            [1.723, 4.159]])
     >>> model.damaged({"k": 0.5}).frequencies([[1.0]]).round(3)
     array([[1.723, 4.159]])
+
+    The second spring is a bar that has a tenth of the second mass. Half of its section lost, it weighs less:
+
+    >>> model = AffineModel(
+    ...     {(): [[400.0, 0.0], [0.0, 0.0]], ("k",): [[400.0, -400.0], [-400.0, 400.0]]},
+    ...     mass=np.eye(2), n_modes=2, group_mass={"k": np.diag([0.0, 0.1])})
+    >>> model.damaged({"k": 0.5}, kind="section").frequencies([[1.0]]).round(3)
+    array([[1.761, 4.175]])
     """
 
     thread_safe = True
 
     _basis: Array | None = None  # the columns are the coordinates in which a reduced model is solved
+    _mass_groups: Groups = {}  # whose mass is known, with the positions of its parts
+    _mass_contents: tuple[tuple[Content, ...], ...] = ()
     _is_quiet = False
 
     def __init__(
@@ -139,6 +154,7 @@ class AffineModel:
         n_modes: int | None = None,
         parameter_names: Sequence[str] | None = None,
         groups: Mapping[str, Sequence[tuple[str, ...] | int]] | None = None,
+        group_mass: Mapping[str, MatrixLike | Terms] | PartsOfMass | None = None,
         track: bool = False,
         dofs: Sequence[Label] = (),
         contents: Sequence[Sequence[Content]] = (),
@@ -155,12 +171,8 @@ class AffineModel:
         self.dofs = check_labels(dofs, n_dof)
 
         terms: type[AffineTerms] = SparseTerms if are_sparse(stiffness_matrices + mass_matrices, wanted) else DenseTerms
-        stiffness_terms, mass_terms = (
-            terms.from_matrices(
-                matrices, np.array([[key.count(name) for name in self.parameter_names] for key in keys], dtype=np.int64)
-            )
-            for keys, matrices in ((stiffness_keys, stiffness_matrices), (mass_keys, mass_matrices))
-        )
+        stiffness_terms = terms.from_matrices(stiffness_matrices, exponents_of(stiffness_keys, self.parameter_names))
+        mass_terms = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self.parameter_names))
         nominal = np.ones((1, len(self.parameter_names)))
         check_supported(stiffness_terms.assemble(nominal)[0], self.dofs)
         available = count_modes(mass_terms.assemble(nominal)[0], at_least=1 if n_modes is None else wanted)
@@ -174,6 +186,8 @@ class AffineModel:
             track=check_flag(track, "track"),
             available=min(available, solvable),
         )
+        if group_mass is not None:
+            self._know(read_group_mass(group_mass, self._groups, self.parameter_names, n_dof))
 
     @property
     def n_modes(self) -> int:
@@ -218,6 +232,23 @@ class AffineModel:
     def stiffness_terms(self) -> list[scipy.sparse.csc_array]:
         """Matrices of the stiffness terms in N/m, without the parameters and severities that multiply them."""
         return [scipy.sparse.csc_array(matrix) for matrix in self._whole.stiffness.each_matrix]
+
+    @property
+    def group_mass(self) -> dict[str, scipy.sparse.csc_array]:
+        """Damage groups and their mass in kg at theta = 1, where it is known; a loss of section takes a share of it."""
+        parts, nominal = self._whole.parts, np.ones((1, len(self.parameter_names)))
+        factors = [] if parts is None else parts.coefficients(nominal)[0]
+        each = [factor * matrix for factor, (_, matrix) in zip(factors, self._parts_of_mass.terms, strict=True)]
+        none = scipy.sparse.csc_array((self.n_dof, self.n_dof))
+        return {name: sum((each[place] for place in own), none) for name, own in self._mass_groups.items()}
+
+    @property
+    def _parts_of_mass(self) -> PartsOfMass:
+        """Masses of damage groups in kg, without the parameters and severities that multiply them."""
+        parts = self._whole.parts
+        keys = [] if parts is None else [np.repeat(self.parameter_names, row).tolist() for row in parts.exponents]
+        matrices = [] if parts is None else map(scipy.sparse.csc_array, parts.each_matrix)
+        return PartsOfMass(list(zip(map(tuple, keys), matrices, strict=True)), self._mass_groups, self._mass_contents)
 
     @property
     def rows_per_chunk(self) -> int:
@@ -381,14 +412,17 @@ class AffineModel:
         stiffness, mass = (scipy.sparse.csc_array(terms.assemble(row)[0]) for terms in (core.stiffness, core.mass))
         return stiffness, mass
 
-    def damaged(self, damage: Mapping[str, float]) -> Self:
-        """A new model with less stiffness (or more) in some groups and the same mass.
+    def damaged(self, damage: Mapping[str, float], *, kind: LossKind = "stiffness") -> Self:
+        """A new model with less stiffness (or more) in some groups, and with the same mass or less.
 
         Parameters
         ----------
         damage : mapping of str to float
             Group -> severity s, which multiplies the group's stiffness by 1 - s: 0.5 is half, -0.15 a strengthening by
             15 %. A term in several damaged groups is multiplied by all their factors.
+        kind : {"stiffness", "section"}, default="stiffness"
+            A loss of stiffness, by which no frequency rises, or of cross-section, which multiplies the groups' mass by
+            1 - s too, so that some frequencies may rise.
 
         Returns
         -------
@@ -399,41 +433,52 @@ class AffineModel:
         Raises
         ------
         ValueError
-            If a group is unknown, or a severity is 1 or more or not finite.
+            If a group is unknown, a severity is 1 or more or not finite, or a section is lost of which the model does
+            not know the mass.
         """
-        factors = np.ones(len(self._whole.stiffness.factors))
-        for group, severity in check_severities(damage, self._groups).items():
+        core, damage = self._whole, check_severities(damage, self._groups)
+        if parts := self._lost_parts(damage, kind):
+            factors = parts.factors.copy()
+            for group, severity in damage.items():
+                factors[list(self._mass_groups[group])] *= 1 - severity
+            core = core.with_scaled_parts(parts.with_factors(factors))
+        factors = np.ones(len(core.stiffness.factors))
+        for group, severity in damage.items():
             factors[list(self._groups[group])] *= 1 - severity
-        return self._with_core(self._whole.with_scaled_stiffness(factors))
+        return self._with_core(core.with_scaled_stiffness(factors))
 
-    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
-        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of each damage group, for small losses.
 
         Parameters
         ----------
         groups : sequence of str, optional
             Damage groups. By default all but those that other groups make up.
+        kind : {"stiffness", "section"}, optional
+            What is lost, as in `damaged`. By default stiffness and, of the groups whose mass is known, section.
 
         Returns
         -------
-        DataFrame of shape (n_groups, n_modes)
-            Derivatives of ln f by the severity, at the model's nominal state. Groups that move no frequency are left
-            out.
+        DataFrame of shape (n_directions, n_modes)
+            Derivatives of ln f by the severity, at the model's nominal state: in a row named as the group for its
+            stiffness, in a row "GROUP, section" for its section. Losses that move no frequency are left out.
 
         Raises
         ------
         ValueError
-            If a group is unknown, or none moves a frequency.
+            If a group is unknown, none moves a frequency, or the mass of a group is not known.
 
         Examples
         --------
         >>> from skthermo.datasets import make_truss
         >>> make_truss().damage_directions(["bottom", "top"]).round(3)
-                    0      1      2      3      4      5
-        bottom -0.233 -0.225 -0.159 -0.070 -0.022 -0.031
-        top    -0.212 -0.127 -0.098 -0.053 -0.140 -0.029
+                             0      1      2      3      4      5
+        bottom          -0.233 -0.225 -0.159 -0.070 -0.022 -0.031
+        top             -0.212 -0.127 -0.098 -0.053 -0.140 -0.029
+        bottom, section -0.129 -0.119 -0.060  0.022 -0.004  0.059
+        top, section    -0.108 -0.019  0.008  0.042 -0.116  0.065
         """
-        return damage_directions(self, groups)
+        return damage_directions(self, groups, kind)
 
     def with_modes(self, modes: Sequence[int]) -> Self:
         """A new model with other modes as its columns.
@@ -494,9 +539,13 @@ class AffineModel:
         return self._with_core(self._whole.with_parameters(columns), kept)
 
     def with_damage_parameters(
-        self, groups: Sequence[str] | None = None, *, severities: tuple[float, float] = (-0.1, 0.6)
+        self,
+        groups: Sequence[str] | None = None,
+        *,
+        severities: tuple[float, float] = (-0.1, 0.6),
+        kind: LossKind = "stiffness",
     ) -> Self:
-        """A new model with one more parameter for each damage group: the factor 1 - severity of its stiffness.
+        """A new model with one more parameter for each damage group: the factor 1 - severity of what it loses.
 
         Each row of theta may then have its own severities, and the Jacobian holds exact derivatives by them.
 
@@ -506,16 +555,18 @@ class AffineModel:
             Damage groups. By default all.
         severities : (float, float), default=(-0.1, 0.6)
             Lowest and highest severity that a reduced model covers; a full model has no bounds.
+        kind : {"stiffness", "section"}, default="stiffness"
+            What the groups lose, as in `damaged`.
 
         Returns
         -------
         AffineModel or ReducedModel
-            Its last parameters are named ``1 - GROUP``.
+            Its last parameters are named ``1 - GROUP``, or ``1 - GROUP, section``.
 
         Raises
         ------
         ValueError
-            If a group is unknown or named twice, or its parameter's name is taken.
+            If a group is unknown or named twice, its parameter's name is taken, or its mass is not known.
 
         Examples
         --------
@@ -530,13 +581,20 @@ class AffineModel:
         unknown = [group for group in chosen if group not in self.groups]
         if unknown:
             raise ValueError(f"unknown damage groups {unknown}; expected some of {sorted(self.groups)}")
-        names = check_different([*self.parameter_names, *(f"1 - {group}" for group in chosen)])
+        parts = self._lost_parts(chosen, kind)
+        names = check_different([*self.parameter_names, *(f"1 - {direction_name(group, kind)}" for group in chosen)])
         scaled = np.zeros((len(self._whole.stiffness.factors), len(chosen)), dtype=np.int64)
         for column, group in enumerate(chosen):
             scaled[list(self.groups[group]), column] = 1
+        core = self._whole.with_group_factors(scaled)
+        if parts:
+            further = np.zeros((len(parts.factors), len(chosen)), dtype=np.int64)
+            for column, group in enumerate(chosen):
+                further[list(self._mass_groups[group]), column] = 1
+            core = core.with_scaled_parts(parts.with_factors(parts.factors, np.hstack([parts.exponents, further])))
         lowest, highest = _range_of(severities, "severities", -np.inf, 1)
         bounds = np.tile([1 - highest, 1 - lowest], (len(chosen), 1))
-        return self._with_core(self._whole.with_group_factors(scaled), names, bounds)
+        return self._with_core(core, names, bounds)
 
     def with_added(self, stiffness: MatrixLike | None = None, mass: MatrixLike | None = None) -> Self:
         """A new model with further stiffness and mass, such as a retrofit adds.
@@ -602,7 +660,11 @@ class AffineModel:
         bounds = np.tile(1 + _range_of(amounts, "amounts", -1, np.inf), (len(masses), 1))
         return self._with_core(self._whole.with_mass_factors(matrices), names, bounds)
 
-    def with_parts(self, parts: Mapping[str, Mapping[int, MatrixLike]]) -> Self:
+    def with_parts(
+        self,
+        parts: Mapping[str, Mapping[int, MatrixLike]],
+        masses: Mapping[str, Mapping[int, MatrixLike]] | None = None,
+    ) -> Self:
         """A new model of the same matrices with further damage groups, which scale parts of stiffness terms.
 
         `Structure.divide` finds the parts that belong to members.
@@ -612,6 +674,9 @@ class AffineModel:
         parts : mapping of str to mapping of int to matrix
             Damage group -> position of a stiffness term -> the matrix (n_dof, n_dof), a part of that term, which the
             group scales. The remainder of a term still belongs to the term's groups, and so do its parts.
+        masses : mapping of str to mapping of int to matrix, optional
+            The same for parts of the mass that groups lose with their section: damage group -> position of a part ->
+            the mass of the group there. The mass of a group that is not named is not known.
 
         Returns
         -------
@@ -633,24 +698,16 @@ class AffineModel:
         >>> model.with_parts({"first": {0: [[400.0, 0.0], [0.0, 0.0]]}}).groups
         {'k': (0, 1), 'first': (1,)}
         """
-        n_terms = len(self._whole.stiffness.factors)
-        groups = dict(self._groups)
-        divided: list[tuple[int, Matrix]] = []
-        for name, of_terms in parts.items():
-            if name in self._groups or not isinstance(of_terms, Mapping) or not of_terms:
-                raise ValueError(f"part {name!r} is {of_terms!r:.200}; expected a new name, and matrices by position")
-            unknown = [position for position in of_terms if position not in range(n_terms)]
-            if unknown:
-                raise ValueError(f"part {name!r} is of terms {unknown}; expected positions from 0 to {n_terms - 1}")
-            first = n_terms + len(divided)
-            new = dict(zip(of_terms, range(first, first + len(of_terms)), strict=True))
-            for group, inside in groups.items():
-                groups[group] = (*inside, *(new[position] for position in inside if position in new))
-            groups[name] = tuple(new.values())
-            divided += [
-                (position, read_matrix(part, f"part {name!r}", self.n_dof)) for position, part in of_terms.items()
-            ]
-        return self._with_core(self._whole.with_divided_stiffness(divided), groups=groups)._twin(contents=())
+        wrong = [name for name, own in parts.items() if name in self._groups or not isinstance(own, Mapping) or not own]
+        if wrong:
+            own = parts[wrong[0]]
+            raise ValueError(f"part {wrong[0]!r} is {own!r:.200}; expected a new name, and matrices by position")
+        groups, stiffness = divided(parts, self._groups, len(self._whole.stiffness.factors), self.n_dof)
+        n_masses = len(self._parts_of_mass.terms)
+        mass_groups, mass = divided(masses or {}, self._mass_groups, n_masses, self.n_dof)
+        whole = self._whole.with_divided_terms(stiffness, mass)
+        changes: dict[str, Any] = {"_groups": groups, "_mass_groups": mass_groups}
+        return self._with_core(whole, **changes, contents=(), _mass_contents=())
 
     def quiet(self) -> Self:
         """The same model without warnings.
@@ -759,12 +816,32 @@ class AffineModel:
         track = ", track=True" if self.track else ""
         return f"AffineModel({parameters}, {degrees} of freedom, {modes}{track})"
 
-    def _with_core(
-        self, core: AffineCore, names: Names = None, bounds: Array | None = None, groups: Groups = None
-    ) -> Self:
-        """A model like this one with another core, these parameter names, bounds of the new ones, and groups."""
-        names, groups = names or self.parameter_names, groups or self._groups
-        return self._twin(_core=core, _whole=core, parameter_names=names, _groups=groups)
+    def _with_core(self, core: AffineCore, names: Names = None, bounds: Array | None = None, **changes: Any) -> Self:
+        """A model like this one with another core, these parameter names, bounds of the new ones, and changes."""
+        return self._twin(_core=core, _whole=core, parameter_names=names or self.parameter_names, **changes)
+
+    def _lost_parts(self, groups: Iterable[str], kind: LossKind) -> AffineTerms | None:
+        """Parts of the mass, where a loss of groups takes some; None where it takes none."""
+        check_kind(kind)
+        unknown = [group for group in groups if group not in self._mass_groups]
+        if kind == "section" and unknown:
+            raise ValueError(
+                f"the model does not know the mass of the groups {unknown}, which a loss of section takes away; "
+                "expected kind='stiffness', or a model with group_mass={group: matrix}, as Structure.assemble gives it"
+            )
+        return self._whole.parts if kind == "section" else None
+
+    def _know(self, masses: PartsOfMass) -> None:
+        """Take the masses of groups."""
+        if masses.terms:
+            keys, matrices = zip(*masses.terms, strict=True)
+            parts = type(self._whole.mass).from_matrices(matrices, exponents_of(keys, self.parameter_names))
+            self._core = self._whole = replace(self._whole, parts=parts)
+        self._mass_groups, self._mass_contents = masses.groups, tuple(map(tuple, masses.contents))
+        mass = self.matrices(np.ones(len(self.parameter_names)))[1].diagonal()
+        for name, own in self.group_mass.items():
+            if (own.diagonal() < 0).any() or (own.diagonal() > (1 + 1e-6) * mass + 1e-9 * mass.max()).any():
+                raise ValueError(f"group_mass of {name!r} is below 0, or more than the model's mass; expected kg of it")
 
     def _twin(self, **changes: Any) -> Self:
         """A model like this one, with some attributes changed."""
@@ -848,7 +925,7 @@ class ReducedModel(AffineModel):
         if not isinstance(tol, int | float | np.floating) or not 0 < tol < 1:
             raise ValueError(f"tol is {tol!r}; expected a relative error between 0 and 1, such as 1e-5")
         self.parameter_names, self._groups, self.contents = full.parameter_names, full._groups, full.contents
-        self.dofs = full.dofs
+        self.dofs, self._mass_groups, self._mass_contents = full.dofs, full._mass_groups, full._mass_contents
         self._full, self._whole = full, full._whole
         self._bounds = check_bounds(bounds, full.parameter_names)
         self._tol = tol
@@ -893,16 +970,14 @@ class ReducedModel(AffineModel):
     def findings(self, theta: Array, frequencies: Array) -> list[SkthermoWarning]:
         return [*self._beyond_bounds(theta), *super().findings(theta, frequencies)]
 
-    def _with_core(
-        self, core: AffineCore, names: Names = None, bounds: Array | None = None, groups: Groups = None
-    ) -> Self:
-        full = self._full._with_core(core, names, groups=groups)
+    def _with_core(self, core: AffineCore, names: Names = None, bounds: Array | None = None, **changes: Any) -> Self:
+        full = self._full._with_core(core, names, **changes)
         known = dict(zip(self.parameter_names, self._bounds, strict=True))
         new = () if bounds is None else bounds
         known |= dict(zip([name for name in full.parameter_names if name not in known], new, strict=True))
         bounds = np.array([known[name] for name in full.parameter_names])
-        names, groups = full.parameter_names, full._groups
-        twin = self._twin(_full=full, _whole=core, _bounds=bounds, parameter_names=names, _groups=groups)
+        changes |= {"_full": full, "_whole": core, "_bounds": bounds, "parameter_names": full.parameter_names}
+        twin = self._twin(**changes)
         twin._use(grow_basis(core, bounds, self._tol, 0, start=self._basis))
         return twin
 
@@ -939,6 +1014,50 @@ def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> t
     if unused:
         raise ValueError(f"no term names the parameters {unused}; expected some of {list(mentioned)}")
     return names
+
+
+def exponents_of(keys: Sequence[Key], names: Sequence[str]) -> NDArray[np.int64]:
+    """How often each parameter multiplies each term, (n_terms, n_parameters)."""
+    return np.array([[key.count(name) for name in names] for key in keys], dtype=np.int64)
+
+
+def read_group_mass(
+    masses: Mapping[str, MatrixLike | Terms] | PartsOfMass, groups: Groups, names: Sequence[str], n_dof: int
+) -> PartsOfMass:
+    """Masses of damage groups as terms, which know their groups."""
+    if isinstance(masses, PartsOfMass):
+        return masses
+    if not isinstance(masses, Mapping) or not set(masses) <= set(groups):
+        raise ValueError(f"group_mass is {masses!r:.200}; expected a mapping of some of {list(groups)} to matrices")
+    terms: list[tuple[Key, Matrix]] = []
+    found = {}
+    for group, mass in masses.items():
+        own = list(zip(*read_terms(mass, f"group_mass of {group!r}", n_dof), strict=True))
+        found[group] = tuple(range(len(terms), len(terms) + len(own)))
+        terms += own
+    unknown = sorted({name for key, _ in terms for name in key} - {*names})
+    if unknown:
+        raise ValueError(f"terms of group_mass name {unknown}; expected parameters of the model, {list(names)}")
+    return PartsOfMass(terms, found)
+
+
+def divided(
+    parts: Mapping[str, Mapping[int, MatrixLike]], groups: Groups, n_terms: int, n_dof: int
+) -> tuple[dict[str, tuple[int, ...]], list[tuple[int, Matrix]]]:
+    """Groups with the positions of their terms once parts are terms of their own, and each part with its term's."""
+    found: Groups = dict(groups)
+    terms: list[tuple[int, Matrix]] = []
+    for name, of_terms in parts.items():
+        unknown = [position for position in of_terms if position not in range(n_terms)]
+        if unknown:
+            raise ValueError(f"part {name!r} is of terms {unknown}; expected positions from 0 to {n_terms - 1}")
+        first = n_terms + len(terms)
+        new = dict(zip(of_terms, range(first, first + len(of_terms)), strict=True))
+        for group, inside in found.items():
+            found[group] = (*inside, *(new[position] for position in inside if position in new))
+        found[name] = tuple(new.values())
+        terms += [(position, read_matrix(part, f"part {name!r}", n_dof)) for position, part in of_terms.items()]
+    return found, terms
 
 
 def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str, tuple[int, ...]]:

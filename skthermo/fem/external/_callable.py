@@ -23,7 +23,7 @@ from skthermo.fem._terms import (
     failures,
     failures_named,
 )
-from skthermo.fem.damage import damage_directions
+from skthermo.fem.damage import LossKind, damage_directions, kind_option
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -243,7 +243,7 @@ class CallableModel:
             for row in np.flatnonzero(wrong.any(axis=1))
         }
 
-    def damaged(self, damage: Mapping[str, float]) -> CallableModel:
+    def damaged(self, damage: Mapping[str, float], *, kind: LossKind = "stiffness") -> CallableModel:
         """A new model with damage: the parameters of each group are multiplied by 1 - severity.
 
         Parameters
@@ -251,6 +251,9 @@ class CallableModel:
         damage : mapping of str to float
             Group -> severity: 0.5 is half, -0.15 a strengthening by 15 %. A parameter in several damaged groups is
             multiplied by all their factors.
+        kind : {"stiffness"}, default="stiffness"
+            The function knows what its parameters multiply: where one is a cross-section, with its mass, its group
+            loses section.
 
         Returns
         -------
@@ -260,21 +263,24 @@ class CallableModel:
         Raises
         ------
         ValueError
-            If a group is unknown, or a severity is 1 or more or not finite.
+            If a group is unknown, a severity is 1 or more or not finite, or the kind is another.
         """
+        kind_option(self, kind)
         twin = copy.copy(self)
         twin._factors = self._factors.copy()
         for group, severity in check_severities(damage, self.groups).items():
             twin._factors[[self.parameter_names.index(name) for name in self.groups[group]]] *= 1 - severity
         return twin
 
-    def damage_directions(self, groups: Sequence[str] | None = None) -> pd.DataFrame:
-        """Relative change of each frequency per loss of stiffness of each damage group, for small losses.
+    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of each damage group, for small losses.
 
         Parameters
         ----------
         groups : sequence of str, optional
             Damage groups. By default all but those that other groups make up.
+        kind : {"stiffness"}, optional
+            As in `damaged`.
 
         Returns
         -------
@@ -285,9 +291,9 @@ class CallableModel:
         Raises
         ------
         ValueError
-            If a group is unknown, or none moves a frequency.
+            If a group is unknown, none moves a frequency, or the kind is another.
         """
-        return damage_directions(self, groups)
+        return damage_directions(self, groups, kind)
 
     def quiet(self) -> CallableModel:
         """The same model, but without warnings and errors: it gives NaN where the function fails.

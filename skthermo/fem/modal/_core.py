@@ -1,10 +1,10 @@
 """Modal analysis of affine matrices: eigenproblems by LAPACK, columns that follow modes, and derivatives."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -38,9 +38,9 @@ class NominalModes(NamedTuple):
             repeated=repeated_modes(eigenvalues[0])[np.ix_(ranks, ranks)],
         )
 
-    def beside(self, mass: AffineTerms) -> "NominalModes":
-        """The same modes, where mass has been added to the structure as further terms."""
-        added = np.zeros(len(mass.factors) - len(self.mass_coefficients))
+    def beside(self, mass: AffineTerms, share: float = 0.0) -> "NominalModes":
+        """The same modes, where the mass has further terms, which have a share in the nominal mass."""
+        added = np.full(len(mass.factors) - len(self.mass_coefficients), share)
         return self._replace(mass_coefficients=np.append(self.mass_coefficients, added))
 
     def mass_spread(self, theta: Array, mass: AffineTerms) -> Array:
@@ -63,6 +63,7 @@ class AffineCore:
     available: int  # how many modes the mass allows and the solver finds
     guards: int = GUARD_MODES  # how many modes above the lowest are computed first where columns are followed
     healthy: "AffineCore | None" = None  # whose nominal modes define the columns, if it is another core
+    parts: AffineTerms | None = None  # of the mass: those that damage groups lose with their section
     n_lowest: int = field(init=False)  # how many of the lowest modes contain all columns at theta = 1
     n_solved: int = field(init=False)  # how many of the lowest modes are computed at first
     first_candidates: int = field(init=False)  # how many are examined at first, where columns are followed
@@ -71,12 +72,19 @@ class AffineCore:
 
     @classmethod
     def from_terms(
-        cls, stiffness: AffineTerms, mass: AffineTerms, *, ranks: Sequence[int], track: bool, available: int
+        cls,
+        stiffness: AffineTerms,
+        mass: AffineTerms,
+        *,
+        ranks: Sequence[int],
+        track: bool,
+        available: int,
+        parts: AffineTerms | None = None,
     ) -> "AffineCore":
         """The core whose columns are the modes of these ranks (the lowest is 0) at theta = 1."""
         solver, order = eigen_solver(stiffness, mass), np.asarray(ranks, dtype=np.intp)
         nominal = NominalModes.of_ranks(solver, mass, order)
-        return cls(stiffness, mass, solver, nominal, order, track, available)
+        return cls(stiffness, mass, solver, nominal, order, track, available, parts=parts)
 
     def __post_init__(self) -> None:
         self.n_lowest = int(self.ranks.max()) + 1
@@ -91,31 +99,51 @@ class AffineCore:
         stiffness, solver = self.stiffness.with_factors(self.stiffness.factors * factors), self.solver.scaled(factors)
         return replace(self, stiffness=stiffness, solver=solver, healthy=self.healthy or self)
 
+    def with_scaled_parts(self, parts: AffineTerms) -> "AffineCore":
+        """The core whose parts of the mass have these factors and exponents; its columns stay the same nominal modes.
+
+        Each part that changes is added to the mass as it becomes, and taken away as it was.
+        """
+        old: Any = self.parts
+        are_other = (parts.factors != old.factors) | (parts.exponents != old.exponents).any(axis=1)
+        matrices = [matrix for matrix, is_other in zip(old.each_matrix, are_other, strict=True) if is_other]
+        if not matrices:
+            return self
+        mass = self.mass.with_terms(
+            [*matrices, *(-matrix for matrix in matrices)],
+            np.vstack([parts.exponents[are_other], old.exponents[are_other]]),
+            np.append(parts.factors[are_other], old.factors[are_other]),
+        )
+        solver, nominal = eigen_solver(self.stiffness, mass), self.nominal.beside(mass, share=1.0)
+        return replace(self, mass=mass, parts=parts, solver=solver, nominal=nominal, healthy=self.healthy or self)
+
     def rescaled(self, row: Array) -> "AffineCore":
         """The core whose theta = 1 is this one's theta = row; its columns stay the same nominal modes."""
-        stiffness = self.stiffness.with_factors(self.stiffness.coefficients(row)[0])
-        mass = self.mass.with_factors(self.mass.coefficients(row)[0])
-        solver = eigen_solver(stiffness, mass)
-        return replace(self, stiffness=stiffness, mass=mass, solver=solver, healthy=self.healthy or self)
+        changed: dict[str, Any] = {
+            name: one.with_factors(one.coefficients(row)[0]) for name, one in self._terms.items()
+        }
+        solver = eigen_solver(changed["stiffness"], changed["mass"])
+        return replace(self, **changed, solver=solver, healthy=self.healthy or self)
 
     def with_modes(self, ranks: NDArray[np.intp]) -> "AffineCore":
         """The core whose columns are other modes of the healthy nominal state."""
         healthy = self.healthy or self
-        nominal = NominalModes.of_ranks(healthy.solver, healthy.mass, ranks).beside(self.mass)
+        nominal = NominalModes.of_ranks(healthy.solver, healthy.mass, ranks)
+        nominal = nominal._replace(mass_coefficients=self.nominal.mass_coefficients)
         return replace(self, nominal=nominal, ranks=ranks)
 
     def with_parameters(self, columns: NDArray[np.intp]) -> "AffineCore":
         """The core of fewer parameters, the others being 1."""
         healthy = self.healthy.with_parameters(columns) if self.healthy else None
-        return self._with_exponents(self.stiffness.exponents[:, columns], self.mass.exponents[:, columns], healthy)
+        return self._with_exponents({name: one.exponents[:, columns] for name, one in self._terms.items()}, healthy)
 
     def with_group_factors(self, scaled: NDArray[np.int64]) -> "AffineCore":
         """The core with further parameters that multiply groups of stiffness terms, (n_terms, n_groups)."""
         healthy = self.healthy.with_group_factors(scaled) if self.healthy else None
-        further = scaled[: len(self.stiffness.factors)]  # the healthy core may lack terms that were added
-        constant = np.zeros((len(self.mass.factors), scaled.shape[1]), dtype=scaled.dtype)
-        stiffness = np.hstack([self.stiffness.exponents, further])
-        return self._with_exponents(stiffness, np.hstack([self.mass.exponents, constant]), healthy)
+        further = {name: np.zeros((len(one.factors), scaled.shape[1]), int) for name, one in self._terms.items()}
+        further["stiffness"] = scaled[: len(self.stiffness.factors)]  # the healthy core may lack terms that were added
+        exponents = {name: np.hstack([one.exponents, further[name]]) for name, one in self._terms.items()}
+        return self._with_exponents(exponents, healthy)
 
     def with_mass_factors(self, masses: Sequence[Matrix]) -> "AffineCore":
         """The core with further parameters: 1 + the number of times that each of these masses is added."""
@@ -126,12 +154,18 @@ class AffineCore:
         solver, nominal = eigen_solver(wider.stiffness, heavy), self.nominal.beside(heavy)
         return replace(wider, mass=heavy, solver=solver, nominal=nominal)
 
-    def _with_exponents(self, stiffness: NDArray, mass: NDArray, healthy: "AffineCore | None") -> "AffineCore":
-        terms = (
-            self.stiffness.with_factors(self.stiffness.factors, stiffness),
-            self.mass.with_factors(self.mass.factors, mass),
-        )
-        return replace(self, stiffness=terms[0], mass=terms[1], solver=eigen_solver(*terms), healthy=healthy)
+    def _with_exponents(self, exponents: Mapping[str, NDArray], healthy: "AffineCore | None") -> "AffineCore":
+        changed: dict[str, Any] = {
+            name: one.with_factors(one.factors, exponents[name]) for name, one in self._terms.items()
+        }
+        solver = eigen_solver(changed["stiffness"], changed["mass"])
+        return replace(self, **changed, solver=solver, healthy=healthy)
+
+    @property
+    def _terms(self) -> dict[str, AffineTerms]:
+        """Stiffness, mass and, where they are known, its parts."""
+        terms = {"stiffness": self.stiffness, "mass": self.mass}
+        return terms if self.parts is None else terms | {"parts": self.parts}
 
     def with_added(self, stiffness: Matrix | None, mass: Matrix | None) -> "AffineCore":
         """The core with further constant stiffness and mass; its columns stay the same nominal modes."""
@@ -144,16 +178,13 @@ class AffineCore:
         solver, nominal = eigen_solver(stiff, heavy), self.nominal.beside(heavy)
         return replace(self, stiffness=stiff, mass=heavy, solver=solver, nominal=nominal, healthy=self.healthy or self)
 
-    def with_divided_stiffness(self, parts: Sequence[tuple[int, Matrix]]) -> "AffineCore":
-        """The core with parts of its stiffness terms, each with its term's position, taken out as further terms."""
-        matrices = self.stiffness.each_matrix
-        for position, part in parts:
-            matrices[position] = matrices[position] - part
-        origin = [*range(len(matrices)), *(position for position, _ in parts)]
-        terms = [*matrices, *(part for _, part in parts)]
-        stiffness = self.stiffness.from_matrices(terms, self.stiffness.exponents[origin])
-        stiffness = stiffness.with_factors(self.stiffness.factors[origin])
-        return replace(self, stiffness=stiffness, solver=eigen_solver(stiffness, self.mass))
+    def with_divided_terms(
+        self, stiffness: Sequence[tuple[int, Matrix]], parts: Sequence[tuple[int, Matrix]]
+    ) -> "AffineCore":
+        """The core with some of its stiffness terms, and of the parts of its mass, divided."""
+        divided = self.stiffness.divided(stiffness)
+        smaller = self.parts if self.parts is None or not parts else self.parts.divided(parts)
+        return replace(self, stiffness=divided, parts=smaller, solver=eigen_solver(divided, self.mass))
 
     def projected(self, basis: Array, tol: float) -> "AffineCore":
         """The core on a basis (n_dof, n) of shapes, whose own relative errors are much smaller than ``tol``."""

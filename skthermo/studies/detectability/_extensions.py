@@ -256,13 +256,16 @@ def scenarios_of(study: DetectabilityStudy, detector: str) -> list[Scenario]:
             continue
         members = [one for one in study.scenarios_ if isinstance(one, Scenario) and one.family == family]
         groups = {group for member in members for group in member.damage or {}}
-        if len(groups) != 1 or not all(list(member.changes(None)) == ["damage"] for member in members):
+        kinds = {member.kind for member in members}
+        is_damage = all(member.changes(None).keys() <= {"damage", "kind"} for member in members)
+        if len(groups) != 1 or len(kinds) != 1 or not is_damage:
             scenarios += members
             continue
         severities = _around(rates) * np.linspace(0.3, 1.5, 13)
         for severity in np.clip(severities, -0.95, 0.95).tolist():
             changed = {groups.copy().pop(): severity}
-            scenarios.append(Scenario(f"{family} {severity}", changed, family=family, severity=severity))
+            options = {"family": family, "severity": severity, "kind": members[0].kind}
+            scenarios.append(Scenario(f"{family} {severity}", changed, **options))
     if not scenarios:
         raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
     return scenarios

@@ -299,10 +299,11 @@ def clean_frequencies(
     """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
     weather, clean = fem.weather(T), {}
     for scenario in scenarios:
-        draws = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
-        changes = [scenario.changes(T, int(draw)) for draw in draws]
+        numbers = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
+        changes = [scenario.changes(T, int(number)) for number in numbers]
         if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
-            clean[scenario.name] = fem.thermal_.with_each(weather, [change["damage"] for change in changes])
+            draws = [change["damage"] for change in changes]
+            clean[scenario.name] = fem.thermal_.with_each(weather, draws, scenario.kind)
         else:
             clean[scenario.name] = [fem.thermal_.simulated(weather, **change) for change in changes]
     return clean

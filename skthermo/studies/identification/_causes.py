@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from skthermo._core.arrays import Array, MatrixLike, check_names, is_real, real_array
 from skthermo.fem import Structure
-from skthermo.fem.damage import ALL_GROUPS, read_groups
+from skthermo.fem.damage import ALL_GROUPS, LossKind, kind_option, read_groups
 
 SOMETHING_ELSE, NO_DAMAGE = "something else", "no damage"
 MemberLine = list[Hashable]
@@ -164,8 +164,10 @@ def _read_masses(model: Any, added_mass: Any) -> dict[str, Any]:
     return found
 
 
-def changed(model: Any, theta: Array, causes: Sequence[Cause], amounts: Sequence[float]) -> tuple[Any, Array]:
-    """The model, and its parameters theta (1, n_parameters), after some amounts of causes."""
+def changed(
+    model: Any, theta: Array, causes: Sequence[Cause], amounts: Sequence[float], kind: LossKind
+) -> tuple[Any, Array]:
+    """The model, and its parameters theta (1, n_parameters), after some amounts of causes, damage of one kind."""
     factors: dict[str, float] = {}
     theta = theta.copy()
     for cause, amount in zip(causes, amounts, strict=True):
@@ -175,7 +177,8 @@ def changed(model: Any, theta: Array, causes: Sequence[Cause], amounts: Sequence
             theta[:, list(model.parameter_names).index(cause.of[0])] *= 1 + amount
         else:
             factors |= {name: factors.get(name, 1.0) * (1 - amount) for name in cause.of}
-    return (model.damaged({name: float(1 - by) for name, by in factors.items()}) if factors else model), theta
+    damage, options = {name: float(1 - by) for name, by in factors.items()}, kind_option(model, kind)
+    return (model.damaged(damage, **options) if damage else model), theta
 
 
 def members_of(model: Any, names: Sequence[str]) -> MemberLine:

@@ -14,12 +14,13 @@ from joblib import delayed
 from numpy.typing import ArrayLike
 from scipy import stats
 
-from skthermo._core.arrays import Array, MatrixLike, as_random_state, check_jobs, check_probability
+from skthermo._core.arrays import Array, MatrixLike, RandomState, as_random_state, check_jobs, check_probability
 from skthermo._core.parallel import run_jobs
 from skthermo._core.text import SPACE, Sentences, chance_text, counted, listed, percent, probability_text, significant
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
+from skthermo.fem.damage import LossKind, check_kind
 from skthermo.studies._scenarios import UncertainDamage, check_chain, checked_models
 from skthermo.studies.identification._causes import (
     NO_DAMAGE,
@@ -44,6 +45,7 @@ def identify_damage(
     groups: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
     *,
     structure: Structure | None = None,
+    kind: LossKind = "stiffness",
     noise: ArrayLike | Literal["fitted"] = "fitted",
     prior: DamagePrior | None = None,
     stiffening: bool | Sequence[str] | None = None,
@@ -54,7 +56,7 @@ def identify_damage(
     shape_noise: ArrayLike | Literal["fitted"] = 0.01,
     models: Sequence[Any] | None = None,
     n_jobs: int | None = None,
-    random_state: int | np.random.RandomState | None = None,
+    random_state: RandomState = None,
 ) -> IdentifiedDamage:
     """Which causes explain how measured frequencies have shifted, how probably, and by how much.
 
@@ -73,6 +75,9 @@ def identify_damage(
         Nodes and members of the model, which was assembled from it and may have been calibrated since; an
         `~skthermo.fem.ImportedStructure` for members that another program has assembled. With it, stretches of
         neighbouring members of a group are sought beside whole groups.
+    kind : {"stiffness", "section"}, default="stiffness"
+        What groups lose, or gain with ``stiffening``: stiffness alone or, with cross-section, mass too. An unknown kind
+        can be found by comparing the misfits of both.
     noise : "fitted", float or array-like of shape (n_modes,), default="fitted"
         Where the error of the mean shift comes from: the residuals of the training records, with their correlations
         from mode to mode and from record to record; or independent records with a relative standard deviation.
@@ -169,7 +174,8 @@ def identify_damage(
     check_jobs(n_jobs)
     random = as_random_state(random_state)
     causes = read_causes(fem.model, groups, stiffening, parameters, added_mass)
-    measured = {"shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
+    check_kind(kind)
+    measured = {"kind": kind, "shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
     with collected() as findings:
         shift = measured_shift(fem, T, F, noise)
         seen = observed(fem, fem.model, shift, **measured)
@@ -210,6 +216,7 @@ def identify_damage(
         similarity=similarity,
         records=shift.counts,
         explained=explained,
+        kind=kind,
     )
     if structure is not None:
         found.table["is_likely"] = found.table.index.isin(found.likely_members())
@@ -418,6 +425,8 @@ class IdentifiedDamage(Sentences):
         training records are worth.
     explained : sequence of explanations
         All explanations with a probability above .001 %, with draws of their amounts.
+    kind : {"stiffness", "section"}, default="stiffness"
+        What the damaged groups have lost in all explanations.
 
     Examples
     --------
@@ -445,6 +454,7 @@ class IdentifiedDamage(Sentences):
     similarity: pd.DataFrame = field(repr=False)
     records: pd.Series = field(repr=False)
     explained: Sequence[DamageExplanation] = field(repr=False)
+    kind: LossKind = "stiffness"
 
     @cached_property
     def explanations(self) -> pd.DataFrame:
@@ -541,7 +551,7 @@ class IdentifiedDamage(Sentences):
         UncertainDamage
             A scenario whose severities are drawn from ``draws``.
         """
-        return UncertainDamage(name, self.draws)
+        return UncertainDamage(name, self.draws, kind=self.kind)
 
     def likely_members(self, probability: float = 0.9, group: str | None = None) -> list[Hashable]:
         """The fewest rows of the table that hold all damaged ones with a probability, given that there are any.
@@ -583,7 +593,7 @@ class IdentifiedDamage(Sentences):
         if best.is_healthy:
             bounds = self.groups["highest_if_damaged"].drop(self.unobservable)
             losses = [f"{_percent(bound)} in {name}" for name, bound in bounds[bounds > 0].items()]
-            yield f"95{SPACE}% upper bounds on undetected losses of stiffness: {listed(losses)}."
+            yield f"95{SPACE}% upper bounds on undetected losses of {self.kind}: {listed(losses)}."
         else:
             yield f"Probability of no change: {chance_text(1 - self.probability_of_damage)}."
         yield (
@@ -597,7 +607,7 @@ class IdentifiedDamage(Sentences):
         row = self.estimates.loc[(self.explained[0].name, cause.name)]
         amount, (low, high) = _percent(row["severity"]), (_percent(row[end]) for end in ("ci_low", "ci_high"))
         text = (
-            f"a loss of {amount} of stiffness in {cause.name}" if cause.kind == "damage" else f"{cause.name} {amount}"
+            f"a loss of {amount} of {self.kind} in {cause.name}" if cause.kind == "damage" else f"{cause.name} {amount}"
         )
         return f"{text}{f', {cause.place}' if cause.place else ''} (90{SPACE}% interval {low} to {high})"
 

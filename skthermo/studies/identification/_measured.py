@@ -15,6 +15,7 @@ from skthermo._core.arrays import Array, as_floats, check_dofs, check_noise, mea
 from skthermo._core.estimators import check_array
 from skthermo._core.text import counted, listed
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
+from skthermo.fem.damage import LossKind
 from skthermo.preprocessing.checks import set_aside
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.numbers import independent_records
@@ -192,13 +193,15 @@ class ObservedChange:
     findings: list[SkthermoWarning]
 
 
-def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any, shape_noise: Any) -> ObservedChange:
+def observed(
+    fem: Any, model: Any, shift: FrequencyShift, kind: LossKind, shapes: Any, dofs: Any, shape_noise: Any
+) -> ObservedChange:
     """Shifts of the measured frequencies, and of mode shapes if there are any; ``model`` may be a divided one."""
     known = ~np.isnan(shift.mean)
     model = getattr(model, "full", model)
 
     def frequencies(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
-        after, theta = changed(model, shift.theta, causes, amounts)
+        after, theta = changed(model, shift.theta, causes, amounts, kind)
         return np.log(as_floats(fem.aligner_.inverse_transform(after.frequencies(theta))))[0, known]
 
     before, covariance = frequencies([], []), shift.covariance[np.ix_(known, known)]
@@ -209,7 +212,7 @@ def observed(fem: Any, model: Any, shift: FrequencyShift, shapes: Any, dofs: Any
     )
 
     def both(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
-        after, theta = changed(model, compared.theta, causes, amounts)  # the model's own components are 0
+        after, theta = changed(model, compared.theta, causes, amounts, kind)  # the model's own components are 0
         components = compared.components(after.modes(theta)[1][0][compared.dofs])
         return np.append(frequencies(causes, amounts) - before, components)
 

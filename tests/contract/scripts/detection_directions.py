@@ -1,4 +1,7 @@
-"""What the directions of a model find, how large it is, and which groups look alike."""
+"""What the directions of a model find, how large it is, and which groups look alike.
+
+What is found is of 0.3, which looks for losses of section too, and so finds those of stiffness less often.
+"""
 
 from sklearn.pipeline import make_pipeline
 
@@ -18,7 +21,7 @@ RESULTS = {
     "smallest": detector[-1].minimum_detectable_damage()[groups],
     "pod": detector[-1].pod([0.05, 0.1, 0.2])[groups],
     "severities": severities.mean()[groups],
-    "directions": detector[-1].directions_,
+    "directions": detector[-1].directions_.loc[[*groups, "vertical"]],
     "explained": float(detector[-1].explained(residuals).mean()),
 }
 TOLERANCES = {

@@ -1,0 +1,251 @@
+"""Losses of cross-section, which take stiffness and mass away."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from skthermo.datasets import make_truss, truss_structure
+from skthermo.fem import AffineModel, Bar, Beam, CallableModel, ImportedStructure, PointMass, Spring, Structure
+
+TRUSS = make_truss()
+NAMES = ["bottom", "top", "diagonal", "vertical"]
+NOMINAL = np.ones((1, 4))
+THETA = np.random.default_rng(0).uniform(0.8, 1.2, size=(6, 4))
+LOSS = {"bottom": 0.3, "diagonal": 0.1}
+STEEL = {"E": 210e9, "G": 81e9, "density": 7850.0, "A": 0.02, "I_yy": 4e-5, "I_zz": 1e-5, "J": 3e-5}
+
+
+def lost(structure, losses):
+    """The structure with smaller members: E, G and density stand for all properties of a section."""
+
+    def smaller(name, element):
+        left = np.prod([1 - loss for group, loss in losses.items() if name in structure.groups[group]])
+        scaled = {name: left * getattr(element, name) for name in ("E", "G", "k", "density") if hasattr(element, name)}
+        return replace(element, **scaled)
+
+    members = {name: smaller(name, element) for name, element in structure.members.items()}
+    return Structure(structure.nodes, members, structure.supports, structure.groups)
+
+
+def frame(n=12):
+    """A continuous beam on springs, with point masses and a tie, whose groups overlap."""
+    nodes = {i: (2.0 * i, 0.0, 0.0) for i in range(n)} | {"low": (n - 1.0, 0.0, -2.0)}
+    members = {("beam", i): Beam(i, i + 1, **STEEL) for i in range(n - 1)}
+    members |= {("tie", i): Bar(i, "low", E=210e9, A=0.001, density=7850.0) for i in (2, n - 3)}
+    members |= {("mass", i): PointMass(i, m=500.0) for i in (3, 5)}
+    members |= {("spring", i): Spring(i, "z", k=2e7) for i in (0, n // 2, n - 1)}
+    groups = {
+        "west": [("beam", i) for i in range(n // 2)] + [("mass", 3)],
+        "middle": [("beam", i) for i in range(3, n - 3)],
+        "ties": [("tie", 2), ("tie", n - 3)],
+        "springs": [("spring", 0), ("spring", n - 1)],
+    }
+    supports = {0: "xy rx", n - 1: "y", "low": "y"}
+    return Structure(nodes, members, supports, groups)
+
+
+def test_the_truss_is_one_with_smaller_members():
+    smaller = lost(truss_structure(), LOSS).assemble(NAMES, n_modes=6)
+    exact = smaller.frequencies(THETA)
+    damaged = TRUSS.damaged(LOSS, kind="section")
+    assert damaged.frequencies(THETA) == pytest.approx(exact, rel=1e-10)
+    areas = truss_structure()
+    members = {
+        name: replace(bar, A=bar.A * np.prod([1 - loss for group, loss in LOSS.items() if name in areas.groups[group]]))
+        for name, bar in areas.members.items()
+    }
+    rebuilt = Structure(areas.nodes, members, areas.supports, areas.groups).assemble(NAMES, n_modes=6)
+    assert damaged.frequencies(THETA) == pytest.approx(rebuilt.frequencies(THETA), rel=1e-10)
+    assert (damaged.frequencies(NOMINAL) > TRUSS.damaged(LOSS).frequencies(NOMINAL)).all()
+
+
+@pytest.mark.parametrize("n", [12, 60])  # dense and sparse
+@pytest.mark.parametrize("track", [False, True])
+def test_beams_overlapping_groups_and_parameters_of_the_mass(n, track):
+    structure, loss = frame(n), {"west": 0.3, "middle": 0.2, "ties": 0.5, "springs": 0.1}
+    parameters = {"E_west": ("E", "west"), "mass of the middle": ("density", "middle"), "ties": "ties"}
+    model, smaller = (one.assemble(parameters, n_modes=4, track=track) for one in (structure, lost(structure, loss)))
+    theta = THETA[:3, :3]
+    assert model.damaged(loss, kind="section").frequencies(theta) == pytest.approx(
+        smaller.frequencies(theta), rel=1e-10
+    )
+    masses, members = model.group_mass, structure.members
+    assert masses["springs"].nnz == 0
+    whole = sum(2.0 * members["beam", i].density * members["beam", i].A for i in range(n // 2))
+    along_z = [place for place, (_, direction) in enumerate(model.dofs) if direction == "z"]
+    rigid = np.isin(np.arange(model.n_dof), along_z).astype(float)
+    assert rigid @ masses["west"] @ rigid == pytest.approx(whole)  # without the point mass
+
+
+def changed_models():
+    """Models that are changed, and the same of the truss with smaller members."""
+    smaller = lost(truss_structure(), LOSS).assemble(NAMES, n_modes=6)
+    yield TRUSS.damaged(LOSS, kind="section").with_modes([0, 3]), smaller.with_modes([0, 3]), THETA
+    fewer = TRUSS.with_parameters(["top", "bottom"])
+    yield fewer.damaged(LOSS, kind="section"), smaller.with_parameters(["top", "bottom"]), THETA[:, :2]
+    yield TRUSS.rescaled(THETA[0]).damaged(LOSS, kind="section"), smaller.rescaled(THETA[0]), THETA
+    step = {"bottom": 1 - np.sqrt(0.7), "diagonal": 1 - np.sqrt(0.9)}
+    yield TRUSS.damaged(step, kind="section").damaged(step, kind="section"), smaller, THETA
+    yield pickle.loads(pickle.dumps(TRUSS)).damaged(LOSS, kind="section"), smaller, THETA
+    mass = np.full(TRUSS.n_dof, 50.0)
+    yield TRUSS.with_added(mass=mass).damaged(LOSS, kind="section"), smaller.with_added(mass=mass), THETA
+    both = TRUSS.damaged({"top": 0.2}).damaged(LOSS, kind="section")
+    yield both, smaller.damaged({"top": 0.2}), THETA
+    varied = TRUSS.with_damage_parameters(["top"], kind="section").damaged(LOSS, kind="section")
+    yield varied.with_parameters(["diagonal"]), smaller.with_parameters(["diagonal"]), THETA[:, :1]
+
+
+@pytest.mark.parametrize("case", range(8))
+def test_other_changes_of_a_model_and_losses_of_section_go_together(case):
+    model, expected, theta = list(changed_models())[case]
+    assert model.frequencies(theta) == pytest.approx(expected.frequencies(theta), rel=1e-10)
+
+
+def test_a_reduced_model_loses_section():
+    exact = lost(truss_structure(), LOSS).assemble(NAMES, n_modes=6).frequencies(THETA)
+    reduced = TRUSS.reduced(0.25, random_state=0)
+    assert reduced.damaged(LOSS, kind="section").frequencies(THETA) == pytest.approx(exact, rel=1e-5)
+    varied = reduced.with_damage_parameters(list(LOSS), kind="section")
+    rows = np.hstack([THETA, np.tile([0.7, 0.9], (len(THETA), 1))])
+    assert varied.frequencies(rows) == pytest.approx(exact, rel=1e-5)
+    assert varied.full.frequencies(rows) == pytest.approx(exact, rel=1e-10)
+
+
+def test_a_tracked_mode_is_followed_where_mass_goes():
+    tracked = frame().assemble(["west", "ties"], groups=["west", "ties"], n_modes=4, track=True)
+    severities = np.linspace(0, 0.9, 19)
+    varied = tracked.with_damage_parameters(["west", "ties"], kind="section")
+    rows = np.column_stack([np.ones((19, 2)), 1 - severities, 1 - severities])
+    each = [tracked.damaged({"west": s, "ties": s}, kind="section").frequencies([[1.0, 1.0]])[0] for s in severities]
+    assert varied.frequencies(rows) == pytest.approx(np.array(each), rel=1e-10)
+
+
+def test_derivatives_are_those_of_differences():
+    parameters = {"E_west": ("E", "west"), "m_middle": ("density", "middle")}
+    model = frame().assemble(parameters, n_modes=4).with_damage_parameters(["west", "middle"], kind="section")
+    theta, step = np.array([[1.1, 0.9, 0.8, 0.95]]), 1e-5
+    jacobian = model.jacobian(theta)[0]
+    for column, unit in enumerate(np.eye(4)):
+        slope = (model.frequencies(theta + step * unit) - model.frequencies(theta - step * unit))[0] / (2 * step)
+        assert jacobian[:, column] == pytest.approx(slope, rel=1e-5, abs=1e-5)
+
+
+def test_directions_are_slopes_of_both_kinds():
+    directions = TRUSS.damage_directions()
+    assert list(directions.index) == [*NAMES, *(f"{name}, section" for name in NAMES)]
+    for kind in ("stiffness", "section"):
+        alone = TRUSS.damage_directions(["top", "bottom"], kind=kind)
+        for group, row in zip(["top", "bottom"], alone.to_numpy(), strict=True):
+            logs = [np.log(TRUSS.damaged({group: s}, kind=kind).frequencies(NOMINAL)[0]) for s in (1e-4, -1e-4)]
+            assert row == pytest.approx((logs[0] - logs[1]) / 2e-4, abs=1e-6)
+        assert alone.to_numpy() == pytest.approx(directions.loc[alone.index].to_numpy(), abs=1e-12)
+    on_springs = frame().assemble(["west"], groups=["west", "springs"], n_modes=4).damage_directions()
+    assert list(on_springs.index) == ["west", "springs", "west, section"]
+
+
+def test_a_loss_of_stiffness_is_what_it_was():
+    masses = truss_structure().assemble(NAMES, n_modes=6)._parts_of_mass
+    of_parameters = {places: (name,) for name, places in TRUSS.parameter_terms.items()}
+    terms = [(of_parameters.get((place,), ()), matrix) for place, matrix in enumerate(TRUSS.stiffness_terms)]
+    for kind in ({}, {"kind": "stiffness"}):
+        assert np.array_equal(TRUSS.damaged(LOSS, **kind).frequencies(THETA), TRUSS.damaged(LOSS).frequencies(THETA))
+    mass = TRUSS.matrices(np.ones(4))[1]
+    plain, knowing = (AffineModel(terms, mass, n_modes=6, group_mass=own) for own in (None, masses))
+    assert np.array_equal(plain.damaged(LOSS).frequencies(THETA), knowing.damaged(LOSS).frequencies(THETA))
+    assert np.array_equal(plain.jacobian(THETA), knowing.jacobian(THETA))
+    assert np.array_equal(TRUSS.frequencies(THETA), TRUSS.damaged({"top": 0.0}, kind="section").frequencies(THETA))
+
+
+def test_a_group_made_of_two_loses_as_both():
+    chords = truss_structure()
+    groups = chords.groups | {"chords": chords.groups["bottom"] | chords.groups["top"]}
+    model = Structure(chords.nodes, chords.members, chords.supports, groups).assemble(NAMES, n_modes=6)
+    one, two = {"chords": 0.2}, {"bottom": 0.2, "top": 0.2}
+    for kind in ("stiffness", "section"):
+        frequencies = [model.damaged(loss, kind=kind).frequencies(THETA) for loss in (one, two)]
+        assert frequencies[0] == pytest.approx(frequencies[1], rel=1e-12)
+    assert abs(model.group_mass["chords"] - model.group_mass["bottom"] - model.group_mass["top"]).max() < 1e-9
+    again = {"chords": 0.2, "top": 0.1}
+    expected = {"bottom": 0.2, "top": 1 - 0.8 * 0.9}
+    frequencies = [model.damaged(loss, kind="section").frequencies(THETA) for loss in (again, expected)]
+    assert frequencies[0] == pytest.approx(frequencies[1], rel=1e-12)
+
+
+def test_members_of_a_divided_group_lose_their_own_mass():
+    structure = frame()
+    model = structure.assemble(["west", "ties"], n_modes=4)
+    parts = {"west": {"first": [("beam", 0), ("beam", 1)]}, "springs": {"left": [("spring", 0)]}}
+    divided = structure.divide(model, parts)
+    fewer = Structure(structure.nodes, structure.members, structure.supports, structure.groups | {
+        "first": [("beam", 0), ("beam", 1)], "left": [("spring", 0)]
+    })  # fmt: skip
+    loss = {"first": 0.4, "middle": 0.1, "left": 0.2}
+    exact = lost(fewer, loss).assemble(["west", "ties"], n_modes=4).frequencies(THETA[:, :2])
+    assert divided.damaged(loss, kind="section").frequencies(THETA[:, :2]) == pytest.approx(exact, rel=1e-10)
+    reduced = structure.divide(model.reduced(0.25, random_state=0), parts).damaged(loss, kind="section")
+    assert reduced.frequencies(THETA[:, :2]) == pytest.approx(exact, rel=1e-5)
+
+
+def springs(**options):
+    stiffness = {("k",): [[800.0, -400.0], [-400.0, 400.0]], ("c",): np.diag([0.0, 100.0])}
+    return AffineModel(stiffness, {(): np.eye(2), ("m",): np.diag([0.0, 2.0])}, n_modes=2, **options)
+
+
+def test_masses_of_other_programs():
+    own = {"k": np.diag([0.5, 0.5]), "c": {("m",): np.diag([0.0, 1.0])}}
+    model, theta = springs(group_mass=own), [[1.2, 0.8, 1.5]]
+    damaged = model.damaged({"k": 0.2, "c": 0.5}, kind="section")
+    stiffness = 0.8 * 1.2 * np.array([[800.0, -400.0], [-400.0, 400.0]]) + 0.5 * 0.8 * np.diag([0.0, 100.0])
+    mass = np.eye(2) + 1.5 * np.diag([0.0, 2.0]) - 0.2 * np.diag([0.5, 0.5]) - 0.5 * 1.5 * np.diag([0.0, 1.0])
+    squares = np.linalg.eigvals(np.linalg.solve(mass, stiffness))
+    assert damaged.frequencies(theta)[0] == pytest.approx(np.sqrt(np.sort(squares)) / (2 * np.pi), rel=1e-12)
+    assert model.group_mass["c"].toarray() == pytest.approx(np.diag([0.0, 1.0]))
+    rescaled = model.rescaled(theta).damaged({"k": 0.2, "c": 0.5}, kind="section")
+    assert rescaled.frequencies(NOMINAL[:, :3]) == pytest.approx(damaged.frequencies(theta), rel=1e-12)
+
+
+def test_an_imported_structure_knows_the_masses_of_its_members():
+    structure = truss_structure()
+    exported = structure.assemble({name: name for name in structure.groups if name in NAMES}, groups=NAMES, n_modes=6)
+    mass = exported.matrices(np.ones(4))[1]
+    terms = {(name,): exported.stiffness_terms[place] for name, (place,) in exported.groups.items()}
+    rest = sum(exported.stiffness_terms) - sum(terms.values())
+    nodes, members = {0: (0.0, 0.0), 1: (1.0, 0.0)}, dict.fromkeys(NAMES, (0, 1))
+    for masses, is_known in ((exported.group_mass, True), (None, False)):
+        model = AffineModel({**terms, (): rest}, mass, n_modes=6, group_mass=masses)
+        imported = ImportedStructure(model, nodes, members, {"chords": ["bottom", "top"], "rest": NAMES[2:]})
+        assembled = imported.assemble(["chords", "rest"], n_modes=6)
+        if is_known:
+            loss = {"bottom": 0.2, "top": 0.2}
+            frequencies = assembled.damaged({"chords": 0.2}, kind="section").frequencies(NOMINAL[:, :2])
+            assert frequencies == pytest.approx(exported.damaged(loss, kind="section").frequencies(NOMINAL), rel=1e-10)
+            divided = imported.divide(assembled, {"chords": {"upper": ["top"]}}).damaged({"upper": 0.3}, kind="section")
+            expected = exported.damaged({"top": 0.3}, kind="section").frequencies(NOMINAL)
+            assert divided.frequencies(NOMINAL[:, :2]) == pytest.approx(expected, rel=1e-10)
+        else:
+            with pytest.raises(ValueError, match="does not know the mass"):
+                assembled.damaged({"chords": 0.2}, kind="section")
+
+
+def test_what_is_wrong_is_named():
+    with pytest.raises(ValueError, match=r"does not know the mass of the groups \['k'\]"):
+        springs().damaged({"k": 0.2}, kind="section")
+    with pytest.raises(ValueError, match=r"does not know the mass of the groups \['c'\]"):
+        springs(group_mass={"k": 0.5 * np.eye(2)}).with_damage_parameters(["k", "c"], kind="section")
+    with pytest.raises(ValueError, match="does not know the mass"):
+        springs().damage_directions(kind="section")
+    with pytest.raises(ValueError, match="expected 'stiffness' or 'section'"):
+        TRUSS.damaged({"top": 0.1}, kind="area")
+    with pytest.raises(ValueError, match="does not know the mass"):
+        CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6).damaged({"top": 0.1}, kind="section")
+    for masses, what in (
+        ({"x": np.eye(2)}, "expected a mapping of some of"),
+        ({"k": 2 * np.eye(2)}, "more than the model's mass"),
+        ({"k": -np.eye(2)}, "below 0"),
+        ({"k": np.eye(3)}, "expected"),
+        ({"k": {("z",): 0.1 * np.eye(2)}}, "name"),
+    ):
+        with pytest.raises(ValueError, match=what):
+            springs(group_mass=masses)
