@@ -231,7 +231,7 @@ def paper_chain(
     >>> from skthermo.surrogate import paper_chain
     >>> year = make_truss_campaign(random_state=0)
     >>> fem = paper_chain(make_truss(), bounds=0.2, n_samples=200, random_state=0)
-    >>> fem = fem.set_params(inverse__regressor__max_iter=20, mapper__regressor__max_iter=20)  # of 1000
+    >>> fem = fem.set_params(inverse__regressor__max_iter=100, mapper__regressor__max_iter=100)
     >>> fem.fit(year.temperatures, year.frequencies).simulate(year.temperatures, damage={"bottom": 0.2}).shape
     (365, 6)
     """
