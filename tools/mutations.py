@@ -272,12 +272,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
     ],
-    ("plotting/_display.py", "plotting/test_limits.py"): [
-        ("outliers that nobody counts", "if np.any(np.concatenate(beyond)):", "if is_upper:"),
+    ("plotting/_over_time.py", "plotting/test_limits.py"): [
+        ("outliers that nobody counts", "        if far:", "        if is_upper:"),
     ],
-    ("plotting/_detectors.py", "plotting/test_detectors.py"): [
+    ("plotting/_studies.py", "plotting/test_detectors.py"): [
         ("measured rates outside their bands", '(rates["mark"] < rates["low"]) |', '(rates["mark"] < rates["low"]) &'),
-        ("measured records not evaluated", "if measured > 0:", "if measured > 1:"),
+        ("measured records not evaluated", '{"unknown_measured": "", ', "{"),
     ],
     ("monitoring/_status.py", "reporting/test_service.py"): [
         ("silence called healthy", "self.max_age is not None and self.age > self.max_age", "False"),
@@ -286,13 +286,13 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("much lost stiffness called healthy", 'return "attention" if said == "healthy" and self.worn else', "return"),
     ],
     ("reporting/_fleet.py", "reporting/test_fleet.py"): [
-        ("significant alarms among the others", '("significant" if is_significant else "open")', '"open"'),
-        ("silent bridges below healthy ones", 'place, size = "silent",', 'place, size = "well",'),
+        ("significant alarms among the others", '"significant" if is_significant else "open"', '"open"'),
+        ("silent bridges below healthy ones", '"not evaluated": ("silent",', '"not evaluated": ("well",'),
     ],
     ("reporting/_study.py", "reporting/test_choice.py"): [
         ("alarm system that is recommended", "ranking.index[0] if", "ranking.index[1] if"),
     ],
-    ("plotting/_structure_display.py", "plotting/test_structures.py"): [
+    ("plotting/_structures.py", "plotting/test_structures.py"): [
         ("motions out of the plane", "and moving <= {*plane", "or moving <= {*plane"),
     ],
     ("monitoring/_files.py", "monitoring/test_files.py"): [
@@ -300,7 +300,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("classes of other packages by a trusted name", "and found.__module__ == module", ""),
     ],
     ("commands/_bridge.py", "commands/test_monitor_commands.py"): [
-        ("an alarm that has ended within a batch", "if has_alarm or state ==", "if state =="),
+        ("an alarm that has ended within a batch", "if had_alarm or self.state", "if self.state"),
     ],
     ("_core/files.py", "test_shared_files.py"): [
         ("a lock that another process holds", "        return False\n    return True", "        pass\n    return True"),

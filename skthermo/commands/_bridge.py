@@ -1,4 +1,4 @@
-"""One monitor in its folder: fitted, updated, reported; each function does the work of a command on it."""
+"""One monitor in its folder: fitted, updated, reported; each method does the work of a command on it."""
 
 from __future__ import annotations
 
@@ -6,90 +6,75 @@ import argparse
 import json
 import logging
 import os
-from collections.abc import Callable, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 import skthermo
-from skthermo._core.files import alone_with
+from skthermo._core.files import alone_with, write_when_complete
 from skthermo._core.text import counted, plain
 from skthermo._core.warnings import collected, warn_each
-from skthermo.commands._new_records import (
-    NewFile,
-    Taken,
-    check_layout,
-    files_in,
-    joined,
-    read_baseline,
-    read_columns,
-)
-from skthermo.commands._settings import Settings, read_settings
-from skthermo.exceptions import SkthermoWarning
+from skthermo.commands._settings import RecordSettings, Settings, read_settings
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
-from skthermo.preprocessing.loggers.logger_files import CsvFormat, in_zone, read_file
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, read_file
+from skthermo.preprocessing.loggers.together import in_celsius, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
-NO_ALARM = ("healthy", "watch")
 COUNTS = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
 
 logger = logging.getLogger("skthermo.commands")
 
 
-@dataclass
-class Done:
-    """What a command did with a bridge, and what it says of it.
+class Bridge:
+    """What a command is asked to work on, settings or the file of a monitor alone, and what it did and says.
 
     ``state`` and ``code`` are those of the command; ``status`` has the facts by the clock.
     """
 
-    name: str
-    state: str | None = None
-    code: int = HEALTHY
-    lines: list[str] = field(default_factory=list)
-    status: MonitorStatus | None = None
-    records: dict[str, Any] | None = None
-    transitions: list[dict[str, Any]] = field(default_factory=list)
-    written: list[Path] = field(default_factory=list)
-    errors: list[str] = field(default_factory=list)
+    def __init__(self, file: Path, options: argparse.Namespace):
+        self.file, self.options, self.name = file, options, file.stem
+        self.state: str | None = None
+        self.code = HEALTHY
+        self.status_: MonitorStatus | None = None
+        self.records: dict[str, Any] | None = None
+        self.metrics_file: Path | None = None
+        self.lines: list[str] = []
+        self.transitions: list[dict[str, Any]] = []
+        self.written: list[Path] = []
+        self.errors: list[str] = []
 
-    def failed(self, error: Exception, what: str = "") -> None:
-        """Note an error, which does not hide an alarm."""
-        self.errors.append(f"{what}{sentence(error)}")
-        self.code = self.code if self.code == ALARM else FAILED
+    def attempt(self, command: str) -> Exception | None:
+        """Do the work of a command, which fails on this bridge alone; the error."""
+        try:
+            if self.settings is not None:
+                self.name = self.settings.name
+                if self.settings.files.metrics and command != "status":  # which changes nothing
+                    self.metrics_file = self.settings.path(self.settings.files.metrics)
+            getattr(self, command)()
+        except Exception as error:  # Python's own exit code of an error would be that of an alarm
+            self.code, self.lines, self.state = FAILED, [], None
+            self.errors.append(sentence(error))
+            return error
+        return None
 
     def facts(self) -> dict[str, Any]:
-        return {
-            "name": self.name,
-            "state": self.state,
-            "exit_code": self.code,
-            "status": None if self.status is None else self.status.as_dict(),
-            "records": self.records,
-            "transitions": self.transitions,
-            "written": list(map(str, self.written)),
-            "errors": self.errors,
-        }
-
-
-@dataclass(frozen=True)
-class Bridge:
-    """What a command is asked to work on: settings, or the file of a monitor alone."""
-
-    file: Path
-    options: argparse.Namespace
+        """What JSON says of it."""
+        status = None if self.status_ is None else self.status_.as_dict()
+        done = {name: getattr(self, name) for name in ("name", "state", "records", "transitions", "errors")}
+        return done | {"exit_code": self.code, "status": status, "written": list(map(str, self.written))}
 
     @cached_property
     def settings(self) -> Settings | None:
         return read_settings(self.file) if self.file.suffix == ".toml" else None
-
-    @property
-    def name(self) -> str:
-        return self.file.stem if self.settings is None else self.settings.name
 
     @property
     def monitor_file(self) -> Path:
@@ -100,55 +85,56 @@ class Bridge:
         """What was taken in from which files; named after the monitor, whose lock it is under."""
         return self.monitor_file.with_name(f"{self.monitor_file.name}.taken.json")
 
-    @property
-    def metrics_file(self) -> Path | None:
-        """Where metrics are written after each command but status, which changes nothing; None for nowhere."""
-        try:
-            metrics = None if self.settings is None else self.settings.files.metrics
-        except (OSError, ValueError):  # of settings with an error, which is reported
-            return None
-        return None if not metrics or self.options.name == "status" else self.settings.path(metrics)
-
     def alone(self) -> Any:
         """Be the only process that changes the monitor."""
         return alone_with(self.monitor_file, self.options.wait)
 
     def load(self) -> Monitor:
         """The monitor as it was saved; one that another version of skthermo has fitted can be fitted anew."""
-        if not self.monitor_file.exists() and self.settings is not None:
+        if self.settings is None:
+            return load_monitor(self.monitor_file)
+        if not self.monitor_file.exists():
             raise FileNotFoundError(
                 f"there is no monitor {str(self.monitor_file)!r}; expected: skthermo fit {self.file}"
             )
         monitor = load_monitor(self.monitor_file)
         version = monitor.versions_["skthermo"]
-        if self.settings is not None and version != skthermo.__version__:
+        if version != skthermo.__version__:
             raise ValueError(
                 f"{self.monitor_file} was fitted with skthermo {version}, and this is {skthermo.__version__}; expected "
                 f"that version, or: skthermo fit {self.file} --replace, then update, which takes all records anew"
             )
         return monitor
 
-    def status(self, monitor: Monitor) -> MonitorStatus:
-        """The facts by the clock, or at the time that was asked for."""
-        return monitor.status(self.options.now, max_age=self.settings.files.max_age if self.settings else None)
+    def failed(self, error: Exception, what: str = "") -> None:
+        """Note an error, which does not hide an alarm."""
+        self.errors.append(f"{what}{sentence(error)}")
+        self.code = self.code if self.code == ALARM else FAILED
 
-    def described(self, monitor: Monitor, done: Done, state: str | None = None, reason: str = "") -> None:
-        """Say how things stand: the state of the command if there is one, else that by the clock."""
-        done.status = self.status(monitor)
-        done.state = done.status.state if state is None else state
-        done.code = FAILED if done.errors and done.state != "alarm" else CODES[done.state]
-        reason = reason or (done.status.reason if done.state != "alarm" else "")
+    @contextmanager
+    def noting_errors_of(self, file: Path) -> Iterator[None]:
+        """An error of one file leaves the others."""
+        try:
+            yield
+        except (OSError, ValueError) as error:
+            self.failed(error if str(file) in str(error) else ValueError(f"{file}: {sentence(error)}"))
+
+    def describe(self, monitor: Monitor, doubt: str = "", had_alarm: bool = False) -> None:
+        """Say how things stand by the clock, or at the time that was asked for; an alarm that has ended again, and a
+        doubt, come before a good state."""
+        max_age = self.settings.files.max_age if self.settings else None
+        self.status_ = monitor.status(self.options.now, max_age=max_age)
+        self.state, reason = self.status_.state, self.status_.reason
+        if had_alarm or self.state == "alarm":
+            self.state, reason = "alarm", "" if self.state == "alarm" else "an event has opened and closed again"
+        elif doubt and self.state in ("healthy", "watch"):
+            self.state, reason = "not evaluated", doubt
+        self.code = FAILED if self.errors and self.state != "alarm" else CODES[self.state]
         newest = f" (newest record {monitor.last_})" if len(monitor.days_) else ""
-        why = f"{', as' if done.state == 'not evaluated' else ';'} {reason}" if reason else ""
-        done.lines.append(f"state: {done.state}{newest}{why}")
-        done.lines += monitor.summary().splitlines()[1:]
-        self.warn_of_changes()
-
-    def warn_of_changes(self) -> None:
-        """Warn of settings that have changed since the fit, by which the monitor does not go yet."""
+        self.lines.append(f"state: {self.state}{newest}{f'; {reason}' if reason else ''}")
+        self.lines += monitor.summary().splitlines()[1:]
         before = None if self.settings is None else Taken.read(self.taken_file).settings
-        changed = [] if self.settings is None or before is None else self.settings.changed_since(before)
-        if changed:
+        if before is not None and (changed := self.settings.changed_since(before)):
             text = (
                 f"{self.file}: {counted(len(changed), 'setting')} changed since the monitor was fitted: "
                 f"{', '.join(changed)}; the monitor goes on with those of its fit: expected skthermo fit {self.file} "
@@ -156,18 +142,160 @@ class Bridge:
             )
             warn_each([SkthermoWarning(text, "changed-settings")])
 
-    def append_transitions(self, monitor: Monitor, done: Done) -> None:
+    def fit(self) -> None:
+        """Fit a monitor to its baseline, and save it."""
+        settings, file = self.settings, self.monitor_file
+        if settings is None:
+            raise ValueError(f"{file} is no file of settings; expected a monitor.toml, as init writes it")
+        paths = [settings.path(name) for name in settings.records.baseline]
+        records, layouts = read_baseline(paths, settings.csv, settings.records)
+        baseline = records if settings.records.until is None else records[: settings.records.until]
+        with self.alone():
+            if file.exists() and not self.options.replace:
+                raise FileExistsError(
+                    f"there is a monitor {str(file)!r} already, with the events that it has seen; expected --replace "
+                    "to fit it anew: the old one is kept under another name"
+                )
+            T, F = (baseline[list(names)] for names in (settings.records.temperatures, settings.records.responses))
+            monitor = settings.monitor(settings.fem(T, F)).fit(baseline)
+            if file.exists():
+                try:
+                    self.lines.append(f"{counted(monitor.keep_acknowledgements(file), 'acknowledgement')} kept")
+                except ValueError as error:
+                    self.lines.append(f"no acknowledgement of the former monitor kept: {error}")
+                file.replace(file.with_name(f"{file.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{file.suffix}"))
+            monitor.save(file)
+            fitted = datetime.now(UTC).isoformat(timespec="seconds")
+            Taken(self.taken_file, layouts, {}, fitted, settings.of_a_fit).write()
+        settings.path(settings.records.folder).mkdir(exist_ok=True)
+        self.written.append(file)
+        self.lines.append(f"fitted to {len(baseline)} records, {baseline.index[0]} to {baseline.index[-1]}")
+        if len(records) > len(baseline):
+            self.lines.append(f"later records of these files, for update: {len(records) - len(baseline)}")
+        self.describe(monitor)
+        self.code = HEALTHY
+
+    def update(self) -> None:
+        """Evaluate what is new, and save the monitor."""
+        with self.alone():
+            monitor, taken = self.load(), Taken.read(self.taken_file)
+            before, new = monitor.counts_, self._new_files(monitor, taken)
+            with collected() as findings:
+                evaluated, handed = self._take_in(monitor, new)
+            warn_each(one for one in findings if one.kind != "not-evaluated")  # said below, with all reasons
+            if len(evaluated):
+                monitor.save(self.monitor_file)
+            if not self.options.records:
+                for file in new:
+                    if file.path in handed:
+                        taken.note(file, handed[file.path])
+                taken.write()
+            self._describe_update(monitor, evaluated, before)
+            self.append_transitions(monitor)
+        self.write_page(monitor)
+
+    def _new_files(self, monitor: Monitor, taken: Taken) -> list[NewFile]:
+        """Files with rows to take in: those that are named, or those of the folder, and of the baseline's files after
+        its end, that were not taken in yet."""
+        settings, named = self.settings, self.options.records
+        given = {name: getattr(self.options, name) for name in ("separator", "decimal", "stamps")}
+        form = CsvFormat() if settings is None else settings.csv
+        form = replace(form, **{name: value for name, value in given.items() if value is not None})
+
+        def read(file: Path, after: pd.Timestamp | None = None, leave_unfinished: bool = False) -> pd.DataFrame:
+            if settings is None:
+                table = read_file(file, form, leave_unfinished=leave_unfinished)
+            else:
+                table = read_columns(file, form, settings.records, leave_unfinished=leave_unfinished)
+                check_layout(table, file, settings.records, taken.layouts)
+            table = in_zone(table, monitor.last_.tz, file).rename_axis(monitor.baseline_.index.name)
+            return table if after is None else table[table.index > after]
+
+        sources: list[tuple[Path, pd.Timestamp | None]] = [(file, None) for file in named]
+        if not named:
+            later = settings.records.baseline if settings.records.until else []
+            sources += [(file, None) for file in files_in(settings.path(settings.records.folder))]
+            sources += [(settings.path(name), monitor.baseline_.index[-1]) for name in later]
+        found = []
+        for file, after in sources:
+            with self.noting_errors_of(file):
+                reader = partial(read, after=after)
+                found.append(NewFile(file, reader(file), pd.DataFrame(), {}) if named else taken.new_in(file, reader))
+        return [file for file in found if file is not None]
+
+    def _take_in(self, monitor: Monitor, new: Sequence[NewFile]) -> tuple[pd.DataFrame, dict[Path, pd.DatetimeIndex]]:
+        """Evaluations of the records of some files, and which stamps of each file were handed over.
+
+        All files are one batch. If that is refused, each is one, the earliest records first, so that a wrong file does
+        not keep the others out. Files with a part of the columns belong together.
+        """
+        columns, has_settings = list(monitor.baseline_), self.settings is not None
+        for file in new:
+            period = f", {file.rows.index.min()} to {file.rows.index.max()}" if len(file.rows) else ""
+            self.lines.append(f"read from {file.path}: {len(file.rows)}{period}")
+        handed = {file.path: file.rows.index for file in new if not len(file.rows)}
+        new = [file for file in new if len(file.rows)]
+        parts = [file for file in new if has_settings and set(file.rows) != set(columns)]
+        units = [[file] for file in new if file not in parts] + ([parts] if parts else [])
+        answers = []
+
+        def take(files: Sequence[NewFile]) -> None:
+            tables = [file.rows for file in files]
+            batch, waiting = joined(tables, columns) if has_settings else (pd.concat(tables), ())
+            answers.append(monitor.update(batch, confirm=self.options.confirm))
+            handed.update({file.path: batch.index for file in files})
+            if len(waiting):
+                self.lines.append(f"not in all files yet, so that they wait: {len(waiting)} stamps")
+
+        if len(units) > 1:
+            try:
+                take(new)
+                units = []
+            except ValueError as error:
+                logger.info("%s: the files are taken one by one, as together they are refused: %s", self.name, error)
+        for files in sorted(units, key=lambda files: min(file.rows.index.min() for file in files)):
+            with self.noting_errors_of(files[0].path):
+                take(files)
+        answers = [one for one in answers if len(one)]
+        return pd.concat(answers) if answers else pd.DataFrame(columns=["state", "reason", "revised"]), handed
+
+    def _describe_update(self, monitor: Monitor, evaluated: pd.DataFrame, before: dict[str, int]) -> None:
+        """What became of the records, and the state: an alarm that has ended again counts, and without a new
+        evaluation, or with records of a time to come, nothing is healthy."""
+        counts = {name: number - before[name] for name, number in monitor.counts_.items()}
+        n_ahead, new = monitor.counts_["n_ahead"], evaluated[~evaluated["revised"].astype(bool)]
+        states = new["state"].value_counts().reindex(list(CODES), fill_value=0).to_dict()
+        is_unknown = new["state"] == "not evaluated"
+        reasons = new.loc[is_unknown, "reason"].value_counts().to_dict()
+        remarks = new.loc[~is_unknown & (new["reason"] != ""), "reason"].value_counts()
+        shown = ", ".join(f"{number} {state}" for state, number in states.items() if number or state != "watch")
+        others = ", ".join(f"{counts[name]} {text}" for name, text in COUNTS.items())
+        self.lines.append(f"new: {len(new)}{f' ({shown})' if len(evaluated) else ''}; {others}")
+        notes = {"evaluated anew, as records came late": len(evaluated) - len(new)}
+        notes |= {"set aside, stamped too far ahead": n_ahead}
+        notes |= {f"not evaluated, {reason}": number for reason, number in reasons.items()}
+        notes |= {f"evaluated, with a remark, {remark}": number for remark, number in remarks.items()}
+        self.lines += [f"{note}: {number}" for note, number in notes.items() if number]
+        self.records = {"new": len(new), **{state.replace(" ", "_"): number for state, number in states.items()}}
+        self.records |= {"revised": len(evaluated) - len(new), "ahead": n_ahead, "reasons": reasons}
+        self.records |= {name.removeprefix("n_"): counts[name] for name in COUNTS}
+        doubt = "records are stamped too far ahead" if counts["n_ahead"] > 0 else ""
+        if not (doubt or states["healthy"] or states["watch"]):
+            doubt = "no new record could be evaluated"
+        self.describe(monitor, doubt, bool((evaluated["state"] == "alarm").any()))
+
+    def append_transitions(self, monitor: Monitor) -> None:
         """Append what has changed to the file of transitions, for whoever holds the lock of the monitor."""
         name = self.settings.files.transitions if self.settings else ""
         if not name:
             return
         own = {"bridge": self.name, "fitted": Taken.read(self.taken_file).fitted}
         try:
-            done.transitions = append_lines(self.settings.path(name), monitor.transitions(), own)
+            self.transitions = append_lines(self.settings.path(name), monitor.transitions(), own)
         except (OSError, ValueError) as error:
-            done.failed(error, f"{name} was not written: ")
+            self.failed(error, f"{name} was not written: ")
 
-    def write_page(self, monitor: Monitor, done: Done) -> None:
+    def write_page(self, monitor: Monitor) -> None:
         """Write the page that the settings or the options name; the records are taken in, whatever becomes of it."""
         page = self.options.report
         if page is None and self.settings is not None and self.settings.files.page:
@@ -180,9 +308,59 @@ class Bridge:
             options = {} if self.settings is None else self.settings.page()
             options |= {"title": self.options.title} if self.options.title else {}
             options.pop("fdr", None)
-            done.written.append(owner_report(monitor, page, now=self.options.now, **options))
+            self.written.append(owner_report(monitor, page, now=self.options.now, **options))
         except Exception as error:  # it does not hide an alarm
-            done.failed(error, f"{page} was not written: ")
+            self.failed(error, f"{page} was not written: ")
+
+    def status(self) -> None:
+        """Say how things stand; the file is whole at any time, and needs no lock to be read."""
+        monitor = self.load()
+        self.describe(monitor)
+        if self.options.report is not None:
+            self.write_page(monitor)
+
+    def report(self) -> None:
+        """Write the page for the owner."""
+        monitor = self.load()
+        self.describe(monitor)
+        self.code = HEALTHY
+        self.write_page(monitor)
+        if not self.written and not self.errors:
+            raise ValueError(f"{self.file} names no page; expected --out with the name of a file")
+
+    def acknowledge(self) -> None:
+        """Say what an event was, and save the monitor."""
+        event, harmless, note = self.options.event, self.options.harmless, self.options.note
+        said = f"event {event} is acknowledged as {'harmless' if harmless else 'damage'}"
+        self._change(lambda monitor: monitor.acknowledge(event, harmless=harmless, note=note) or said)
+
+    def discard(self) -> None:
+        """Take back records that should not have been taken in, and save the monitor."""
+        since, until = self.options.since, self.options.until
+        self._change(lambda monitor: f"records taken back: {monitor.discard(since, until)}")
+
+    def refit(self) -> None:
+        """Learn anew from the baseline and the records since, and save the monitor."""
+        self._change(lambda monitor: monitor.refit(until=self.options.until, force=self.options.force))
+
+    def rebaseline(self) -> None:
+        """Begin a new baseline after a repair, and save the monitor."""
+        self._change(lambda monitor: monitor.rebaseline(self.options.since, until=self.options.until))
+
+    def _change(self, change: Callable[[Monitor], str | Retraining]) -> None:
+        """Change the monitor and save it, unless that was refused; say what was changed, and how things stand."""
+        with self.alone():
+            monitor = self.load()
+            said = change(monitor)
+            refused = isinstance(said, Retraining) and not said.accepted
+            if not refused:
+                monitor.save(self.monitor_file)
+            self.lines += (said.summary() if isinstance(said, Retraining) else said).splitlines()
+            self.describe(monitor)
+            self.code = HEALTHY
+            if refused:
+                self.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
+            self.append_transitions(monitor)
 
 
 def sentence(error: Exception) -> str:
@@ -192,275 +370,6 @@ def sentence(error: Exception) -> str:
     if isinstance(error, OSError) and error.filename:
         return f"{error.filename}: {error.strerror}"
     return str(error) or type(error).__name__
-
-
-def attempt(work: Callable[[Bridge, Done], None], bridge: Bridge) -> tuple[Done, Exception | None]:
-    """Do the work of a command on one bridge, which fails alone."""
-    done = Done(bridge.file.stem)
-    try:
-        done.name = bridge.name
-        work(bridge, done)
-    except Exception as error:  # Python's own exit code of an error would be that of an alarm
-        done.code, done.lines, done.state = FAILED, [], None
-        done.errors.append(sentence(error))
-        return done, error
-    return done, None
-
-
-def fit(bridge: Bridge, done: Done) -> None:
-    """Fit a monitor to its baseline, and save it."""
-    settings = _of_file(bridge)
-    files = [settings.path(name) for name in settings.records.baseline]
-    records, layouts = read_baseline(files, settings.csv, settings.records)
-    until = settings.records.until
-    baseline = records if until is None else records[:until]
-    with bridge.alone():
-        if bridge.monitor_file.exists() and not bridge.options.replace:
-            raise FileExistsError(
-                f"there is a monitor {str(bridge.monitor_file)!r} already, with the events that it has seen; expected "
-                "--replace to fit it anew: the old one is kept under another name"
-            )
-        T, F = (baseline[list(names)] for names in (settings.records.temperatures, settings.records.responses))
-        monitor = settings.monitor(settings.fem(T, F)).fit(baseline)
-        if bridge.monitor_file.exists():
-            old = bridge.monitor_file
-            try:
-                kept = f"{counted(monitor.keep_acknowledgements(old), 'acknowledgement')} of the former monitor kept"
-            except ValueError as error:
-                kept = f"no acknowledgement of the former monitor kept: {error}"
-            done.lines.append(kept)
-            old.replace(old.with_name(f"{old.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{old.suffix}"))
-        monitor.save(bridge.monitor_file)
-        fitted = datetime.now(UTC).isoformat(timespec="seconds")
-        Taken(bridge.taken_file, layouts, {}, fitted, settings.of_a_fit).write()
-    settings.path(settings.records.folder).mkdir(exist_ok=True)
-    done.written.append(bridge.monitor_file)
-    done.lines.append(f"fitted to {len(baseline)} records, {baseline.index[0]} to {baseline.index[-1]}")
-    if len(records) > len(baseline):
-        done.lines.append(f"later records of these files, for update: {len(records) - len(baseline)}")
-    bridge.described(monitor, done)
-    done.code = HEALTHY
-
-
-def update(bridge: Bridge, done: Done, files: Sequence[Path] = ()) -> None:
-    """Evaluate what is new, and save the monitor."""
-    with bridge.alone():
-        monitor, taken = bridge.load(), Taken.read(bridge.taken_file)
-        before = monitor.counts_
-        new = _given(bridge, files, monitor, done) if files else _found(bridge, taken, monitor, done)
-        with collected() as findings:
-            evaluated, handed = _taken_in(monitor, new, bridge, done)
-        warn_each(one for one in findings if one.kind != "not-evaluated")  # said below, with all reasons
-        if len(evaluated):
-            monitor.save(bridge.monitor_file)
-        if not files:
-            for file in new:
-                if file.path in handed:
-                    taken.note(file, handed[file.path])
-            taken.write()
-        _described_update(bridge, monitor, done, evaluated, before)
-        bridge.append_transitions(monitor, done)
-    bridge.write_page(monitor, done)
-
-
-def _given(bridge: Bridge, files: Sequence[Path], monitor: Monitor, done: Done) -> list[NewFile]:
-    """Records of files that were named."""
-    read = _reader(bridge, monitor)
-    nothing = pd.DataFrame()
-    return [
-        NewFile(file, table, nothing, {}) for file in files if (table := _tried(done, file, read, file)) is not None
-    ]
-
-
-def _found(bridge: Bridge, taken: Taken, monitor: Monitor, done: Done) -> list[NewFile]:
-    """Records of files in the folder, and of those of the baseline after its end, that were not taken in yet."""
-    settings = _of_file(bridge)
-    read = _reader(bridge, monitor)
-    end = monitor.baseline_.index[-1]
-    later = [settings.path(name) for name in settings.records.baseline] if settings.records.until else []
-
-    def read_later(file: Path, **options: Any) -> pd.DataFrame:
-        table = read(file, **options)
-        return table[table.index > end]
-
-    sources = [(file, read) for file in files_in(settings.path(settings.records.folder))]
-    sources += [(file, read_later) for file in later]
-    found = [_tried(done, file, taken.new_in, file, one) for file, one in sources]
-    return [file for file in found if file is not None]
-
-
-def _tried(done: Done, file: Path, read: Callable[..., Any], *arguments: Any) -> Any:
-    """What a file gives; an error of one file leaves the others."""
-    try:
-        return read(*arguments)
-    except (OSError, ValueError) as error:
-        done.failed(error if str(file) in str(error) else ValueError(f"{file}: {sentence(error)}"))
-        return None
-
-
-def _reader(bridge: Bridge, monitor: Monitor) -> Callable[..., pd.DataFrame]:
-    """How files of records are read, in the time zone of the monitor."""
-    zone, name = monitor.last_.tz, monitor.baseline_.index.name
-    settings, layouts = bridge.settings, Taken.read(bridge.taken_file).layouts
-    form = CsvFormat() if settings is None else settings.csv
-    given = {one: getattr(bridge.options, one) for one in ("separator", "decimal", "stamps")}
-    form = replace(form, **{one: value for one, value in given.items() if value is not None})
-
-    def read(file: Path, *, leave_unfinished: bool = False) -> pd.DataFrame:
-        if settings is None:
-            table = read_file(file, form, leave_unfinished=leave_unfinished)
-        else:
-            table = read_columns(file, form, settings.records, leave_unfinished=leave_unfinished)
-            check_layout(table, file, settings.records, layouts)
-        return in_zone(table, zone, file).rename_axis(name)
-
-    return read
-
-
-def _taken_in(
-    monitor: Monitor, new: Sequence[NewFile], bridge: Bridge, done: Done
-) -> tuple[pd.DataFrame, dict[Path, pd.DatetimeIndex]]:
-    """Evaluations of the records of some files, and which stamps of each file were handed over.
-
-    All files are one batch. If that is refused, each is one, the earliest records first, so that a wrong file does not
-    keep the others out. Files with a part of the columns belong together.
-    """
-    columns, has_settings = list(monitor.baseline_), bridge.settings is not None
-    done.lines += [_read(file.path, file.rows) for file in new]
-    handed = {file.path: file.rows.index for file in new if not len(file.rows)}
-    new = [file for file in new if len(file.rows)]
-    parts = [file for file in new if has_settings and set(file.rows) != set(columns)]
-    units = [[file] for file in new if file not in parts] + ([parts] if parts else [])
-    answers = []
-
-    def take(files: Sequence[NewFile]) -> None:
-        tables = [file.rows for file in files]
-        batch, waiting = joined(tables, columns) if has_settings else (pd.concat(tables), ())
-        answers.append(monitor.update(batch, confirm=bridge.options.confirm))
-        handed.update({file.path: batch.index for file in files})
-        done.lines += [f"not in all files yet, so that they wait: {len(waiting)} stamps"] if len(waiting) else []
-
-    if len(units) > 1:
-        try:
-            take(new)
-            units = []
-        except ValueError as error:
-            logger.info("%s: the files are taken one by one, as together they are refused: %s", bridge.name, error)
-    for files in sorted(units, key=lambda files: min(file.rows.index.min() for file in files)):
-        _tried(done, files[0].path, take, files)
-    evaluated = [one for one in answers if len(one)]
-    return pd.concat(evaluated) if evaluated else pd.DataFrame(), handed
-
-
-def _described_update(
-    bridge: Bridge, monitor: Monitor, done: Done, evaluated: pd.DataFrame, before: dict[str, int]
-) -> None:
-    """What became of the records, and the state: an alarm that has ended again counts, and without a new evaluation, or
-    with records of a time to come, nothing is healthy."""
-    after = monitor.counts_
-    counts = {name: after[name] - before[name] for name in COUNTS}
-    others = ", ".join(f"{counts[name]} {text}" for name, text in COUNTS.items())
-    new = evaluated[~evaluated["revised"]] if len(evaluated) else evaluated
-    states = {state: int((new["state"] == state).sum()) if len(new) else 0 for state in CODES}
-    is_unknown = new["state"] == "not evaluated" if len(new) else []
-    reasons = new.loc[is_unknown, "reason"].value_counts().to_dict() if len(new) else {}
-    remarks = new.loc[~is_unknown & (new["reason"] != ""), "reason"].value_counts().to_dict() if len(new) else {}
-    n_revised, n_ahead = len(evaluated) - len(new), after["n_ahead"]
-    numbers = [f"{number} {state}" for state, number in states.items() if number or state != "watch"]
-    shown = f" ({', '.join(numbers)})" if len(evaluated) else ""
-    done.lines.append(f"new: {len(new)}{shown}; {others}")
-    done.lines += [f"evaluated anew, as records came late: {n_revised}"] if n_revised else []
-    done.lines += [f"set aside, stamped too far ahead: {n_ahead}"] if n_ahead else []
-    done.lines += [f"not evaluated, {reason}: {number}" for reason, number in reasons.items()]
-    done.lines += [f"evaluated, with a remark, {remark}: {number}" for remark, number in remarks.items()]
-    done.records = {"new": len(new), **{state.replace(" ", "_"): number for state, number in states.items()}}
-    done.records |= {"revised": n_revised, "ahead": n_ahead} | {name[2:]: number for name, number in counts.items()}
-    done.records["reasons"] = reasons
-    has_alarm = len(evaluated) > 0 and (evaluated["state"] == "alarm").any()
-    state = bridge.status(monitor).state
-    if has_alarm or state == "alarm":
-        bridge.described(monitor, done, "alarm", "" if state == "alarm" else "an event has opened and closed again")
-    elif state in NO_ALARM and n_ahead > before["n_ahead"]:
-        bridge.described(monitor, done, "not evaluated", "records are stamped too far ahead")
-    elif state in NO_ALARM and not any(states[one] for one in NO_ALARM):
-        bridge.described(monitor, done, "not evaluated", "no new record could be evaluated")
-    else:
-        bridge.described(monitor, done)
-
-
-def _read(file: Path, records: pd.DataFrame) -> str:
-    period = f", {records.index.min()} to {records.index.max()}" if len(records) else ""
-    return f"read from {file}: {len(records)}{period}"
-
-
-def status(bridge: Bridge, done: Done) -> None:
-    """Say how things stand; the file is whole at any time, and needs no lock to be read."""
-    monitor = bridge.load()
-    bridge.described(monitor, done)
-    if bridge.options.report is not None:
-        bridge.write_page(monitor, done)
-
-
-def report(bridge: Bridge, done: Done) -> None:
-    """Write the page for the owner."""
-    monitor = bridge.load()
-    bridge.described(monitor, done)
-    done.code = HEALTHY
-    bridge.write_page(monitor, done)
-    if not done.written and not done.errors:
-        raise ValueError(f"{bridge.file} names no page; expected --out with the name of a file")
-
-
-def acknowledge(bridge: Bridge, done: Done) -> None:
-    """Say what an event was, and save the monitor."""
-    options = bridge.options
-
-    def said(monitor: Monitor) -> list[str]:
-        monitor.acknowledge(options.event, harmless=options.harmless, note=options.note)
-        return [f"event {options.event} is acknowledged as {'harmless' if options.harmless else 'damage'}"]
-
-    _changed(bridge, done, said)
-
-
-def discard(bridge: Bridge, done: Done) -> None:
-    """Take back records that should not have been taken in, and save the monitor."""
-    options = bridge.options
-    _changed(bridge, done, lambda monitor: [f"records taken back: {monitor.discard(options.since, options.until)}"])
-
-
-def refit(bridge: Bridge, done: Done) -> None:
-    """Learn anew from the baseline and the records since, and save the monitor."""
-    options = bridge.options
-    _changed(bridge, done, lambda monitor: monitor.refit(until=options.until, force=options.force))
-
-
-def rebaseline(bridge: Bridge, done: Done) -> None:
-    """Begin a new baseline after a repair, and save the monitor."""
-    options = bridge.options
-    _changed(bridge, done, lambda monitor: monitor.rebaseline(options.since, until=options.until))
-
-
-def _changed(bridge: Bridge, done: Done, change: Callable[[Monitor], list[str] | Retraining]) -> None:
-    """Change the monitor and save it, unless that was refused; say what was changed, and how things stand."""
-    with bridge.alone():
-        monitor = bridge.load()
-        said = change(monitor)
-        refused = isinstance(said, Retraining) and not said.accepted
-        if not refused:
-            monitor.save(bridge.monitor_file)
-        done.lines += said.summary().splitlines() if isinstance(said, Retraining) else said
-        bridge.described(monitor, done)
-        done.code = HEALTHY
-        if refused:
-            done.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
-        bridge.append_transitions(monitor, done)
-
-
-def _of_file(bridge: Bridge) -> Settings:
-    """Settings, for what needs them."""
-    if bridge.settings is None:
-        raise ValueError(f"{bridge.file} is no file of settings; expected a monitor.toml, as init writes it")
-    return bridge.settings
 
 
 def append_lines(file: Path, entries: Sequence[Mapping[str, Any]], own: Mapping[str, str]) -> list[dict[str, Any]]:
@@ -485,3 +394,130 @@ def append_lines(file: Path, entries: Sequence[Mapping[str, Any]], own: Mapping[
             lines.flush()
             os.fsync(lines.fileno())
     return new
+
+
+@dataclass(frozen=True)
+class NewFile:
+    """Rows of a file that were not taken in before, after so many that were; ``seen`` says how the file was found."""
+
+    path: Path
+    rows: pd.DataFrame
+    before: pd.DataFrame
+    seen: Mapping[str, Any]
+
+
+@dataclass
+class Taken:
+    """What has been taken in from which files, kept beside the monitor.
+
+    ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit, and
+    ``settings`` are those of the fit. For each file there are its size, the time of its last change, and how many of
+    its first rows are done, with a checksum of these. If a command is killed after it has saved the monitor, rows come
+    again, and the monitor knows them.
+    """
+
+    file: Path
+    layouts: list[list[str]] = field(default_factory=list)
+    files: dict[str, dict[str, Any]] = field(default_factory=dict)
+    fitted: str = ""
+    settings: dict[str, Any] | None = None
+
+    @classmethod
+    def read(cls, file: Path) -> Taken:
+        """What an earlier call has left in a file beside the monitor; nothing if that cannot be read."""
+        try:
+            content = json.loads(file.read_text(encoding="utf-8"))
+            return cls(file, content["layouts"], content["files"], content["fitted"], content.get("settings"))
+        except (OSError, ValueError, KeyError, TypeError):
+            return cls(file)
+
+    def write(self) -> None:
+        """Keep it for the next call."""
+        content = {name: value for name, value in vars(self).items() if name != "file"}
+        write_when_complete(self.file, json.dumps(content, indent=1) + "\n")
+
+    def new_in(self, file: Path, read: Any) -> NewFile | None:
+        """What is new in a file; None if it is as it was when all of it was taken in."""
+        known = self.files.get(self._key(file), {})
+        found = file.stat()
+        if not found.st_size:
+            return None
+        seen = {"size": found.st_size, "changed": found.st_mtime_ns}
+        is_as_before = all(known.get(name) == value for name, value in seen.items())
+        if is_as_before and known.get("whole"):
+            return None
+        table = read(file, leave_unfinished=not is_as_before)  # a line that is not finished may be, the next time
+        n_rows = known.get("rows", 0)
+        n_done = n_rows if len(table) >= n_rows and _checksum(table[:n_rows]) == known.get("checksum") else 0
+        end = file.read_bytes().rstrip(b"\0")[-1:]
+        is_finished = is_as_before or file.suffix.lower() in NO_TEXT_FILES or end in (b"\n", b"\r")
+        return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
+
+    def _key(self, file: Path) -> str:
+        """How a file is called: by its path from the folder of the monitor, wherever the command is started."""
+        return os.path.relpath(file, self.file.parent)
+
+    def note(self, file: NewFile, handed: pd.DatetimeIndex) -> None:
+        """Rows of a file that are done: the first ones, up to one whose stamp was not handed over."""
+        waiting = ~file.rows.index.isin(handed)
+        n_done = int(waiting.argmax()) if waiting.any() else len(file.rows)
+        done = pd.concat([file.before, file.rows[:n_done]])
+        self.files[self._key(file.path)] = dict(file.seen) | {
+            "rows": len(done),
+            "checksum": _checksum(done),
+            "whole": file.seen["whole"] and not waiting.any(),
+        }
+
+
+def _checksum(table: pd.DataFrame) -> int:
+    return zlib.crc32(pd.util.hash_pandas_object(table.astype(float)).to_numpy().tobytes())
+
+
+def files_in(folder: Path) -> list[Path]:
+    """Files of records in a folder, by name; hidden and unfinished ones are left out."""
+    endings = (".csv", ".txt", ".dat", ".tsv", *NO_TEXT_FILES)
+    return sorted(one for one in folder.glob("*") if one.suffix.lower() in endings and one.name[0] not in "._~")
+
+
+def read_columns(
+    file: Path, form: CsvFormat, records: RecordSettings, *, leave_unfinished: bool = False
+) -> pd.DataFrame:
+    """Records of a file in the columns that the settings name, temperatures in degrees Celsius."""
+    table = read_file(file, form, ignore=records.ignore, leave_unfinished=leave_unfinished)
+    unknown = [name for name in table if name not in records.columns]
+    if unknown:
+        raise ValueError(
+            f"{file} has the columns {unknown}, which [records] does not name; expected {records.columns}, and other "
+            "columns under ignore"
+        )
+    return in_celsius(table, records.convert)
+
+
+def check_layout(table: pd.DataFrame, file: Path, records: RecordSettings, layouts: Sequence[Sequence[str]]) -> None:
+    """Raise an error if a file has not the columns of a file of the baseline, or all columns."""
+    known = [records.columns, *layouts]
+    if not any(set(table) == set(layout) for layout in known):
+        nearest = max(known, key=lambda layout: len(set(layout) & set(table)))
+        lacking = [name for name in nearest if name not in table]
+        raise ValueError(f"{file} lacks the columns {lacking}; expected {nearest}, in any order, as in the baseline")
+
+
+def read_baseline(
+    files: Sequence[Path], form: CsvFormat, records: RecordSettings
+) -> tuple[pd.DataFrame, list[list[str]]]:
+    """Records of the baseline's files, in order of time, and the columns of each file."""
+    tables = [read_columns(file, form, records) for file in files]
+    lacking = [name for name in records.columns if not any(name in table for table in tables)]
+    if lacking:
+        raise ValueError(f"no file of the baseline has the columns {lacking}; expected {records.columns}")
+    whole, waiting = joined(tables, records.columns)
+    if not len(whole):
+        stamps = ", ".join(f"{file.name} from {table.index.min()}" for file, table in zip(files, tables, strict=True))
+        raise ValueError(f"no stamp is in all files of the baseline ({stamps}); expected records of the same times")
+    if len(waiting):
+        text = (
+            f"{counted(len(waiting), 'stamp')} of the baseline are not in all files, the first {waiting.min()}. They "
+            f"are left out; {len(whole)} records have all columns. If they are many, compare the clocks of the loggers"
+        )
+        warn_each([RecordsWarning(text, "different-rows")])
+    return once(whole).sort_index(), [list(table) for table in tables]

@@ -10,14 +10,15 @@ import datetime
 import inspect
 import json
 import re
+import runpy
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from types import UnionType
-from typing import Any, NamedTuple, Union, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple
 from zoneinfo import ZoneInfo
 
 import pandas as pd
@@ -29,6 +30,7 @@ from skthermo.monitoring import Monitor
 from skthermo.preprocessing.loggers.logger_files import CsvFormat
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
+REQUIRED = inspect.Parameter.empty  # the default of what has none
 NONE = "none"  # in a file, where a parameter may be None and is not by default
 
 
@@ -108,22 +110,15 @@ class Setting(NamedTuple):
     text: str
     kind: str
 
-    @property
-    def is_required(self) -> bool:
-        return self.default is inspect.Parameter.empty
 
-
-SECTIONS: dict[str, tuple[Callable[[], Callable[..., Any]], tuple[str, ...]]] = {
-    "files": (lambda: Files, ()),
-    "records": (lambda: RecordSettings, ()),
-    "csv": (lambda: CsvFormat, ()),
-    "compensator": (lambda: CompensatedDetector, ("detector", "regressor", "targets")),
-    "monitor": (lambda: Monitor, ("detector", "targets", "reference", "fem")),
-    "fem": (lambda: import_module("skthermo.surrogate").DataInformedFEM, ("inverse", "mapper", "imputer")),
-    "page": (
-        lambda: import_module("skthermo.reporting").owner_report,
-        ("subject", "path", "identified", "detector", "max_false_alarms", "now"),
-    ),
+SECTIONS: dict[str, tuple[str, str]] = {
+    "files": ("skthermo.commands._settings.Files", ""),
+    "records": ("skthermo.commands._settings.RecordSettings", ""),
+    "csv": ("skthermo.preprocessing.loggers.logger_files.CsvFormat", ""),
+    "compensator": ("skthermo.detection.CompensatedDetector", "detector regressor targets"),
+    "monitor": ("skthermo.monitoring.Monitor", "detector targets reference fem"),
+    "fem": ("skthermo.surrogate.DataInformedFEM", "inverse mapper imputer"),
+    "page": ("skthermo.reporting.owner_report", "subject path identified detector max_false_alarms now"),
 }
 """What each section calls, imported when it is needed, and which parameters come from elsewhere."""
 
@@ -138,25 +133,29 @@ OF_A_FIT = ("records", "features", "regression", "compensator", "detector", "mon
 """Sections of which changes take effect with the next fit."""
 
 
+def called_by(section: str) -> tuple[Callable[..., Any], list[str]]:
+    """What a section calls, and which parameters come from elsewhere."""
+    maker, without = SECTIONS[section]
+    module, _, name = maker.rpartition(".")
+    return getattr(import_module(module), name), without.split()
+
+
 def settings_of(maker: Callable[..., Any], without: Sequence[str] = ()) -> dict[str, Setting]:
-    """Parameters of a class or function by name, with their descriptions; defaults made by a factory are empty."""
-    doc = inspect.getdoc(maker) or ""
-    types = dict(re.findall(r"^(\w+) : ([^\n]*?)(?:, optional|, default=[^\n]*)?$", doc, re.MULTILINE))
-    texts = {name: f"{text} {types[name]}" if text.endswith(":") else text for name, text in _descriptions(doc)}
-    kinds = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
+    """Parameters of a class or function by name, as its numpydoc docstring describes them in their first paragraphs;
+    defaults made by a factory are empty."""
+    doc, many = inspect.getdoc(maker) or "", re.MULTILINE
+    part = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", doc, re.DOTALL | many)
+    one_of_them = r"^(\w[\w, ]*?) ?: (.*)\n((?:[ \t]+.*\n?)*)"
+    said: dict[str, tuple[str, str]] = {}
+    for names, of_type, lines in re.findall(one_of_them, part[1] if part else "", many):
+        kind = re.sub(r", (optional|default=.*)$", "", of_type)
+        text = re.sub(r"`+~?([^`]*)`+", r"\1", " ".join(lines.split()))
+        said |= {name.strip(): (f"{text} {kind}" if text.endswith(":") else text, kind) for name in names.split(",")}
     return {
-        name: Setting({} if "factory" in repr(one.default) else one.default, texts.get(name, ""), types.get(name, ""))
+        name: Setting({} if "factory" in repr(one.default) else one.default, *said.get(name, ("", "")))
         for name, one in inspect.signature(maker).parameters.items()
-        if name not in without and one.kind not in kinds
+        if name not in without and one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
     }
-
-
-def _descriptions(doc: str) -> Iterator[tuple[str, str]]:
-    """Names and first paragraphs of the parameters that a numpydoc docstring describes."""
-    part = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", doc, re.DOTALL | re.MULTILINE)
-    for match in re.finditer(r"^(\w[\w, ]*?) ?: [^\n]*\n((?:[ \t]+[^\n]*\n?)*)", part[1] if part else "", re.MULTILINE):
-        text = re.sub(r"`+~?([^`]*)`+", r"\1", " ".join(match[2].split()))
-        yield from ((name.strip(), text) for name in match[1].split(","))
 
 
 @dataclass(frozen=True)
@@ -186,15 +185,13 @@ class Settings:
 
     def changed_since(self, before: Mapping[str, Any]) -> list[str]:
         """Names of settings that were others when the monitor was fitted, such as "[detector] window"."""
-        found = []
-        for section, value in self.of_a_fit.items():
-            known = before.get(section)
-            if isinstance(value, dict) and isinstance(known, dict):
-                keys = [key for key in known | value if known.get(key) != value.get(key) and key != "folder"]
-                found += [f"[{section}] {key}" for key in keys]
-            elif value != known:
-                found.append(f"[{section}]")
-        return found
+
+        def flat(content: Mapping[str, Any]) -> dict[str, Any]:
+            sections = {name: one if isinstance(one, dict) else {"": one} for name, one in content.items()}
+            return {f"[{name}] {key}".strip(): one for name, values in sections.items() for key, one in values.items()}
+
+        now, then = flat(self.of_a_fit), flat(before)
+        return [name for name in now | then if now.get(name) != then.get(name) and name != "[records] folder"]
 
     def path(self, name: str) -> Path:
         """A file that the settings name: beside them, if it has no folder of its own."""
@@ -214,7 +211,7 @@ class Settings:
         options = dict(self.options["fem"])
         if not options:
             return None
-        return SECTIONS["fem"][0]()(_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
+        return called_by("fem")[0](_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
 
     def page(self) -> dict[str, Any]:
         """Arguments of the owner's page."""
@@ -245,187 +242,155 @@ def _model(path: Path, settings: Path) -> Any:
 
 def _made_by(path: Path, setting: str, what: str) -> Any:
     """What a function of a Python file gives, as in "bridge.py:make_model"."""
-    file, _, function = str(path).rpartition(".py:")
-    names: dict[str, Any] = {"__name__": Path(file).stem}
-    code = Path(f"{file}.py")
-    if not file or not code.is_file():
+    file, _, function = str(path).rpartition(":")
+    if not file.endswith(".py") or not Path(file).is_file():
         raise ValueError(
             f"{setting} is {str(path)!r}; expected a Python file and its function, such as 'bridge.py:make'"
         )
-    exec(compile(code.read_text(encoding="utf-8"), str(code), "exec"), names)
+    names = runpy.run_path(file, run_name=Path(file).stem)
     if not callable(names.get(function)):
-        raise ValueError(f"{setting}: {code} has no function {function!r}; expected one that gives {what}")
+        raise ValueError(f"{setting}: {file} has no function {function!r}; expected one that gives {what}")
     return names[function]()
+
+
+class SettingError(ValueError):
+    """What is wrong with a setting: the name of its section, its number among those of that name, and its key."""
+
+    def __init__(self, text: str, section: str, key: str = "", number: int = 0):
+        super().__init__(text)
+        self.place = section, number, key
 
 
 def read_settings(file: Path) -> Settings:
     """Read and check a file of settings; errors name the line."""
-    return _Reader.opened(file).settings()
+    try:
+        text = file.read_text(encoding="utf-8")
+        content = tomllib.loads(text)
+    except FileNotFoundError as error:
+        how = HOW_TO_BEGIN.format(file.parent)
+        raise FileNotFoundError(f"there is no file {str(file)!r}; expected settings, from: {how}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
+    try:
+        return _checked(file, content)
+    except SettingError as error:
+        (section, number, _), lines = error.place, dict(_places(text))
+        line = lines.get(error.place) or lines.get((section, number, ""))
+        raise ValueError(f"{file}{f', line {line}' if line else ''}: {error}") from error
 
 
-@dataclass(frozen=True)
-class _Reader:
-    """Content of a file, and where each of its settings stands."""
-
-    file: Path
-    content: Mapping[str, Any]
-    lines: Mapping[tuple[str, int, str], int]
-
-    @classmethod
-    def opened(cls, file: Path) -> _Reader:
-        try:
-            text = file.read_text(encoding="utf-8")
-            return cls(file, tomllib.loads(text), dict(_places(text)))
-        except FileNotFoundError as error:
-            how = HOW_TO_BEGIN.format(file.parent)
-            raise FileNotFoundError(f"there is no file {str(file)!r}; expected settings, from: {how}") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
-
-    def settings(self) -> Settings:
-        known = [*SECTIONS, *CLASSES]
-        for name, given in self.content.items():
-            is_list, wants_list = isinstance(given, list), name == "features"
-            if name not in known:
-                raise self.error(name, 0, "", f"there is no section [{name}]{_nearest(name, known)}")
-            if is_list != wants_list or not all(isinstance(one, dict) for one in (given if is_list else [given])):
-                expected = f"[[{name}]], once for each step" if wants_list else f"[{name}], once"
-                raise self.error(name, 0, "", f"{name!r} is no section; expected {expected}")
-        files, records, form = (self._called(name) for name in ("files", "records", "csv"))
-        parts = {
-            name: self._made(name, 0, self.content[name]) for name in ("regression", "detector") if self._has(name)
-        }
-        steps = enumerate(self.content.get("features", ()))
-        parts["features"] = [self._made("features", n, given) for n, given in steps]
-        options = {name: self._values(name) for name in ("compensator", "monitor", "fem", "page")}
-        found = Settings(self.file, self.content, files, records, form, parts, options)
-        self._check(found)
-        return found
-
-    def error(self, section: str, number: int, key: str, text: str) -> ValueError:
-        """An error that names the line."""
-        line = self.lines.get((section, number, key)) or self.lines.get((section, number, ""))
-        return ValueError(f"{self.file}{f', line {line}' if line else ''}: {text}")
-
-    def _has(self, name: str) -> bool:
-        if name not in self.content:
-            raise self.error(name, 0, "", f"there is no section [{name}]; expected one, with class = a name")
-        return True
-
-    def _called(self, name: str) -> Any:
-        """What a section calls with its values."""
-        values = self._values(name)
-        maker = SECTIONS[name][0]()
-        for key, value in values.items():
-            if not fits(value, get_type_hints(maker)[key]):
-                expected = settings_of(maker)[key].kind
-                raise self.error(name, 0, key, f"[{name}] {key} is {value!r:.100}; expected {expected}")
-        return maker(**values)
-
-    def _values(self, name: str) -> dict[str, Any]:
-        """Values of a section that are parameters of what it calls."""
-        if name in ("fem", "page") and name not in self.content:
-            return {}
-        maker, without = SECTIONS[name]
-        return self._known(name, 0, self.content.get(name, {}), settings_of(maker(), without))
-
-    def _known(self, name: str, number: int, given: Mapping[str, Any], known: Mapping[str, Setting]) -> dict[str, Any]:
-        for key in given:
-            if key not in known:
-                raise self.error(name, number, key, f"[{name}] has no setting {key!r}{_nearest(key, known)}")
-        lacking = [key for key, one in known.items() if one.is_required and key not in given]
-        if lacking:
-            raise self.error(name, number, "", f"[{name}] lacks {', '.join(lacking)}")
-        return {key: _plain(value, known[key]) for key, value in given.items()}
-
-    def _made(self, name: str, number: int, given: Mapping[str, Any]) -> Any:
-        """An estimator of the class that a section names."""
-        values = dict(given)
-        try:
-            maker = class_named(values.pop("class", None), CLASSES[name])
-        except ValueError as error:
-            raise self.error(name, number, "class", f"[{name}] class {error}") from error
-        known = self._known(name, number, values, settings_of(maker))
-        parts = {
-            key: self._made(name, number, one) for key, one in known.items() if isinstance(one, dict) and "class" in one
-        }
-        estimator = maker(**known | parts)
-        self._validate(name, number, estimator)
-        return estimator
-
-    def _validate(self, name: str, number: int, estimator: Any) -> None:
-        """The checks of parameters that every estimator has."""
-        try:
-            estimator._validate_params()
-        except ValueError as error:
-            key = re.search(r"'(\w+)' parameter", str(error))
-            raise self.error(name, number, key[1] if key else "", f"[{name}] {error}") from error
-
-    def _check(self, found: Settings) -> None:
-        """What concerns several settings, or a value's meaning."""
-        columns = found.records.columns
-        again = sorted({name for name in columns if columns.count(name) > 1})
-        if again:
-            raise self.error("records", 0, "", f"[records] names {again} twice; expected each column once")
-        for key in ("temperatures", "responses"):
-            if not getattr(found.records, key):
-                raise self.error("records", 0, key, f"[records] {key} is empty; expected names of columns")
-        for column, unit in found.records.convert.items():
-            if unit not in ("K", "°F") or column not in columns:
-                text = f"[records] convert has {column!r}: {unit!r}; expected a column that is used, in 'K' or '°F'"
-                raise self.error("records", 0, "convert", text)
-        try:
-            ZoneInfo(found.csv.time_zone or "UTC")
-        except (KeyError, ValueError, OSError) as error:
-            text = f"[csv] time_zone is {found.csv.time_zone!r}; expected a name such as 'Europe/Brussels' or 'UTC'"
-            raise self.error("csv", 0, "time_zone", text) from error
-        monitor = found.monitor()
-        self._validate("monitor", 0, monitor)
-        self._validate("compensator", 0, monitor.detector)
+def _checked(file: Path, content: Mapping[str, Any]) -> Settings:
+    """Settings of a file with this content."""
+    known = [*SECTIONS, *CLASSES]
+    for name, given in content.items():
+        steps, wants_list = given if isinstance(given, list) else [given], name == "features"
+        if name not in known:
+            raise SettingError(f"there is no section [{name}]{_nearest(name, known)}", name)
+        if isinstance(given, list) != wants_list or not all(isinstance(one, dict) for one in steps):
+            expected = f"[[{name}]], once for each step" if wants_list else f"[{name}], once"
+            raise SettingError(f"{name!r} is no section; expected {expected}", name)
+    if lacking := [name for name in ("regression", "detector") if name not in content]:
+        raise SettingError(f"there is no section [{lacking[0]}]; expected one, with class = a name", lacking[0])
+    values = {
+        name: _known(name, content.get(name, {}), settings_of(*called_by(name)))
+        for name in SECTIONS
+        if name in content or name not in ("fem", "page")
+    }
+    for name in ("files", "records", "csv"):
+        kinds = {key: setting.kind for key, setting in settings_of(called_by(name)[0]).items()}
+        if wrong := [key for key, value in values[name].items() if not fits(value, kinds[key])]:
+            got = f"[{name}] {wrong[0]} is {values[name][wrong[0]]!r:.100}"
+            raise SettingError(f"{got}; expected {kinds[wrong[0]]}", name, wrong[0])
+    files, records, form = (called_by(name)[0](**values[name]) for name in ("files", "records", "csv"))
+    parts: dict[str, Any] = {name: _made(name, content[name]) for name in ("regression", "detector")}
+    parts["features"] = [_made("features", one, number) for number, one in enumerate(content.get("features", ()))]
+    options = {name: values.get(name, {}) for name in ("compensator", "monitor", "fem", "page")}
+    found = Settings(file, content, files, records, form, parts, options)
+    _check_columns(records)
+    try:
+        ZoneInfo(form.time_zone or "UTC")
+    except (KeyError, ValueError, OSError) as error:
+        text = f"[csv] time_zone is {form.time_zone!r}; expected a name such as 'Europe/Brussels' or 'UTC'"
+        raise SettingError(text, "csv", "time_zone") from error
+    monitor = found.monitor()
+    _validate("monitor", monitor)
+    _validate("compensator", monitor.detector)
+    return found
 
 
-def class_named(name: Any, packages: Sequence[str]) -> type:
-    """A class of skthermo by its name, or one of scikit-learn by its module and name."""
-    own = [
-        one
-        for package in packages
-        if package.startswith("skthermo")
-        for one in import_module(package).__all__
-        if hasattr(getattr(import_module(package), one), "get_params")
-    ]
-    module, _, last = str(name).rpartition(".")
+def _known(name: str, given: Mapping[str, Any], known: Mapping[str, Setting], number: int = 0) -> dict[str, Any]:
+    """Values of a section, which are parameters of what it calls: times as text, and None by a word."""
+    for key in given:
+        if key not in known:
+            raise SettingError(f"[{name}] has no setting {key!r}{_nearest(key, known)}", name, key, number)
+    if lacking := [key for key, one in known.items() if one.default is REQUIRED and key not in given]:
+        raise SettingError(f"[{name}] lacks {', '.join(lacking)}", name, "", number)
+    is_time = datetime.date, datetime.time
+    plain = {key: value.isoformat() if isinstance(value, is_time) else value for key, value in given.items()}
+    return {key: None if one == NONE and known[key].default is not None else one for key, one in plain.items()}
+
+
+def _made(name: str, given: Mapping[str, Any], number: int = 0) -> Any:
+    """An estimator of the class that a section names, and its parts."""
+    values = dict(given)
+    try:
+        maker = class_named(name, values.pop("class", None))
+    except ValueError as error:
+        raise SettingError(f"[{name}] class {error}", name, "class", number) from error
+    known = _known(name, values, settings_of(maker), number)
+    is_part = {key: isinstance(one, dict) and "class" in one for key, one in known.items()}
+    made = maker(**{key: _made(name, one, number) if is_part[key] else one for key, one in known.items()})
+    _validate(name, made, number)
+    return made
+
+
+def _validate(name: str, estimator: Any, number: int = 0) -> None:
+    """The checks of parameters that every estimator has."""
+    try:
+        estimator._validate_params()
+    except ValueError as error:
+        key = re.search(r"'(\w+)' parameter", str(error))
+        raise SettingError(f"[{name}] {error}", name, key[1] if key else "", number) from error
+
+
+def _check_columns(records: RecordSettings) -> None:
+    """Raise an error for columns that are named twice, for roles without any, and for unknown units."""
+    if again := sorted({name for name in records.columns if records.columns.count(name) > 1}):
+        raise SettingError(f"[records] names {again} twice; expected each column once", "records")
+    for key in ("temperatures", "responses"):
+        if not getattr(records, key):
+            raise SettingError(f"[records] {key} is empty; expected names of columns", "records", key)
+    for column, unit in records.convert.items():
+        if unit not in ("K", "°F") or column not in records.columns:
+            text = f"[records] convert has {column!r}: {unit!r}; expected a column that is used, in 'K' or '°F'"
+            raise SettingError(text, "records", "convert")
+
+
+def class_named(section: str, name: Any) -> type:
+    """A class that a section may call: of skthermo by its name, of scikit-learn by its module and name."""
+    packages = CLASSES[section]
+    rooms = [import_module(package) for package in packages if package.startswith("skthermo")]
+    own = {one: getattr(room, one) for room in rooms for one in room.__all__}
+    own = {one: found for one, found in own.items() if hasattr(found, "get_params")}
     if name in own:
-        return next(getattr(import_module(one), name) for one in packages if hasattr(import_module(one), name))
-    if module.split(".")[0] == "sklearn" and "sklearn" in packages:
-        try:
+        return own[name]
+    module, _, last = str(name).rpartition(".")
+    if module.split(".")[0] in packages:
+        with suppress(ImportError, AttributeError):
             found = getattr(import_module(module), last)
-        except (ImportError, AttributeError):
-            found = None
-        if isinstance(found, type) and hasattr(found, "get_params"):
-            return found
+            if isinstance(found, type) and hasattr(found, "get_params"):
+                return found
     expected = [*own, "one of scikit-learn, such as 'sklearn.linear_model.Ridge'"]
-    raise ValueError(f"is {name!r}{_nearest(str(name), own, expected)}")
+    raise ValueError(f"is {name!r}{_nearest(str(name), list(own), expected)}")
 
 
-def fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type."""
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin in (Union, UnionType):
-        return any(fits(value, one) for one in inner)
-    if origin is not None and issubclass(origin, Mapping):
-        return isinstance(value, Mapping) and all(fits(one, inner[1]) for one in value.values())
-    if origin is not None:
-        return isinstance(value, list) and all(fits(one, inner[0]) for one in value)
-    if hint is float:
-        return isinstance(value, int | float) and not isinstance(value, bool)
-    return isinstance(value, hint) and (hint is bool or not isinstance(value, bool))
-
-
-def _plain(value: Any, setting: Setting) -> Any:
-    """A value as Python's API has it: times as text, and None by a word."""
-    if isinstance(value, datetime.date | datetime.time):
-        return value.isoformat()
-    return None if value == NONE and setting.default is not None else value
+def fits(value: Any, kind: str) -> bool:
+    """Whether a value is of a kind, such as "str", "list of float" or "mapping of str to str"."""
+    outer, _, inner = kind.partition(" of ")
+    types = {"str": str, "int": int, "float": (int, float), "list": list, "mapping": dict}
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    is_right = isinstance(value, types[outer]) and not isinstance(value, bool)
+    return is_right and all(fits(one, inner.removeprefix("str to ")) for one in parts)
 
 
 def _nearest(name: str, known: Sequence[str] | Mapping[str, Any], expected: Sequence[str] | None = None) -> str:

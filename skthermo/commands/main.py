@@ -32,7 +32,6 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -42,30 +41,83 @@ import skthermo
 from skthermo._core.files import ReadWhenAsked, write_when_complete
 from skthermo._core.text import capital, plain
 from skthermo._core.warnings import collected
-from skthermo.commands import _bridge
-from skthermo.commands._bridge import ALARM, CODES, FAILED, HEALTHY, NOT_EVALUATED, Bridge, Done, attempt, sentence
+from skthermo.commands._bridge import ALARM, CODES, FAILED, HEALTHY, NOT_EVALUATED, Bridge, sentence
 from skthermo.commands._settings import HOW_TO_BEGIN
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
 EXPLAINED = (ValueError, OSError, ImportError)  # errors that need no traceback
-GAUGES = {
-    "up": "1 if the last command could do its work on this bridge, else 0",
-    "state": "1 for the state that the bridge is in, 0 for the others",
-    "damage_index": "Damage index of the newest record that was evaluated",
-    "threshold": "Damage index above which a damage event opens",
-    "watch_threshold": "Damage index above which the level watch begins",
-    "newest_record_timestamp_seconds": "Time of the newest record, in seconds since 1970",
-    "record_age_seconds": "Age of the newest record when the metrics were written",
-    "open_events": "Number of events that are open, by kind",
-    "failed_sensors": "Number of sensors that have failed",
-    "records": "Number of records since the baseline",
-    "records_not_evaluated": "Number of records since the baseline that were not evaluated",
-    "written_timestamp_seconds": "Time at which the metrics were written, in seconds since 1970",
+COMMANDS = {
+    "check": "look at files of records, and say what was found",
+    "init": "look at files of records, and write settings that fit them",
+    "fit": "fit monitors to their baselines",
+    "update": "take in new records",
+    "status": "say how things stand",
+    "report": "write the page for the owner",
+    "acknowledge": "say what an event was",
+    "rebaseline": "begin a new baseline after a repair",
+    "refit": "learn anew from the baseline and the records since",
+    "discard": "take back records, such as those stamped by a wrong clock",
 }
-"""Names of metrics, all of them gauges that begin with ``skthermo_``, and their help."""
+RECORDS, SINGLE, SEVERAL = "check init", "acknowledge rebaseline refit discard", "fit update status report"
+PAGE = {"dest": "report", "type": Path, "metavar": "PAGE", "help": "HTML for the owner, or of the fleet"}
+BRIDGES = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
+OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("--json", " ".join(COMMANDS), {"action": "store_true", "help": "print JSON in place of text"}),
+    ("--log", " ".join(COMMANDS), {"type": Path, "metavar": "FILE", "help": "append warnings and what was done"}),
+    ("--verbose", " ".join(COMMANDS), {"action": "store_true", "help": "say more on stderr"}),
+    ("files", RECORDS, {"nargs": "+", "type": Path, "help": "T.csv F.csv, or one file with all columns"}),
+    ("--temperatures", RECORDS, {"nargs": "+", "metavar": "COLUMN", "help": "by default as files or names tell"}),
+    ("--responses", RECORDS, {"nargs": "+", "metavar": "COLUMN", "help": "by default as files or names tell"}),
+    ("--reference", RECORDS, {"nargs": "+", "default": [], "metavar": "COLUMN", "help": "temperatures from elsewhere"}),
+    ("--zone", RECORDS, {"help": 'time zone of the logger\'s clock, such as "Europe/Brussels"'}),
+    ("--stamps", RECORDS, {"metavar": "FORMAT", "help": 'such as "%%m/%%d/%%Y %%H:%%M" (default: as stamps tell)'}),
+    ("--until", RECORDS, {"metavar": "TIME", "help": "last moment of the baseline (default: all records)"}),
+    ("--into", "init", {"type": Path, "required": True, "metavar": "FOLDER", "help": "made if it does not exist"}),
+    ("--name", "init", {"dest": "bridge", "help": "of the bridge (default: that of the folder)"}),
+    ("files", SINGLE, {"type": Path, "nargs": 1, "metavar": "file", "help": BRIDGES}),
+    ("files", SEVERAL, {"type": Path, "nargs": "+", "help": f"{BRIDGES}; of update, then new records"}),
+    ("--metrics", f"{SINGLE} {SEVERAL}", {"type": Path, "metavar": "FILE", "help": "in Prometheus' text format"}),
+    ("--now", f"{SINGLE} {SEVERAL}", {"metavar": "TIME", "help": "as of this time (default: that of the clock)"}),
+    ("--report", "update status", PAGE),
+    ("--out", "report", PAGE),
+    ("--title", "update status report", {"help": "heading of the page"}),
+    ("--fdr", "update status report", {"type": float, "default": 0.1, "help": "false discovery rate of a fleet"}),
+    ("--wait", f"{SINGLE} fit update", {"type": float, "default": 60.0, "help": "seconds for another command at work"}),
+    ("--replace", "fit", {"action": "store_true", "help": "fit anew; the old monitor is kept beside"}),
+    ("--separator", "update", {"help": "between values of a CSV file (default: as the settings say, or a comma)"}),
+    ("--decimal", "update", {"help": "decimal sign of a CSV file (default: as the settings say, or a point)"}),
+    ("--stamps", "update", {"metavar": "FORMAT", "help": 'such as "%%d.%%m.%%Y %%H:%%M" (default: 2026-01-31 13:00)'}),
+    ("--confirm", "update", {"action": "store_true", "help": "take in records that are stamped far ahead"}),
+    ("event", "acknowledge", {"type": int, "help": "its number"}),
+    ("--harmless", "acknowledge", {"action": "store_true", "help": "its records may train the monitor anew"}),
+    ("--damage", "acknowledge", {"action": "store_true", "help": "its records may not"}),
+    ("--note", "acknowledge", {"default": "", "help": "what was found"}),
+    ("--since", "rebaseline", {"required": True, "metavar": "TIME", "help": "when the work was complete"}),
+    ("--since", "discard", {"required": True, "metavar": "TIME", "help": "first stamp of the records"}),
+    ("--until", "rebaseline refit", {"metavar": "TIME", "help": "last moment that may train"}),
+    ("--until", "discard", {"metavar": "TIME", "help": "last stamp (default: all records since)"}),
+    ("--force", "refit", {"action": "store_true", "help": "take over whatever speaks against it"}),
+)
+"""Arguments and options, the commands that have them, and their settings for argparse."""
 
+GAUGES: dict[str, tuple[str, Callable[[Mapping[str, Any]], Any]]] = {
+    "damage_index": ("Damage index of the newest record that was evaluated", lambda status: status["index"]),
+    "threshold": ("Damage index above which a damage event opens", lambda status: status["threshold"]),
+    "watch_threshold": ("Damage index above which the level watch begins", lambda status: status["watch_threshold"]),
+    "newest_record_timestamp_seconds": ("Time of the newest record, seconds since 1970", lambda status: newest(status)),
+    "record_age_seconds": ("Age of the newest record when the metrics were written", lambda status: status["age"]),
+    "failed_sensors": ("Number of sensors that have failed", lambda status: len(status["faults"])),
+    "records": ("Number of records since the baseline", lambda status: status["counts"]["n_records"]),
+    "records_not_evaluated": ("Number of these not evaluated", lambda status: status["counts"]["n_not_evaluated"]),
+}
+"""Metrics of a status that are one number each, and their help; what is not known is left out."""
 
 logger = logging.getLogger("skthermo.commands")
+
+
+def newest(status: Mapping[str, Any]) -> float | None:
+    """Time of the newest record in seconds since 1970."""
+    return status["newest"] and datetime.fromisoformat(status["newest"]).timestamp()
 
 
 class Parser(argparse.ArgumentParser):
@@ -104,10 +156,11 @@ def _run(options: argparse.Namespace, facts: dict[str, Any]) -> None:
     """Do what was asked for, and then say each warning once."""
     with collected() as findings:
         try:
-            facts["exit_code"] = options.command(options, facts)
+            facts["exit_code"] = (_look if options.name in RECORDS.split() else _on_bridges)(options, facts)
         except Exception as error:  # Python's own exit code of an error would be that of an alarm
             _complain(error)
             facts["errors"].append(sentence(error))
+            facts["exit_code"] = FAILED
     facts["warnings"] = list(dict.fromkeys(map(str, findings)))
     for text in facts["warnings"]:
         logger.warning("%s", text)
@@ -156,113 +209,45 @@ def _parser() -> Parser:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("--version", action="version", version=f"%(prog)s {skthermo.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-
-    def add(name: str, text: str, command: Callable[..., int]) -> argparse.ArgumentParser:
+    for name, text in COMMANDS.items():
         one = commands.add_parser(name, help=text, description=f"{capital(text)}.")
-        one.set_defaults(command=command, name=name, metrics=None, now=None, report=None, title=None)
-        one.add_argument("--json", action="store_true", help="print JSON in place of text")
-        one.add_argument("--log", type=Path, metavar="FILE", help="append warnings, errors and what was done")
-        one.add_argument("--verbose", action="store_true", help="say more on stderr")
-        return one
-
-    _on_records(add("check", "look at files of records, and say what was found", _look))
-    init = add("init", "look at files of records, and write settings that fit them", _look)
-    _on_records(init)
-    init.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="made if it does not exist")
-    init.add_argument("--name", dest="bridge", help="of the bridge (default: that of the folder)")
-    works: tuple[tuple[str, str, Any], ...] = (
-        ("fit", "fit monitors to their baselines", _bridge.fit),
-        ("update", "take in new records", _bridge.update),
-        ("status", "say how things stand", _bridge.status),
-        ("report", "write the page for the owner", _bridge.report),
-        ("acknowledge", "say what an event was", _bridge.acknowledge),
-        ("rebaseline", "begin a new baseline after a repair", _bridge.rebaseline),
-        ("refit", "learn anew from the baseline and the records since", _bridge.refit),
-        ("discard", "take back records, such as those stamped by a wrong clock", _bridge.discard),
-    )
-    for name, text, work in works:
-        _on_monitors(add(name, text, partial(_on_bridges, work)), name)
-    _add_details(commands.choices)
+        one.set_defaults(name=name, metrics=None, now=None, report=None, title=None)
+        said = one.add_mutually_exclusive_group(required=True) if name == "acknowledge" else one
+        for option, of_commands, settings in OPTIONS:
+            if name in of_commands.split():
+                (said if option in ("--harmless", "--damage") else one).add_argument(option, **settings)
     return parser
 
 
-def _on_records(one: argparse.ArgumentParser) -> None:
-    one.add_argument("files", nargs="+", type=Path, help="T.csv F.csv, or one file with all columns")
-    one.add_argument("--temperatures", nargs="+", metavar="COLUMN", help="by default as files or names tell")
-    one.add_argument("--responses", nargs="+", metavar="COLUMN", help="by default as files or names tell")
-    one.add_argument("--reference", nargs="+", default=[], metavar="COLUMN", help="temperatures from elsewhere")
-    one.add_argument("--zone", help='time zone of the logger\'s clock, such as "Europe/Brussels"')
-    one.add_argument("--stamps", metavar="FORMAT", help='such as "%%m/%%d/%%Y %%H:%%M" (default: as stamps tell)')
-    one.add_argument("--until", metavar="TIME", help="last moment of the baseline (default: all records)")
-
-
-def _on_monitors(one: argparse.ArgumentParser, name: str) -> None:
-    many = {} if name in ("acknowledge", "rebaseline", "refit", "discard") else {"nargs": "+"}
-    what = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
-    one.add_argument("files", type=Path, help=f"{what}, then new records" if name == "update" else what, **many)
-    one.add_argument("--metrics", type=Path, metavar="FILE", help="write them in Prometheus' text format")
-    one.add_argument("--now", metavar="TIME", help="as of this time (default: that of the clock)")
-    if name in ("update", "status", "report"):
-        page = "--out" if name == "report" else "--report"
-        one.add_argument(page, dest="report", type=Path, metavar="PAGE", help="HTML for the owner, or of the fleet")
-        one.add_argument("--title", help="heading of the page")
-        one.add_argument("--fdr", type=float, default=0.1, help="false discovery rate of a fleet (default: 0.1)")
-    if name not in ("status", "report"):
-        one.add_argument(
-            "--wait", type=float, default=60.0, metavar="SECONDS", help="for another command at work (default: 60)"
-        )
-
-
-def _add_details(parsers: dict[str, argparse.ArgumentParser]) -> None:
-    parsers["fit"].add_argument("--replace", action="store_true", help="fit anew; the old monitor is kept beside")
-    update = parsers["update"]
-    update.add_argument("--separator", help="between values of a CSV file (default: as the settings say, or a comma)")
-    update.add_argument("--decimal", help="decimal sign of a CSV file (default: as the settings say, or a point)")
-    update.add_argument("--stamps", metavar="FORMAT", help='such as "%%d.%%m.%%Y %%H:%%M" (default: 2026-01-31 13:00)')
-    update.add_argument("--confirm", action="store_true", help="take in records that are stamped far ahead")
-    parsers["acknowledge"].add_argument("event", type=int, help="its number")
-    kinds = parsers["acknowledge"].add_mutually_exclusive_group(required=True)
-    kinds.add_argument("--harmless", action="store_true", help="its records may train the monitor anew")
-    kinds.add_argument("--damage", action="store_true", help="its records may not")
-    parsers["acknowledge"].add_argument("--note", default="", help="what was found")
-    parsers["rebaseline"].add_argument("--since", required=True, metavar="TIME", help="when the work was complete")
-    for name in ("rebaseline", "refit"):
-        parsers[name].add_argument("--until", metavar="TIME", help="last moment that may train")
-    parsers["refit"].add_argument("--force", action="store_true", help="take over whatever speaks against it")
-    parsers["discard"].add_argument("--since", required=True, metavar="TIME", help="first stamp of the records")
-    parsers["discard"].add_argument("--until", metavar="TIME", help="last stamp (default: all records since)")
-
-
-def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: dict[str, Any]) -> int:
-    given = [_settings_in(file) for file in (options.files if isinstance(options.files, list) else [options.files])]
+def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+    """Do the work of a command on each bridge; the exit code."""
+    given = [file / "monitor.toml" if (file / "monitor.toml").is_file() else file for file in options.files]
     files = [file for file in given if file.suffix in MONITORS]
-    records = [file for file in given if file.suffix not in MONITORS]
-    empty = [file for file in given if file.is_dir() or not (file.suffix or file.exists())]
-    if empty:
+    options.records = [file for file in given if file.suffix not in MONITORS]
+    if empty := [file for file in given if file.is_dir() or not (file.suffix or file.exists())]:
         what = "the folder {} has no monitor.toml" if empty[0].is_dir() else "there is no folder {}"
         raise FileNotFoundError(f"{what.format(repr(str(empty[0])))}; expected: {HOW_TO_BEGIN.format(empty[0])}")
-    if not files or (records and (work is not _bridge.update or len(files) > 1)):
+    is_update = options.name == "update"
+    if not files or (options.records and (not is_update or len(files) > 1)):
         raise ValueError(
             f"files are {', '.join(map(str, given))}; expected settings (.toml) or monitors (.skops, .joblib)"
-            f"{', one alone if records are named' if work is _bridge.update else ' only'}"
+            f"{', one alone if records are named' if is_update else ' only'}"
         )
-    if work is _bridge.update and not records and any(file.suffix != ".toml" for file in files):
+    if is_update and not options.records and any(file.suffix != ".toml" for file in files):
         raise ValueError(f"no new records are named for {files[0]}; expected their file, such as new.csv")
-    if records:
-        work = partial(work, files=records)
     of_fleet = {} if len(files) == 1 else {"report": None, "title": None}  # what is named is the fleet's page
     bridges = [Bridge(file, argparse.Namespace(**vars(options) | of_fleet)) for file in files]
-    done, errors = [], {}
+    errors: dict[str, Exception] = {}
     for bridge in bridges:
-        one, error = attempt(work, bridge)
-        done.append(one)
-        _say(one, options, len(bridges), error)
-        if one.errors:
-            errors[one.name] = error or ValueError("; ".join(one.errors))
-    facts["bridges"] = [one.facts() for one in done]
-    code = next(code for code in (ALARM, FAILED, NOT_EVALUATED, HEALTHY) if any(one.code == code for one in done))
+        error = bridge.attempt(options.name)
+        _say(bridge, options, len(bridges), error)
+        if bridge.errors:
+            errors[bridge.name] = error or ValueError("; ".join(bridge.errors))
+    facts["bridges"] = [bridge.facts() for bridge in bridges]
+    codes = {bridge.code for bridge in bridges}
+    facts["exit_code"] = next(code for code in (ALARM, FAILED, NOT_EVALUATED, HEALTHY) if code in codes)
     if len(bridges) > 1 and options.name in ("update", "status", "report"):
-        code = _as_fleet(bridges, done, errors, options, facts, code)
+        _as_fleet(bridges, errors, options, facts)
     metrics: dict[Path, list[dict[str, Any]]] = {}
     for bridge, one in zip(bridges, facts["bridges"], strict=True):
         for file in {options.metrics, bridge.metrics_file} - {None}:
@@ -271,43 +256,32 @@ def _on_bridges(work: Callable[..., None], options: argparse.Namespace, facts: d
         try:
             write_metrics(file, of_bridges, pd.Timestamp.now("UTC"))
         except OSError as error:
-            code = _failed(error, f"{file} was not written: ", facts, code)
-    return code
+            _failed(error, f"{file} was not written: ", facts)
+    return facts["exit_code"]
 
 
-def _settings_in(path: Path) -> Path:
-    """The settings in a bridge's folder; any other path as it is."""
-    settings = path / "monitor.toml"
-    return settings if settings.is_file() else path
-
-
-def _say(done: Done, options: argparse.Namespace, number: int, error: Exception | None) -> None:
-    where = f"{done.name}: " if number > 1 else ""
-    if not options.json and done.lines:
-        _print("\n".join([f"[{done.name}]"] * (number > 1) + done.lines + [""] * (number > 1)))
-    for text in done.errors:
-        logger.error("%s%s", where, text)
+def _say(bridge: Bridge, options: argparse.Namespace, number: int, error: Exception | None) -> None:
+    heading, end = ([f"[{bridge.name}]"], [""]) if number > 1 else ([], [])
+    if not options.json and bridge.lines:
+        _print("\n".join([*heading, *bridge.lines, *end]))
+    for text in bridge.errors:
+        logger.error("%s%s", f"{bridge.name}: " if number > 1 else "", text)
     if error is not None and not isinstance(error, EXPLAINED):
         traceback.print_exception(error)
-    logger.info("%s %s: state %s, exit code %s", options.name, done.name, done.state, done.code)
+    logger.info("%s %s: state %s, exit code %s", options.name, bridge.name, bridge.state, bridge.code)
 
 
 def _as_fleet(
-    bridges: Sequence[Bridge],
-    done: Sequence[Done],
-    errors: dict[str, Exception],
-    options: argparse.Namespace,
-    facts: dict[str, Any],
-    code: int,
-) -> int:
-    """Say which alarms are significant among those of several bridges, and write their page; the exit code."""
+    bridges: Sequence[Bridge], errors: dict[str, Exception], options: argparse.Namespace, facts: dict[str, Any]
+) -> None:
+    """Say which alarms are significant among those of several bridges, and write their page."""
     from skthermo.monitoring import Fleet  # a job of one bridge needs none
 
-    loaded = {one.name: bridge.load for bridge, one in zip(bridges, done, strict=True) if one.state is not None}
-    if len(loaded) + sum(one.state is None for one in done) < len(done):
-        raise ValueError(
-            f"bridges are called {[one.name for one in done]}; expected another name for each, as in [files]"
-        )
+    working = [bridge for bridge in bridges if bridge.state is not None]
+    loaded = {bridge.name: bridge.load for bridge in working}
+    if len(loaded) < len(working):
+        names = [bridge.name for bridge in working]
+        raise ValueError(f"bridges are called {names}; expected another name for each, as in [files]")
     try:
         fleet = Fleet.of_monitors(ReadWhenAsked(loaded), errors)
         facts["fleet"] = {"summary": fleet.summary(), "page": None, "discoveries": []}
@@ -323,15 +297,14 @@ def _as_fleet(
             page = owner_report(fleet, options.report, title=options.title, fdr=options.fdr, now=options.now)
             facts["fleet"]["page"] = str(page)
     except Exception as error:  # it does not hide an alarm
-        return _failed(error, "the fleet was not reported: ", facts, code)
-    return code
+        _failed(error, "the fleet was not reported: ", facts)
 
 
-def _failed(error: Exception, what: str, facts: dict[str, Any], code: int) -> int:
-    """Say that something beside the monitors failed; the exit code, which stays that of an alarm."""
+def _failed(error: Exception, what: str, facts: dict[str, Any]) -> None:
+    """Say that something beside the monitors failed, which does not hide an alarm."""
     _complain(error, what)
     facts["errors"].append(f"{what}{sentence(error)}")
-    return code if code == ALARM else FAILED
+    facts["exit_code"] = ALARM if facts["exit_code"] == ALARM else FAILED
 
 
 def _look(options: argparse.Namespace, facts: dict[str, Any]) -> int:
@@ -351,41 +324,30 @@ def _look(options: argparse.Namespace, facts: dict[str, Any]) -> int:
 
 
 def write_metrics(file: Path, bridges: Sequence[Mapping[str, Any]], now: pd.Timestamp) -> None:
-    """Replace a file of metrics of some bridges, as the JSON has them."""
-    samples = [(name, *sample) for bridge in bridges for name, sample in _samples(bridge, now)]
+    """Replace a file of metrics of some bridges, as the JSON has them: all are gauges that begin with ``skthermo_``."""
     escapes = str.maketrans({"\\": r"\\", '"': r"\"", "\n": r"\n"})  # of labels, as the text format wants them
-    lines = []
-    for name, text in GAUGES.items():
-        lines += [f"# HELP skthermo_{name} {text}", f"# TYPE skthermo_{name} gauge"]
-        for one, labels, value in samples:
-            if one == name:
-                escaped = {label: text.translate(escapes) for label, text in labels.items()}
-                shown = ",".join(f'{label}="{text}"' for label, text in escaped.items())
-                lines.append(f"skthermo_{name}{{{shown}}} {value:.10g}")
+    lines: list[str] = []
+
+    def add(name: str, text: str, values_of: Callable[[Mapping[str, Any]], Mapping[str, Any]], label: str = "") -> None:
+        lines.extend([f"# HELP skthermo_{name} {text}", f"# TYPE skthermo_{name} gauge"])
+        for bridge in bridges:
+            own = f'bridge="{bridge["name"].translate(escapes)}"'
+            for key, value in values_of(bridge).items():
+                shown = f'{own},{label}="{key}"' if label else own
+                lines.extend([f"skthermo_{name}{{{shown}}} {value:.10g}"] if value is not None else [])
+
+    def states(bridge: Mapping[str, Any]) -> dict[str, bool]:
+        return {state: bridge["status"]["state"] == state for state in CODES} if bridge["status"] else {}
+
+    def open_events(bridge: Mapping[str, Any]) -> dict[str, int]:
+        kinds = [event["kind"] for event in bridge["status"]["events"]] if bridge["status"] else None
+        known = ("damage", "watch", "measurement or structure")
+        return {} if kinds is None else {kind: kinds.count(kind) for kind in known}
+
+    add("up", "1 if the last command could do its work on this bridge, else 0", lambda one: {"": not one["errors"]})
+    add("state", "1 for the state that the bridge is in, 0 for the others", states, "state")
+    add("open_events", "Number of events that are open, by kind", open_events, "kind")
+    for name, (text, value) in GAUGES.items():
+        add(name, text, lambda one, value=value: {"": value(one["status"])} if one["status"] else {})
+    add("written_timestamp_seconds", "Time at which the metrics were written", lambda one: {"": now.timestamp()})
     write_when_complete(file, "\n".join(lines) + "\n")
-
-
-def _samples(bridge: Mapping[str, Any], now: pd.Timestamp) -> Iterator[tuple[str, tuple[dict[str, str], float]]]:
-    """Names of metrics, labels and values of one bridge; what is not known is left out."""
-    status, own = bridge["status"], {"bridge": bridge["name"]}
-    yield "up", (own, float(not bridge["errors"]))
-    yield "written_timestamp_seconds", (own, now.timestamp())
-    if status is None:
-        return
-    for state in CODES:
-        yield "state", (own | {"state": state}, float(status["state"] == state))
-    for kind in ("damage", "watch", "measurement or structure"):
-        yield "open_events", (own | {"kind": kind}, sum(one["kind"] == kind for one in status["events"]))
-    yield "failed_sensors", (own, len(status["faults"]))
-    counts = status["counts"] or {}
-    newest = status["newest"] and datetime.fromisoformat(status["newest"]).timestamp()
-    values = {
-        "damage_index": status["index"],
-        "threshold": status["threshold"],
-        "watch_threshold": status["watch_threshold"],
-        "newest_record_timestamp_seconds": newest,
-        "record_age_seconds": status["age"],
-        "records": counts.get("n_records"),
-        "records_not_evaluated": counts.get("n_not_evaluated"),
-    }
-    yield from ((name, (own, value)) for name, value in values.items() if value is not None)

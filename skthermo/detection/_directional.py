@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 
-from skthermo._core.arrays import Array, as_floats, check_probability, patterns, real_array
+from skthermo._core.arrays import Array, as_floats, check_probability, patterns, real_array, spread_evenly
 from skthermo._core.estimators import Interval, StrOptions, check_is_fitted
 from skthermo.detection._mahalanobis import MahalanobisDetector, normal_of
 from skthermo.residuals.cones import project_on_cones
@@ -153,6 +153,7 @@ class DirectionalDetector(MahalanobisDetector):
         refuse_no_residuals(F, (self.report_["read_as"] == "residual").to_numpy())
         self.directions_ = read_directions(self.directions, getattr(self, "feature_names_in_", None), F.shape[1])
         self.covariance_ = self._fitted(F, self.findings_)
+        self._healthy = F[spread_evenly(np.flatnonzero(~np.isnan(F).all(axis=1)), 2000)]
         white = self._white_effects()
         self.sensitivities_ = pd.Series(np.linalg.norm(white, axis=0), self.directions_.index)
         self.indistinguishable_ = alike(white, self.directions_.index)
@@ -239,7 +240,7 @@ class DirectionalDetector(MahalanobisDetector):
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
 
     def pod(self, severities: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
-        """Probability of detection of single records, by drawing normal ones from the learned covariance.
+        """Probability of detection of single records: of those of the baseline, with its gaps, moved by a loss.
 
         Parameters
         ----------
@@ -264,8 +265,7 @@ class DirectionalDetector(MahalanobisDetector):
         if not ((amounts >= 0) & (amounts <= self._largest)).all():
             expected = "losses from 0 to 1" if self._largest == 1 else "amounts that are not negative"
             raise ValueError(f"severities is {severities!r:.200}; expected {expected}")
-        white = self._white_effects()
-        rates = {name: self._rates(white, n, amounts) for name, n in self._directions_of(kind).items()}
+        rates = {name: self._rates(n, amounts) for name, n in self._directions_of(kind).items()}
         return pd.DataFrame(rates, pd.Index(amounts, name="severity"))
 
     def minimum_detectable_damage(
@@ -287,13 +287,13 @@ class DirectionalDetector(MahalanobisDetector):
             in the unit of the given directions.
         """
         check_is_fitted(self)
-        level, white = check_probability(level, "level"), self._white_effects()
-        lengths, found = np.linalg.norm(white, axis=0), {}
+        level, found = check_probability(level, "level"), {}
+        lengths = self.sensitivities_.to_numpy()
         threshold = self.threshold_ / (self.section_scale_ or 1.0 if kind == "section" else 1.0)
         for name, direction in self._directions_of(kind).items():
-            # five standard deviations above the threshold, every record is found
-            highest = min((threshold + 5) / max(lengths[direction], np.finfo(float).tiny), self._largest)
-            found[name] = smallest_amount(lambda sizes, k=direction: self._rates(white, k, sizes), highest, level)
+            # a complete record is found five standard deviations above the threshold, one with gaps later
+            highest = min(4 * (threshold + 5) / max(lengths[direction], np.finfo(float).tiny), self._largest)
+            found[name] = smallest_amount(lambda sizes, k=direction: self._rates(k, sizes), highest, level)
         return pd.Series(found, dtype=float).rename_axis("direction")
 
     def _directions_of(self, kind: str) -> dict[str, int]:
@@ -313,15 +313,10 @@ class DirectionalDetector(MahalanobisDetector):
             )
         return chosen
 
-    def _rates(self, white: Array, direction: int, amounts: Array, n_draws: int = 2000) -> Array:
-        """Shares of normal records with each amount of a direction above the threshold."""
-        draws = np.random.RandomState(0).standard_normal((n_draws, len(white)))
-        moved = (draws + np.outer(amounts, white[:, direction])[:, np.newaxis]).reshape(-1, len(white))
-        tests = [np.linalg.norm(moved, axis=1)]
-        for own in (white[:, cone] for cone in self._cones):
-            tests.append(project_on_cones((own.T @ own)[np.newaxis], moved @ own, np.zeros(len(moved), dtype=int))[1])
-        above = self._joined(np.column_stack(tests)) > self.threshold_
-        return above.reshape(len(amounts), -1).mean(axis=1)
+    def _rates(self, direction: int, amounts: Array) -> Array:
+        """Shares of the records of the baseline that are above the threshold with each amount of a direction."""
+        change = self.directions_.to_numpy()[direction]
+        return np.array([(self._index(self._healthy + amount * change) > self.threshold_).mean() for amount in amounts])
 
     def _white_effects(self) -> Array:
         """Changes of whitened records by a unit of each direction, (n_modes, n_directions)."""
@@ -435,14 +430,12 @@ def rare_level(index: Array, rate: float, tail: float = 0.1) -> float:
     return float(np.sqrt(level + excess * np.log(tail / rate)))
 
 
-def smallest_amount(rates: Callable[[Array], Array], highest: float, level: float) -> float:
-    """The first of 21 amounts up to the highest that is found often enough, refined once; infinite if none is."""
+def smallest_amount(rates: Callable[[Array], Array], highest: float, level: float, n_halvings: int = 12) -> float:
+    """The smallest amount up to the highest that is found often enough, by bisection; infinite if none is."""
+    if rates(np.array([highest]))[0] < level:
+        return np.inf
     low, high = 0.0, highest
-    for _ in range(2):
-        amounts = np.linspace(low, high, 21)
-        reached = np.flatnonzero(rates(amounts) >= level)
-        if not len(reached):
-            return np.inf
-        last = max(reached[0], 1)
-        low, high = float(amounts[last - 1]), float(amounts[last])
+    for _ in range(n_halvings):
+        middle = (low + high) / 2
+        low, high = (low, middle) if rates(np.array([middle]))[0] >= level else (middle, high)
     return high

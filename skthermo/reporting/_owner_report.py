@@ -13,7 +13,7 @@ from skthermo._core.arrays import check_path, check_size
 from skthermo._core.files import write_when_complete
 from skthermo.fem import Structure
 from skthermo.reporting._monitor import Standing, monitor_facts
-from skthermo.reporting._page import check_templates, rendered
+from skthermo.reporting._page import check_templates, identified_facts, rendered
 
 if TYPE_CHECKING:  # jobs write the page on a monitor every night: studies and fleets are imported for their own pages
     from skthermo.monitoring import Fleet, Monitor
@@ -109,29 +109,26 @@ def owner_report(
     True
     """
     kind = _kind_of(subject)
-    given = {"identified": identified, "title": title, "structure": structure, "detector": detector, "now": now}
-    _check_arguments(kind, given)
-    file = _checked_file(path)
-    if kind != "DetectabilityStudy":
-        limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
-    folder = check_templates(templates)
+    _check_arguments(kind, identified=identified, title=title, structure=structure, detector=detector, now=now)
+    file, folder = check_path(path), check_templates(templates)
+    if file.is_dir() or not file.parent.is_dir():
+        raise ValueError(f"path is {str(file)!r}; expected a file in a folder that exists, such as 'report.html'")
+    limit = check_size(drift_limit, "drift_limit", 0, 1, "a loss of stiffness between 0 and 1, such as 0.1")
+    check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
     if kind == "Fleet":
         from skthermo.reporting._fleet import write_fleet
 
-        check_size(fdr, "fdr", 0, 1, "a share of false ones between 0 and 1, such as 0.1")
         write_fleet(subject, file, title, now, limit, fdr, folder)
-    elif kind == "Monitor":
+        return file
+    if kind == "Monitor":
         facts = monitor_facts(Standing.at(subject, now, limit), structure)
-        if identified is not None:
-            from skthermo.reporting._drawings import identified_facts
-
-            facts["identified"] = identified_facts(identified)
-        write_when_complete(file, rendered("monitor", facts | {"title": title}, folder))
+        facts["identified"] = None if identified is None else identified_facts(identified)
     else:
         from skthermo.reporting._study import study_facts
 
         facts = study_facts(subject, identified, structure, detector, max_false_alarms)
-        write_when_complete(file, rendered("study", facts | {"title": title}, folder))
+    page = "monitor" if kind == "Monitor" else "study"
+    write_when_complete(file, rendered(page, facts | {"title": title}, folder))
     return file
 
 
@@ -141,16 +138,15 @@ def _kind_of(subject: object) -> str:
     kind = next((kind for kind, name in attributes.items() if hasattr(subject, name)), None)
     if kind is None:
         raise ValueError(f"subject is {subject!r:.200}; expected a DetectabilityStudy, a Monitor or a Fleet")
-    if kind == "Monitor" and not hasattr(subject, "events_"):
-        raise NotFittedError("the monitor is not fitted yet; expected a call of fit before")
-    if kind == "DetectabilityStudy" and not hasattr(subject, "results_"):
-        raise NotFittedError("the study has no results yet; expected a call of run before")
+    for of_kind, needed, call in (("Monitor", "events_", "fit"), ("DetectabilityStudy", "results_", "run")):
+        if kind == of_kind and not hasattr(subject, needed):
+            raise NotFittedError(f"the {kind} has no {needed} yet; expected a call of {call} before")
     return kind
 
 
-def _check_arguments(kind: str, given: dict[str, Any]) -> None:
+def _check_arguments(kind: str, **given: Any) -> None:
     """Raise an error for arguments of another type, or that are not for this subject."""
-    types = {"title": str, "structure": Structure}
+    types: dict[str, type] = {"title": str, "structure": Structure}
     if given["identified"] is not None:
         from skthermo.studies import IdentifiedDamage
 
@@ -158,23 +154,7 @@ def _check_arguments(kind: str, given: dict[str, Any]) -> None:
     for name, expected in types.items():
         if given[name] is not None and not isinstance(given[name], expected):
             raise ValueError(f"{name} is {given[name]!r:.200}; expected a {expected.__name__}")
-    only_for = {
-        "identified": ("DetectabilityStudy", "Monitor"),
-        "structure": ("DetectabilityStudy", "Monitor"),
-        "detector": ("DetectabilityStudy",),
-        "now": ("Monitor", "Fleet"),
-    }
-    for name, kinds in only_for.items():
-        if given[name] is not None and kind not in kinds:
-            raise ValueError(f"{name} given for a {kind}; expected only for a {' or a '.join(kinds)}")
-
-
-def _checked_file(path: str | os.PathLike[str]) -> Path:
-    file = check_path(path)
-    if not file.parent.is_dir():
-        raise ValueError(
-            f"path is {str(file)!r}, and there is no folder {str(file.parent)!r}; expected one that exists"
-        )
-    if file.is_dir():
-        raise ValueError(f"path is {str(file)!r}, a folder; expected a file, such as {str(file / 'report.html')!r}")
-    return file
+    of_fleets = ("identified", "structure", "detector")
+    for name in {"Fleet": of_fleets, "Monitor": ("detector",), "DetectabilityStudy": ("now",)}[kind]:
+        if given[name] is not None:
+            raise ValueError(f"{name} given for a {kind}; expected it for other subjects only")

@@ -1,61 +1,53 @@
-"""Pages from templates, the package's own or changed ones in a folder; their HTML, settings and versions."""
+"""What pages are made of: templates, the package's own or changed ones in a folder, tables, and drawings as SVG whose
+values can be read under the pointer, and as CSV."""
 
 from __future__ import annotations
 
 import os
 import platform
 import re
+import textwrap
 import traceback
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import lru_cache, partial
 from hashlib import sha256
-from html import escape
-from importlib import import_module
+from importlib import metadata
 from importlib.resources import files
-from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, TypeAlias
+from inspect import isfunction
+from io import BytesIO
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
+import skthermo
 from skthermo._core import text
 from skthermo._core.arrays import check_path
 from skthermo._core.estimators import import_optional
 from skthermo._core.frames import midnight
+from skthermo._core.text import printable
+from skthermo._core.warnings import collected
+from skthermo.fem import Structure
+from skthermo.plotting import DetectorsDisplay, StructureDisplay
 
 if TYPE_CHECKING:
     from datetime import datetime
 
     from jinja2 import Environment
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from skthermo.studies import IdentifiedDamage
 
 Row: TypeAlias = dict[str, Any]
 
 
-class Html(str):
-    """Text that is HTML already; any other text is escaped when it becomes part of an element."""
-
-    __slots__ = ()
-
-    def __html__(self) -> Html:
-        """By which templates know it."""
-        return self
-
-
-def element(tag: str, *content: object, **attributes: object) -> Html:
-    """An element with its content; an underscore at the end of an attribute's name is left out, others are hyphens."""
-    named = "".join(f' {name.rstrip("_").replace("_", "-")}="{_escaped(one)}"' for name, one in attributes.items())
-    inner = "".join(_escaped(part) for part in content)
-    return Html(f"<{tag}{named}>" if tag in ("img", "input") else f"<{tag}{named}>{inner}</{tag}>")
-
-
-def _escaped(value: object) -> str:
-    return str(value) if hasattr(value, "__html__") else escape(text.printable(value))
-
-
 STYLE, SCRIPT = (
-    Html("\n" + files("skthermo.reporting").joinpath(name).read_text(encoding="utf-8"))
-    for name in ("page.css", "page.js")
+    "\n" + files("skthermo.reporting").joinpath(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
 )
 POLICY = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
@@ -93,8 +85,6 @@ def check_templates(folder: str | os.PathLike[str] | None) -> str:
         return ""
     path = check_path(folder, "templates")
     known = sorted(one.name for one in files("skthermo.reporting").joinpath("templates").iterdir())
-    if not path.is_dir():
-        raise ValueError(f"templates is {str(path)!r}, and there is no such folder; expected one with {known[0]!r}")
     if not any((path / name).is_file() for name in known):
         raise ValueError(f"templates is {str(path)!r}; expected a folder with one of {', '.join(known)}")
     return str(path.resolve())
@@ -114,14 +104,11 @@ def environment_of(folder: str = "") -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals |= {"policy": POLICY, "style": STYLE, "script": SCRIPT}
+    environment.globals |= {"policy": POLICY, "style": STYLE, "script": SCRIPT, "versions": versions}
     environment.tests["finite"] = np.isfinite
-    filters = [
-        *(text.bounds_text, text.capital, text.chance_text, text.counted, text.counted_number, text.duration_text),
-        *(text.listed, text.percent, text.period_text, text.probability_text, text.share_text, text.significant),
-        *(moment, day, rows_of, sections_of),
-    ]
-    environment.filters |= {one.__name__: one for one in filters} | {"grouped": "{:,}".format}
+    environment.filters |= {name: one for name, one in vars(text).items() if isfunction(one)}
+    environment.filters |= {"moment": moment, "rows_of": rows_of, "sections_of": sections_of}
+    environment.filters |= {"grouped": "{:,}".format, "day": partial(moment, is_short=True)}
     return environment
 
 
@@ -134,10 +121,9 @@ def rows_of(table: pd.DataFrame) -> list[Row]:
     ]
 
 
-def sections_of(page: str) -> list[tuple[str, Html]]:
-    """Anchors and headings of the sections of a page."""
-    found = re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
-    return [(anchor, Html(title)) for anchor, title in found]
+def sections_of(page: str) -> list[tuple[str, str]]:
+    """Anchors and headings of the sections of a page, as HTML."""
+    return re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
 
 
 def moment(time: str | datetime | None, *, is_short: bool = False) -> str:
@@ -145,21 +131,15 @@ def moment(time: str | datetime | None, *, is_short: bool = False) -> str:
     if pd.isna(time):
         return ""
     stamp = pd.Timestamp(time)
-    month = stamp.month_name()[: 3 if is_short else None]
-    day = text.SPACE.join([str(stamp.day), month, str(stamp.year)])
+    day = f"{stamp.day} {stamp.month_name()[: 3 if is_short else None]} {stamp.year}".replace(" ", text.SPACE)
     return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"
-
-
-def day(time: str | datetime | None) -> str:
-    """A time as text with the month's name cut to three letters."""
-    return moment(time, is_short=True)
 
 
 def _printable(value: Any) -> Any:
     """What a template writes: nothing for None, and text without control characters."""
     if value is None:
         return ""
-    return value if hasattr(value, "__html__") else text.printable(value)
+    return value if hasattr(value, "__html__") else printable(value)
 
 
 def _place(error: Exception, folder: str = "") -> str:
@@ -171,19 +151,153 @@ def _place(error: Exception, folder: str = "") -> str:
 
 def versions() -> list[tuple[str, str]]:
     """Versions of the programs by name."""
-    packages = {name: name for name in ("skthermo", "numpy", "scipy", "pandas")}
-    packages |= {"sklearn": "scikit-learn", "matplotlib": "matplotlib"}
-    installed = {name: shown for name, shown in packages.items() if find_spec(name) is not None}
-    found = [(shown, str(import_module(name).__version__)) for name, shown in installed.items()]
-    return [("Python", platform.python_version()), *found]
+    found = {"Python": platform.python_version(), "skthermo": skthermo.__version__}
+    for name in ("numpy", "scipy", "pandas", "scikit-learn", "matplotlib"):
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return list(found.items())
 
 
 def settings_of(estimators: Mapping[str, object], but: Sequence[str] = ()) -> list[tuple[str, str]]:
     """Parameters of estimators as short text, by the name of their part; of what has none, nothing."""
-    rows = []
-    for part, estimator in estimators.items():
-        found = estimator.get_params(deep=False) if hasattr(estimator, "get_params") else {}
-        for name, value in found.items():
-            shown, label = " ".join(repr(value).split()), f"{part}: {name}"
-            rows += [] if label in but else [(label, shown if len(shown) <= 400 else f"{shown[:400]} ...")]
-    return rows
+    rows = [
+        (f"{part}: {name}", " ".join(repr(value).split()))
+        for part, estimator in estimators.items()
+        if hasattr(estimator, "get_params")
+        for name, value in estimator.get_params(deep=False).items()
+    ]
+    return [(name, shown if len(shown) <= 400 else f"{shown[:400]} ...") for name, shown in rows if name not in but]
+
+
+class Drawing(NamedTuple):
+    """A picture, what it shows in words, and the table behind it, as addresses of data.
+
+    ``x`` and ``y`` are places of the rows in thousandths of the picture's width and height, from the top left corner.
+    Without a table ``csv`` is empty, without matplotlib ``source`` is.
+    """
+
+    alt: str
+    source: str = ""
+    name: str = ""
+    csv: str = ""
+    n_rows: int = 0
+    x: str = ""
+    y: str = ""
+
+
+def csv_address(table: pd.DataFrame) -> str:
+    """A table as CSV, within an address."""
+    index = table.index
+    if isinstance(index, pd.DatetimeIndex):
+        times = index.tz_localize(None)
+        index = times.strftime("%Y-%m-%d %H:%M" if (times != times.normalize()).any() else "%Y-%m-%d")
+    elif not is_numeric_dtype(index):
+        index = index.map(printable)
+    shown = table.rename(columns=printable).set_axis(index)
+    label = printable(table.index.name or "record")
+    content = shown.to_csv(float_format="%.6g", index_label=label, lineterminator="\n")
+    return f"data:text/csv;charset=utf-8,{quote(content, safe=',:;+/')}"
+
+
+def draw(
+    make: Callable[..., Any],
+    alt: str,
+    title: str = "",
+    *,
+    height: float | None = 2.8,
+    width: float = 4.2,
+    name: str = "",
+    table: pd.DataFrame | None = None,
+    is_scatter: bool = False,
+    legend: str | None = "outside upper center",
+) -> Drawing:
+    """A display as an image of fixed width, in matplotlib's own style and on white; its values can be read.
+
+    Width and height are in inches, so that a telephone shows it at nearly full size; without a height, the drawing
+    keeps its proportions, with room for a legend. The index of the table is in the unit of the horizontal axis; in a
+    scatter plot, a row is a point of its first column. Without matplotlib, what the image shows is said, and its values
+    can be saved.
+    """
+    drawn = Drawing(alt)
+    if table is not None:
+        drawn = drawn._replace(name=name, csv=csv_address(table), n_rows=len(table))
+    try:
+        plt = import_optional("matplotlib.pyplot", extra="plot")
+    except ImportError:
+        return drawn
+    others = set(plt.get_fignums())
+    settings = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
+    try:
+        with plt.style.context("default"), plt.rc_context(settings):
+            figure = make().figure_
+            own_width, own_height = figure.get_size_inches()
+            figure.set_size_inches(width, own_height / own_width * width + 0.5 if height is None else height)
+            _fold_legend(figure, legend)
+            if title:
+                shown = textwrap.shorten(printable(title), 50, placeholder=" ...")
+                figure.axes[0].set_title(shown, fontsize="medium", parse_math=False)
+            drawn = drawn._replace(source=f"data:image/svg+xml;base64,{b64encode(_svg(figure)).decode()}")
+            return drawn if table is None else drawn._replace(**_places(figure.axes[0], table, is_scatter))
+    finally:
+        for number in set(plt.get_fignums()) - others:
+            plt.close(number)
+
+
+def _fold_legend(figure: Figure, place: str | None) -> None:
+    """Put the legends of a figure into one place and at most two columns, so that they fit a narrow drawing."""
+    for one in [*figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]:
+        labels = [text.get_text() for text in one.get_texts()]
+        one.remove()
+        is_wide = max(map(len, labels)) > 28  # letters, of which two labels fit beside each other
+        style = {"ncols": 1 if is_wide else 2, "frameon": False, "fontsize": "small" if is_wide else "medium"}
+        if place is not None:
+            figure.legend(one.legend_handles, labels, loc=place, **style)
+
+
+def _svg(figure: Figure) -> bytes:
+    """A figure as SVG: letters as shapes or, if the font lacks some, as text in fonts of the reader."""
+    fonts, texts = (import_optional(f"matplotlib.{name}", extra="plot") for name in ("font_manager", "text"))
+    for line in figure.findobj(lambda artist: hasattr(artist, "get_xdata")):
+        line.set_rasterized(len(line.get_xdata()) > 1000)  # as an image, which is smaller
+    letters = {ord(letter) for one in figure.findobj(texts.Text) for letter in one.get_text() if letter.isprintable()}
+    has_all = letters <= set(fonts.get_font(fonts.findfont(fonts.FontProperties())).get_charmap())
+    drawn = BytesIO()
+    plt = import_optional("matplotlib.pyplot", extra="plot")
+    with plt.rc_context({"svg.fonttype": "path" if has_all else "none"}), collected(drop_others=True):
+        figure.savefig(drawn, format="svg", metadata={"Date": None})
+    return drawn.getvalue()
+
+
+def _places(ax: Axes, table: pd.DataFrame, is_scatter: bool) -> dict[str, str]:
+    """Where the rows of a table are drawn."""
+    index = table.index.tz_localize(None) if isinstance(table.index, pd.DatetimeIndex) else table.index
+    is_placed = isinstance(index, pd.DatetimeIndex) or is_numeric_dtype(index)
+    across = ax.convert_xunits(np.asarray(index if is_placed else range(len(index))))
+    up = table.iloc[:, 0].to_numpy(dtype=float) if is_scatter else np.zeros(len(table))
+    pixels = ax.transData.transform(np.column_stack([across, up]))
+    x, y = 1000 * ax.figure.transFigure.inverted().transform(pixels).T
+    shares = {"x": x, "y": np.clip(1000 - y, 0, 1000)} if is_scatter else {"x": x}
+    return {name: " ".join(f"{share:.0f}" for share in places) for name, places in shares.items()}
+
+
+def draw_structure(
+    structure: Structure, alt: str, groups: Sequence[str] | None = None, losses: Mapping[str, float] | None = None
+) -> Drawing:
+    """Where damage groups are, or the smallest loss of stiffness of each member's group that raises an alarm."""
+    values = None if losses is None else {name: 100 * loss for name, loss in losses.items()}
+    make = partial(StructureDisplay.from_structure, structure, values, groups=groups, label="smallest loss (%)")
+    return draw(make, alt, height=None, width=5.2 if losses is None else 6.2, legend="outside lower center")
+
+
+def identified_facts(identified: IdentifiedDamage) -> dict[str, Any]:
+    """What the template of the section on identified damage is given: probabilities and severities are drawn one below
+    the other."""
+    height = 2.6 + 0.6 * len(identified.table)
+
+    def make() -> DetectorsDisplay:
+        plt = import_optional("matplotlib.pyplot", extra="plot")
+        axes = plt.subplots(2, 1, figsize=(4.2, height), layout="constrained")[1]
+        return DetectorsDisplay.from_predictions(identified.table, ax=axes)
+
+    saved = Drawing("", name="identified damage", csv=csv_address(identified.table.rename_axis("group")))
+    return {"found": identified, "draw": partial(draw, make, height=height), "saved": saved}

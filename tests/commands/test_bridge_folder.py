@@ -356,7 +356,7 @@ def test_an_fe_model_of_a_python_file_follows_drift_and_is_drawn(bridge, records
 def test_the_page_is_written_from_the_templates_that_the_settings_name(bridge, monkeypatch):
     pytest.importorskip("jinja2")
     monkeypatch.undo()  # of the short page
-    monkeypatch.setattr("skthermo.reporting._drawings._svg", lambda figure: b"<svg/>")
+    monkeypatch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
     text = settings(bridge).read_text().replace("# [page]", "[page]").replace("# templates = ", "templates = ")
     settings(bridge).write_text(text)
     failed = run("report", settings(bridge))

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo.commands._new_records import check_layout, read_baseline, read_columns
+from skthermo.commands._bridge import check_layout, read_baseline, read_columns
 from skthermo.commands._settings import read_settings
 from skthermo.preprocessing import read_records
 from tests.commands.folders import run

@@ -262,3 +262,23 @@ def test_losses_that_explain_records_are_those_that_have_moved_them():
         assert single.predict(nothing).tolist() == [0] * 7
     assert np.isnan(single.explained(nothing)).all()
     assert single.severities(nothing).isna().all(axis=None)
+
+
+@pytest.mark.filterwarnings("ignore:.*(few-records|not-evaluated)")  # of a winter, records count as few
+@pytest.mark.parametrize("kind", ["gaps", "winter", "tails"])
+def test_smallest_changes_hold_with_the_gaps_and_the_scatter_of_the_baseline(kind):
+    def records(n, seed):
+        random = np.random.default_rng(seed)
+        rows = 0.01 * (random.standard_t(4, (n, 4)) if kind == "tails" else random.standard_normal((n, 4)))
+        if kind == "winter":
+            rows[: n // 3] *= 3
+        return np.where(random.random(rows.shape) < 0.3, np.nan, rows) if kind == "gaps" else rows
+
+    found, directions = [], -0.3 - np.eye(4)
+    for seed in range(3):
+        detector = DirectionalDetector(directions).fit(records(1000, seed))
+        smallest, later = detector.minimum_detectable_damage(0.9), records(4000, 100 + seed)
+        for direction, size in zip(directions, smallest, strict=True):
+            decisions = detector.predict(later + size * direction)
+            found.append((decisions[~np.isnan(later).all(axis=1)] == -1).mean())
+    assert np.mean(found) == pytest.approx(0.9, abs=0.02)

@@ -52,10 +52,9 @@ def test_given_axes_are_used(later):
         assert list(display.axes_) == list(axes.ravel())
         assert display.figure_ is figure
     assert plt.get_fignums() == [figure.number]
-    with pytest.raises(ValueError, match="ax holds 2 axes; expected 6"):
-        PredictionDisplay.from_predictions(*tables, ax=axes[0, :2])
-    with pytest.raises(ValueError, match="ax is 'here'; expected matplotlib's axes"):
-        PredictionDisplay.from_predictions(*tables, ax="here")
+    for wrong in (axes[0, :2], "here"):
+        with pytest.raises(ValueError, match="expected 6 of matplotlib's axes"):
+            PredictionDisplay.from_predictions(*tables, ax=wrong)
 
 
 def test_histories_of_estimated_and_predicted_parameters(fem, year):

@@ -60,7 +60,7 @@ def page_text(subject, *, is_drawn=False, **options):
     """The page on a subject; drawings are blank unless they are wanted."""
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         if not is_drawn:
-            patch.setattr("skthermo.reporting._drawings._svg", lambda figure: b"<svg/>")
+            patch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
         return owner_report(subject, Path(folder) / "page.html", **options).read_text(encoding="utf-8")
 
 

@@ -52,7 +52,7 @@ def test_the_first_of_the_ranking_is_recommended_and_reported(study, tmp_path):
     other = page_of(study, tmp_path, max_false_alarms=0.1, detector=LOUD)
     assert f"This report is on \N{LEFT DOUBLE QUOTATION MARK}{LOUD}" in other.text
     false_alarms = study.results_.set_index(["detector", "scenario"]).loc[(LOUD, "healthy"), "rate"]
-    said = re.search(r"Of the records of the healthy structure, ([\d.]+)\xa0% raise an alarm", other.text)
+    said = re.search(r"Of the records of the healthy structure \(healthy\), ([\d.]+)\xa0% raise an alarm", other.text)
     assert float(said[1]) == pytest.approx(100 * false_alarms, rel=0.05)
 
 

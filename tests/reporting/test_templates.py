@@ -20,7 +20,7 @@ GERMAN = Path(__file__).parent / "german"
 
 @pytest.fixture(autouse=True)
 def blank_drawings(monkeypatch):
-    monkeypatch.setattr("skthermo.reporting._drawings._svg", lambda figure: b"<svg/>")
+    monkeypatch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
 
 
 @pytest.fixture
@@ -131,7 +131,7 @@ def test_errors_name_the_file_and_the_line(write, tmp_path, text, line, message)
 
 def test_folders_without_a_template_are_refused(tmp_path):
     for folder, message in (
-        (tmp_path / "none", "no such folder"),
+        (tmp_path / "none", "expected a folder with one of bridge"),
         (tmp_path, "expected a folder with one of bridge"),
         (3, "is 3"),
     ):

@@ -1,42 +1,215 @@
-"""Bars with errors: detectors beside each other, causes of a shift of frequencies, smallest changes."""
+"""Results of studies: curves of the probability of detection, and bars with errors."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import TYPE_CHECKING, Literal
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
-from skthermo._core.arrays import Array, check_names
+import skthermo.plotting._display as shared
+from skthermo._core.arrays import check_names
 from skthermo._core.text import chance_text, percent, printable, share_text
-from skthermo.plotting._display import (
-    BLACK,
-    BLUE,
-    GREY,
-    LETTER,
-    ORANGE,
-    Display,
-    check_study,
-    figure_legend,
-    label_of,
-    panels,
-    plain,
-    shortened,
-)
+from skthermo.plotting._display import BLACK, BLUE, COLOURS, GREY, LINES, MARKERS, ORANGE, Display
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import PathCollection
     from matplotlib.container import BarContainer
 
-    from skthermo.studies import DetectabilityStudy
-
-BEST, ONE_REPEAT = "not significantly worse", "order uncertain: one repeat"
-WORSE, BROKEN = "significantly lower POD", "failed"
+    from skthermo.studies import DetectabilityStudy, PODCurve
 
 RATES = ["low", "high", "value", "mark"]
+BLANK = ("", "", "", "")
+
+
+@dataclass(eq=False, repr=False)
+class PODCurveDisplay(Display):
+    """Probability of detection over severity: observed shares, fitted curve and its confidence bounds.
+
+    It is best made by `from_estimator` or `from_predictions`. Several curves can be drawn into the same axes; each gets
+    its own colour, marker and dashes.
+
+    Parameters
+    ----------
+    curve : PODCurve
+        With the attributes ``severities``, ``n_detected``, ``n_records``, ``a90`` and ``a90_95`` and the method
+        ``predict(severity)``, which returns the probability of detection and its lowest and highest values.
+    label : str, optional
+        Legend of the curve.
+
+    Attributes
+    ----------
+    axes_, ax_, figure_ : array of matplotlib's Axes, the first of them, and Figure
+        Where it is drawn.
+    line_ : Line2D
+        The curve.
+    band_ : PolyCollection
+        Its bounds.
+    replicates_ : PolyCollection or None
+        The band in which the curve of a measured campaign should lie, ``curve.prediction_interval(severity)``, where
+        the study has replicates: paler, with dashed edges.
+    errorbar_ : ErrorbarContainer
+        Observed shares with Wilson's intervals of 95 %, which hold for independent records.
+    marks_ : dict of str to artist
+        Lines at ``"a90"`` and ``"a90_95"`` where they are finite; or, where the records determine no curve, the
+        ``"bracket"`` of the curve, between whose severities a90 lies.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> import numpy as np
+    >>> from scipy.special import expit
+    >>> from skthermo.plotting import PODCurveDisplay
+    >>> class Curve:
+    ...     severities, n_detected, n_records = np.array([0.1, 0.2, 0.3]), np.array([10, 50, 95]), 100
+    ...     a90, a90_95 = 0.28, 0.30
+    ...     def predict(self, severity):
+    ...         return tuple(expit(25 * (np.asarray(severity) - middle)) for middle in (0.19, 0.21, 0.17))
+    >>> display = PODCurveDisplay.from_predictions(Curve(), label="bottom")
+    >>> display.ax_.get_xlabel(), display.ax_.get_ylabel(), sorted(display.marks_)
+    ('severity: loss of stiffness (%)', 'probability of detection (%)', ['a90', 'a90_95'])
+    >>> plt.close(display.figure_)
+    """
+
+    curve: PODCurve
+    _: KW_ONLY
+    label: str | None = None
+
+    @classmethod
+    def from_estimator(
+        cls,
+        study: DetectabilityStudy,
+        family: str,
+        *,
+        detector: str | None = None,
+        source: str = "simulated",
+        label: str | None = None,
+        **options: object,
+    ) -> PODCurveDisplay:
+        """Draw the curve of one family of scenarios of a study.
+
+        Parameters
+        ----------
+        study : DetectabilityStudy
+            With results.
+        family : str
+            Of the scenarios.
+        detector : str, optional
+            Name of the detector, where there are several; draw one after the other into the same axes to compare them.
+        source : str, default="simulated"
+            "simulated" or "reference".
+        label : str, optional
+            Legend of the curve; by default the name of the detector, or the family where none is named.
+        **options : dict
+            Options of `plot`.
+
+        Returns
+        -------
+        PODCurveDisplay
+
+        Raises
+        ------
+        NotFittedError
+            If the study has no results.
+        ValueError
+            If there is no such family or detector, several detectors and none is named, or the curve cannot be fitted.
+
+        Warns
+        -----
+        UserWarning
+            If the curve has no finite slope, or lies outside the bounds of some tested severities.
+        """
+        curve = study.pod_curve(family, source, detector=detector)
+        return cls.from_predictions(curve, label=label or detector or family, **options)
+
+    @classmethod
+    def from_predictions(cls, curve: PODCurve, **options: object) -> PODCurveDisplay:
+        """Draw a curve.
+
+        Parameters
+        ----------
+        curve : PODCurve
+            As in `PODCurveDisplay`.
+        **options : dict
+            ``label`` of the display, and options of `plot`.
+
+        Returns
+        -------
+        PODCurveDisplay
+        """
+        return cls._drawn(curve, **options)
+
+    def plot(self, ax: Axes | None = None, *, marks: bool = True) -> PODCurveDisplay:
+        """Draw into axes.
+
+        Parameters
+        ----------
+        ax : matplotlib's Axes, optional
+            Those of another curve, for example. A new figure by default.
+        marks : bool, default=True
+            Whether the severities that are detected with a probability of 90 %, and so with a confidence of 95 %, are
+            marked.
+
+        Returns
+        -------
+        PODCurveDisplay
+            Itself.
+        """
+        self.axes_ = shared.panels(ax, ["one display"], (6.5, 4.2))
+        ax, curve = self.ax_, self.curve
+        number = sum(line.get_gid() == "POD" for line in ax.lines)
+        marker, line, colour = (styles[number % len(styles)] for styles in (MARKERS, LINES, COLOURS))
+        severities, n_detected, n_records = np.broadcast_arrays(
+            *(np.asarray(values, dtype=float) for values in (curve.severities, curve.n_detected, curve.n_records))
+        )
+        share = n_detected / n_records
+        tests = (binomtest(int(k), int(n)) for k, n in zip(n_detected, n_records, strict=True))
+        errors = 100 * np.abs(np.transpose([test.proportion_ci(method="wilson") for test in tests]) - share)
+        label = None if number else "tested, with 95 % interval"
+        style = {"linestyle": "", "markersize": 5, "capsize": 2, "elinewidth": 0.8, "color": colour, "label": label}
+        self.errorbar_ = ax.errorbar(100 * severities, 100 * share, errors, marker=marker, **style)
+        drawn = np.linspace(severities.min(), severities.max(), 200)
+        pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in curve.predict(drawn))
+        style = {"color": colour, "linestyle": line, "label": shared.shortened(self.label or "fitted curve")}
+        self.line_ = ax.plot(100 * drawn, pod, gid="POD", **style)[0]
+        label = None if number else f"its {100 * getattr(curve, 'confidence', 0.95):g} % interval"
+        style = {"color": colour, "alpha": 0.15, "linewidth": 0, "label": label}
+        self.band_ = ax.fill_between(100 * drawn, lowest, highest, **style)
+        self.replicates_ = None
+        if getattr(curve, "replicates", ()):
+            ends = (100 * np.asarray(values) for values in curve.prediction_interval(drawn))
+            style = {"color": colour, "alpha": 0.12, "linestyle": "--", "linewidth": 0.8, "zorder": 0}
+            label = "prediction interval of one campaign"
+            self.replicates_ = ax.fill_between(100 * drawn, *ends, label=label, **style)
+        self.marks_ = self._draw_marks(colour) if marks else {}
+        ax.set(xlabel="severity: loss of stiffness (%)", ylabel="probability of detection (%)", ylim=(-3, 103))
+        ax.legend(framealpha=0.8, edgecolor="none", fontsize="small", loc="best")
+        return self
+
+    def _draw_marks(self, colour: str) -> dict[str, Artist]:
+        """Vertical lines from the axis up to 90 %, or the bracket of a curve that the records do not determine."""
+        drawn: dict[str, Any] = {}
+        for name, text, dashes in (("a90", "$a_{90}$", ":"), ("a90_95", "$a_{90/95}$", "-.")):
+            value = getattr(self.curve, name)
+            if value is not None and np.isfinite(value):
+                style = {"color": colour, "linestyle": dashes, "linewidth": 1, "label": f"{text} = {100 * value:.1f} %"}
+                drawn[name] = self.ax_.plot([100 * value] * 2, [-3, 90], **style)[0]
+        sign = np.sign(np.asarray(self.curve.severities)[-1])
+        low, high = 100 * sign * np.array(getattr(self.curve, "bracket", (np.nan, np.nan)), dtype=float)
+        if drawn:
+            self.ax_.axhline(90, color=GREY, linewidth=0.6, linestyle=":")
+        elif np.isnan(self.curve.a90) and np.isfinite([low, high]).all():
+            label = f"$a_{{90}}$ between {min(low, high):.1f} and {max(low, high):.1f} %"
+            drawn["bracket"] = self.ax_.axvspan(low, high, facecolor=colour, alpha=0.15, hatch="//", label=label)
+        elif np.isnan(self.curve.a90) and np.isfinite(low):
+            drawn["bracket"] = self.ax_.plot([], [], " ", label=f"$a_{{90}}$ beyond {low:.1f} %")[0]
+        return drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +306,6 @@ class DetectorsDisplay(Display):
         *,
         max_false_alarms: float = 0.02,
         source: str = "simulated",
-        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         **options: object,
     ) -> DetectorsDisplay:
         """Draw the ranking of the detectors of a study, or its simulated rates beside measured ones.
@@ -148,8 +320,6 @@ class DetectorsDisplay(Display):
             Limit of the share of false alarms in a ranking.
         source : str, default="simulated"
             Records of a ranking: "simulated" or "reference".
-        by : {"pod", "pod_at_equal_pfa"}, default="pod"
-            What a ranking compares: detectors as they are, or with thresholds moved to equal false alarms.
         **options : dict
             Options of `from_predictions` and of `plot`.
 
@@ -164,13 +334,12 @@ class DetectorsDisplay(Display):
         ValueError
             If ``what`` is something else, or the study has no healthy scenario to rank by, or no measured records.
         """
-        check_study(study)
         if what not in ("ranking", "agreement"):
             raise ValueError(f"what is {what!r}; expected 'ranking' or 'agreement'")
         if what == "agreement":
             return cls.from_predictions(study.results_, **options)
-        ranking = study.ranking(max_false_alarms, source, by=by)
-        return cls.from_predictions(ranking, max_false_alarms=max_false_alarms, by=by, **options)
+        ranking = study.ranking(max_false_alarms, source)
+        return cls.from_predictions(ranking, max_false_alarms=max_false_alarms, **options)
 
     @classmethod
     def from_predictions(
@@ -178,7 +347,6 @@ class DetectorsDisplay(Display):
         table: pd.DataFrame,
         *,
         max_false_alarms: float = 0.02,
-        by: Literal["pod", "pod_at_equal_pfa"] = "pod",
         scenarios: Sequence[str] | None = None,
         groups: Mapping[str, str] | None = None,
         **options: object,
@@ -195,8 +363,6 @@ class DetectorsDisplay(Display):
             `~skthermo.detection.DirectionalDetector.minimum_detectable_damage` gives it.
         max_false_alarms : float, default=0.02
             Limit of the share of false alarms with which a ranking was made.
-        by : {"pod", "pod_at_equal_pfa"}, default="pod"
-            What was compared with the best in a ranking.
         scenarios : sequence of str, optional
             Scenarios of results that are drawn, in this order. By default all, false alarms first.
         groups : mapping of str to str, optional
@@ -216,29 +382,20 @@ class DetectorsDisplay(Display):
         """
         if isinstance(table, pd.Series) and len(table):
             return cls(**of_changes(table)).plot(**options)
-        columns = list(table.columns) if isinstance(table, pd.DataFrame) else []
-        identified = {
-            of_causes: {"probability", "severity", "ci_low", "ci_high"},
-            of_shifts: {"measured", "explained", "standard_error"},
-            of_explanations: {"probability"},
-        }
-        for made, needed in identified.items():
-            if columns and len(table) and needed <= set(columns) and "rate" not in columns:
-                return cls(**made(table)).plot(**options)
-        results = ["detector", "scenario", "source", "measure", "rate", "pi_low", "pi_high"]
-        bounded = [
-            f"{name}{end}" for name in ("false_alarms", "pod", "pod_deficit") for end in ("", "_ci_low", "_ci_high")
-        ]
-        ranking = [*bounded, "within_limit", "pod_at_equal_pfa", "significantly_worse"]
-        is_ranking = "within_limit" in columns
-        needed = ranking if is_ranking else results
-        missing = [name for name in needed if name not in columns]
-        if missing or not len(table):
-            got = f"lacks the columns {missing}" if columns and missing else f"is {table!r:.200}"
-            raise ValueError(f"table {got}; expected a ranking, or results with {results}, and one row or more")
-        if is_ranking:
-            return cls(**of_ranking(table, max_false_alarms, by)).plot(**options)
-        return cls(**of_results(table, scenarios, groups or {})).plot(**options)
+        columns = set(table.columns) if isinstance(table, pd.DataFrame) and len(table) else set()
+        bounded = {f"{name}{end}" for name in ("pod", "pod_deficit") for end in ("", "_ci_low", "_ci_high")}
+        known = (
+            (bounded | {"false_alarms", "within_limit"}, partial(of_ranking, limit=max_false_alarms)),
+            ({"detector", "scenario", "rate", "pi_low"}, partial(of_results, scenarios=scenarios, groups=groups or {})),
+            ({"probability", "severity", "ci_low", "ci_high"}, of_causes),
+            ({"measured", "explained", "standard_error"}, of_shifts),
+            ({"probability"}, of_explanations),
+        )
+        made = next((made for needed, made in known if needed <= columns), None)
+        if made is None:
+            got = f"has the columns {sorted(map(str, columns))}" if columns else f"is {table!r:.200}"
+            raise ValueError(f"table {got}; expected a ranking, results, identified damage, or smallest changes")
+        return cls(**made(table)).plot(**options)
 
     def plot(self, ax: Axes | np.ndarray | None = None) -> DetectorsDisplay:
         """Draw into axes.
@@ -254,38 +411,54 @@ class DetectorsDisplay(Display):
             Itself.
         """
         n_columns = min(2 if len(self.panels) == 4 else 3, len(self.panels))
-        n_letters = max(len(label_of(name)) for _, name in self.places if name is not None)
-        width = 3.6 if n_columns > 1 else 5.0
-        size = width + LETTER * n_letters / n_columns, max(0.26 * len(self.places) + 1.5, 2.4)  # inches
-        self.axes_ = panels(ax, list(self.panels), size, n_columns=n_columns)
+        n_letters = max(len(shared.label_of(name)) for _, name in self.places if name is not None)
+        width = (3.6 if n_columns > 1 else 5.0) + shared.LETTER * n_letters / n_columns
+        size = width, max(0.26 * len(self.places) + 1.5, 2.4)  # inches
+        self.axes_ = shared.panels(ax, list(self.panels), size, n_columns)
         self.bars_: dict[str, BarContainer] = {}
         self.values_: dict[str, PathCollection] = {}
         self.marks_: dict[str, list[PathCollection]] = {}
         for one, (name, panel) in zip(self.axes_, self.panels.items(), strict=True):
-            name_rows(one, self.places)
+            one.set_title(panel.title, fontsize="medium")
+            one.set_xlabel(panel.label)
+            self._name_rows(one)
             self._draw_rates(one, name, panel)
             self._write_notes(one, panel)
-        figure_legend(self.axes_, ax is None)
+        shared.legend(self.axes_, ax is None)
         return self
+
+    def _name_rows(self, ax: Axes) -> None:
+        """Names of the detectors left of the panels, headings of groups in bold type, and an empty frame."""
+        texts = [shared.label_of(group if name is None else name) for group, name in self.places]
+        ax.set_yticks(list(self.places.values()), texts)
+        for text, (_, name) in zip(ax.get_yticklabels(), self.places, strict=True):
+            text.set_fontweight("bold" if name is None else "normal")
+        ax.set_ylim(len(self.places) - 0.4, -0.6)
+        cell = ax.get_subplotspec()
+        ax.tick_params(axis="y", length=0, labelleft=cell is None or cell.is_first_col())
+        ax.spines[["top", "right", "left"]].set_visible(False)
+        ax.grid(axis="x", color="#DDDDDD", linewidth=0.6)
+        ax.set_axisbelow(True)
 
     def _draw_rates(self, ax: Axes, name: str, panel: RatesPanel) -> None:
         heights = {detector: height for (_, detector), height in self.places.items() if detector is not None}
         y = panel.rates.index.map(heights).to_numpy(dtype=float)
         low, high, value, mark = panel.rates[RATES].to_numpy(dtype=float).T
         colours = [self.colours[detector] for detector in panel.rates.index]
-        if panel.axis == "small":
-            small_rates(ax, np.append(np.r_[high, value, mark], panel.limit or 0.0))
+        if panel.axis == "small":  # a square-root scale spreads small rates
+            largest = float(np.clip(1.08 * np.nanmax([*high, *value, *mark, panel.limit or 0.0]), 2.0, 101.0))
+            ax.set_xscale("function", functions=(lambda x: np.sign(x) * np.sqrt(np.abs(x)), lambda x: x * np.abs(x)))
+            ax.set_xlim(-0.0004 * largest, largest)
+            ticks = [tick for tick in (0, 0.5, 2, 5, 10, 20, 40, 60, 80, 100) if tick <= largest]
+            ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         elif panel.axis == "shares":
             ax.set_xlim(-1, 101)
-        ax.set_title(panel.title, fontsize="medium")
-        ax.set_xlabel(panel.label)
         if panel.limit is not None:
             ax.axvline(panel.limit, color=BLACK, linestyle="--", linewidth=1, label="limit of the false-alarm rate")
-        bounds, mean, filled, empty = self.labels
-        has_bounds, has_values = (np.isfinite(one).any() for one in (high - low, value))
-        style = {"color": colours, "alpha": 0.35, "label": bounds if has_bounds else None}
-        self.bars_[name] = ax.barh(y, high - low, 0.62, low, **style)
-        label = mean if has_values else None
+        bounds, mean, filled, empty = (text or None for text in self.labels)
+        label = bounds if np.isfinite(high - low).any() else None
+        self.bars_[name] = ax.barh(y, high - low, 0.62, low, color=colours, alpha=0.35, label=label)
+        label = mean if np.isfinite(value).any() else None
         style = {"marker": "|", "s": 100, "linewidths": 2, "color": colours, "zorder": 3, "label": label}
         self.values_[name] = ax.scatter(value, y, **style)
         self.marks_[name] = []
@@ -297,45 +470,43 @@ class DetectorsDisplay(Display):
 
     def _write_notes(self, ax: Axes, panel: RatesPanel) -> None:
         """Small texts at that end of their rows where there is more room."""
+        left, right = ax.get_xlim()
         for (_, detector), height in self.places.items():
             text = printable(panel.notes.get(detector, ""))
-            if not text:
-                continue
-            text = text if len(text) <= 45 else f"{text[:45].rstrip()} ..."
-            is_right = False
-            if detector in panel.rates.index:
-                drawn, (left, right) = panel.rates.loc[detector, RATES].astype(float), ax.get_xlim()
-                is_right = bool(right - drawn.max() > drawn.min() - left)
+            drawn = panel.rates[RATES].astype(float).T.get(detector, pd.Series(np.inf))
+            is_right = bool(right - drawn.max() > drawn.min() - left)
             place = {"x": 0.99 if is_right else 0.01, "ha": "right" if is_right else "left"}
             style = {"fontsize": "x-small", "color": GREY, "va": "center", "clip_on": True, "in_layout": False}
-            ax.text(y=height, s=plain(text), transform=ax.get_yaxis_transform(), **place, **style)
+            text = shared.plain(text if len(text) <= 45 else f"{text[:45].rstrip()} ...")
+            if text:
+                ax.text(y=height, s=text, transform=ax.get_yaxis_transform(), **place, **style)
 
 
-def of_ranking(ranking: pd.DataFrame, limit: float, by: str) -> dict[str, object]:
-    """What a display of a ranking is made of."""
-    level = BEST if ranking["pod_deficit_ci_low"].notna().any() else ONE_REPEAT
-    loud = f"more than {percent(limit)} false alarms"
+def of_ranking(ranking: pd.DataFrame, limit: float) -> dict[str, object]:
+    """Contents of a display of a ranking."""
+    has_bounds = ranking["pod_deficit_ci_low"].notna().any()
+    level = "not significantly worse" if has_bounds else "order uncertain: one repeat"
+    worse, loud, broken = "significantly lower POD", f"more than {percent(limit)} false alarms", "failed"
     is_tested = np.isfinite(ranking["false_alarms"].astype(float))
-    kinds = ranking["significantly_worse"].astype(bool).map({True: WORSE, False: level})
-    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, BROKEN)
-    kinds = kinds.sort_values(key=lambda names: names.map([level, WORSE, loud, BROKEN].index), kind="stable")
+    kinds = ranking["significantly_worse"].astype(bool).map({True: worse, False: level})
+    kinds = kinds.where(ranking["within_limit"].astype(bool), loud).where(is_tested, broken)
+    kinds = kinds.sort_values(key=lambda names: names.map([level, worse, loud, broken].index), kind="stable")
     tested = ranking[is_tested]
 
-    def rates(name: str, mark: pd.Series | None = None) -> pd.DataFrame:
-        table = tested[[f"{name}_ci_low", f"{name}_ci_high", name]].set_axis(RATES[:3], axis=1)
-        return (100 * table.assign(mark=np.nan if mark is None else mark).astype(float)).assign(is_open=True)
+    def rates(name: str, mark: object = np.nan) -> pd.DataFrame:
+        ends = {side: tested.get(f"{name}_ci_{side}", np.nan) for side in ("low", "high")}
+        return in_percent(tested.index, is_open=True, value=tested[name], mark=mark, **ends)
 
     errors = ranking.loc[~is_tested, "error"].to_dict() if "error" in ranking else {}
     unknown = tested.get("not_evaluated", pd.Series(dtype=float))
     notes = {name: f"{share_text(share)} not evaluated" for name, share in unknown.items() if share > 0}
-    label = f"{'at their own thresholds' if by == 'pod' else 'at equal false alarms'} (percentage points)"
     false, found = "healthy in alarm (%, square-root scale)", "damaged in alarm (%)"
     panels = {
         "false_alarms": RatesPanel("false alarms", false, rates("false_alarms"), errors, "small", 100 * limit),
         "pod": RatesPanel("probability of detection", found, rates("pod", tested["pod_at_equal_pfa"]), notes),
-        "pod_deficit": RatesPanel("POD below that of the best", label, rates("pod_deficit"), axis="free"),
+        "pod_deficit": RatesPanel("POD below that of the best", "percentage points", rates("pod_deficit"), axis="free"),
     }
-    colours = {name: {BEST: BLUE, ONE_REPEAT: BLUE, WORSE: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
+    colours = {name: {level: BLUE, worse: GREY}.get(kind, ORANGE) for name, kind in kinds.items()}
     labels = ["confidence interval", "at its own threshold", "", f"at equal false alarms ({percent(limit)})"]
     places = places_of(list(ranking.index), kinds.to_dict())
     return {"panels": panels, "places": places, "colours": colours, "labels": labels}
@@ -389,7 +560,7 @@ def of_explanations(table: pd.DataFrame) -> dict[str, object]:
     notes = {name: chance_text(share) for name, share in shown.items()}
     rates = in_percent(shown.index, low=0.0, high=shown)
     panels = {"probability": RatesPanel("explanations of the shifts", "probability (%)", rates, notes)}
-    return drawn_by_row(panels, ORANGE, ["", "", "", ""])
+    return drawn_by_row(panels, ORANGE, BLANK)
 
 
 def of_changes(changes: pd.Series) -> dict[str, object]:
@@ -398,14 +569,14 @@ def of_changes(changes: pd.Series) -> dict[str, object]:
     notes = dict.fromkeys(changes.index[known.isna()], "not found")
     rates = in_percent(changes.index, low=0.0, high=known, value=known)
     panels = {"smallest": RatesPanel("smallest change found", "loss of stiffness (%)", rates, notes, "free")}
-    return drawn_by_row(panels, BLUE, ["", "", "", ""])
+    return drawn_by_row(panels, BLUE, BLANK)
 
 
 def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: Mapping[str, str]) -> dict[str, object]:
-    """What a display of measured rates beside simulated ones is made of."""
-    failed = results["scenario"].isna()
-    errors = {row["detector"]: f"failed: {row.get('error', '')}" for _, row in results[failed].iterrows()}
-    table = both_rates(results[~failed])
+    """Contents of a display of measured rates beside simulated ones."""
+    failed = results[results["scenario"].isna()].set_index("detector")
+    errors = {name: f"failed: {text}" for name, text in failed.get("error", pd.Series("", failed.index)).items()}
+    table = both_rates(results[results["scenario"].notna()])
     measures = table.groupby("scenario", sort=False)["measure"].first()
     known = measures.sort_values(key=lambda measure: measure != "PFA", kind="stable").index
     names = check_names(known if scenarios is None else scenarios, "scenarios", known)
@@ -419,12 +590,12 @@ def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: M
         lacking = [one for one in order if one not in rates.index and (number == 0 or one in set(table["detector"]))]
         notes = rates["note"].to_dict() | {one: errors.get(one, "no measured records") for one in lacking}
         is_healthy, inside = measures[name] == "PFA", rates["inside"].dropna()
-        title = f"{'false alarms' if is_healthy else 'POD'}: {shortened(name)}"
+        title = f"{'false alarms' if is_healthy else 'POD'}: {shared.shortened(name)}"
         title += f"\n{inside.sum():.0f} of {len(inside)} within the prediction interval" if len(inside) else ""
-        rates = rates.assign(is_open=(rates["mark"] < rates["low"]) | (rates["mark"] > rates["high"]))
-        rates[RATES] *= 100
+        is_open = (rates["mark"] < rates["low"]) | (rates["mark"] > rates["high"])
+        shown = in_percent(rates.index, is_open=is_open, **rates[RATES])
         label = f"records in alarm (%{', square-root scale' if is_healthy else ''})"
-        panels[name] = RatesPanel(title, label, rates, notes, "small" if is_healthy else "shares")
+        panels[name] = RatesPanel(title, label, shown, notes, "small" if is_healthy else "shares")
     labels = ["prediction interval of one campaign", "simulated mean", "measured", "measured, outside the interval"]
     colours = dict.fromkeys(order, ORANGE)
     return {"panels": panels, "places": places_of(order, groups), "colours": colours, "labels": labels}
@@ -433,39 +604,32 @@ def of_results(results: pd.DataFrame, scenarios: Sequence[str] | None, groups: M
 def both_rates(results: pd.DataFrame) -> pd.DataFrame:
     """Simulated rates with their bands (value, low, high) and measured ones (mark), of scenarios that have both."""
     keys = ["detector", "scenario"]
-    counts = results.value_counts([*keys, "source"])
-    if counts.max() > 1:
-        (detector, scenario, source), n_rows = counts.index[0], counts.iloc[0]
+    if (twice := results.duplicated([*keys, "source"])).any():
+        row = results[twice].iloc[0]
         raise ValueError(
-            f"detector {detector!r} has {n_rows} rows of scenario {scenario!r}, source {source!r}; expected one: of "
-            "each study, keep the scenarios that are to be compared"
+            f"detector {row['detector']!r} has several rates of scenario {row['scenario']!r}; expected one: of each "
+            "study, keep the scenarios that are to be compared"
         )
     n_unknown = results.get("n_not_evaluated", pd.Series(0, results.index))
     results = results.assign(unknown=n_unknown / (results.get("n_records", 0) + n_unknown))
-    simulated, measured = (
-        results[results["source"] == source].set_index(keys) for source in ("simulated", "reference")
-    )
+    simulated, measured = (results[results["source"] == source] for source in ("simulated", "reference"))
+    measured = measured.reindex(columns=[*keys, "rate", "unknown", "n_repeats"])
+    simulated = simulated[simulated["scenario"].isin(measured["scenario"])].drop(columns="n_repeats", errors="ignore")
+    if not len(simulated):
+        known = results["scenario"].unique().tolist()
+        raise ValueError(f"no scenario of {known} has both simulated and measured records; expected a run with both")
     table = simulated.rename(columns={"rate": "value", "pi_low": "low", "pi_high": "high"})
-    measured = measured.rename(columns={"rate": "mark", "unknown": "unknown_measured", "n_repeats": "n_campaigns"})
-    scenarios = measured.index.get_level_values("scenario")
-    table = table[table.index.get_level_values("scenario").isin(scenarios)]
-    if not len(table):
-        raise ValueError(
-            f"no scenario of {results['scenario'].unique().tolist()} has both simulated and measured records; expected "
-            "the results of a run with a reference"
-        )
-    table = table.join(measured.reindex(columns=["mark", "unknown_measured", "n_campaigns"])).reset_index()
-    can_compare = table[["low", "high", "mark"]].notna().all(axis=1) & (table["n_campaigns"].fillna(1) == 1)
-    inside = table["mark"].between(table["low"], table["high"]).astype(float).where(can_compare)
-    shares = table[["unknown_measured", "unknown"]].itertuples(index=False)
-    return table.assign(inside=inside, note=[_not_evaluated(*both) for both in shares])
-
-
-def _not_evaluated(measured: float, simulated: float) -> str:
-    """What share of the measured and of the simulated records is not evaluated; nothing if all are."""
-    if measured > 0:
-        return f"{share_text(measured)} not evaluated{f' (simulated {share_text(simulated)})' if simulated > 0 else ''}"
-    return f"{share_text(simulated)} of simulated not evaluated" if simulated > 0 else ""
+    table = table.merge(measured.rename(columns={"rate": "mark"}), "left", on=keys, suffixes=("", "_measured"))
+    is_single = table[["low", "high", "mark"]].notna().all(axis=1) & (table["n_repeats"].fillna(1) == 1)
+    inside = table["mark"].between(table["low"], table["high"]).astype(float).where(is_single)
+    shares = {"unknown_measured": "", "unknown": " of simulated"}
+    notes = table[list(shares)].apply(
+        lambda row: ", ".join(
+            f"{share_text(row[name])}{of} not evaluated" for name, of in shares.items() if row[name] > 0
+        ),
+        axis=1,
+    )
+    return table.assign(inside=inside, note=notes)
 
 
 def places_of(names: Sequence[Hashable], groups: Mapping[Hashable, Hashable]) -> dict[tuple[Hashable, Hashable], int]:
@@ -480,30 +644,3 @@ def places_of(names: Sequence[Hashable], groups: Mapping[Hashable, Hashable]) ->
     for group in dict.fromkeys(groups.values()):
         rows += [(group, None), *((group, name) for name in names if groups.get(name) == group)]
     return {row: height for height, row in enumerate(rows)}
-
-
-def name_rows(ax: Axes, places: Mapping[tuple[Hashable, Hashable], int]) -> None:
-    """Names of the detectors, headings of groups in bold type, and an empty frame; names stand left of the panels."""
-    texts = [label_of(group) if name is None else label_of(name) for group, name in places]
-    ax.set_yticks(list(places.values()), texts)
-    for text, (_, name) in zip(ax.get_yticklabels(), places, strict=True):
-        text.set_fontweight("bold" if name is None else "normal")
-    ax.set_ylim(len(places) - 0.4, -0.6)
-    cell = ax.get_subplotspec()
-    ax.tick_params(axis="y", length=0, labelleft=cell is None or cell.is_first_col())
-    ax.spines[["top", "right", "left"]].set_visible(False)
-    ax.grid(axis="x", color="#DDDDDD", linewidth=0.6)
-    ax.set_axisbelow(True)
-
-
-def small_rates(ax: Axes, drawn: Array) -> None:
-    """An axis from 0 to the largest of some rates in percent, on a square-root scale, which spreads small ones."""
-    largest = float(np.clip(1.08 * np.nanmax(drawn), 2.0, 101.0))
-    functions = (lambda value: np.sign(value) * np.sqrt(np.abs(value)), lambda root: root * np.abs(root))
-    ticks: list[float] = []
-    for value in (0, 0.1, 0.5, 1, 2, 5, 10, 20, 30, 40, 60, 80, 100):
-        if value <= largest and (not ticks or np.sqrt(value) - np.sqrt(ticks[-1]) > 0.07 * np.sqrt(largest)):
-            ticks.append(value)
-    ax.set_xscale("function", functions=functions)
-    ax.set_xlim(-0.0004 * largest, largest)  # 2 % of the axis
-    ax.set_xticks(ticks, [f"{value:g}" for value in ticks])
