@@ -5,6 +5,7 @@ from pathlib import Path
 GROUPS = {
     "First steps": {
         "plot_truss_study": "How well simulated years predict alarms in true ones, healthy and damaged",
+        "plot_paper_chain": "The paper's networks on the truss: errors of M1 by member, and alarms",
         "plot_your_own_structure": "A tower: records with gaps and faults, an updated model, intervals",
         "plot_accelerations": "Operational modal analysis of a year, then the same method",
     },

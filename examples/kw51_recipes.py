@@ -1,4 +1,4 @@
-"""Records of KW51, measured or synthetic, and chains by the paper's choices and others; for ``plot_kw51_study.py``."""
+"""Records of KW51, measured or synthetic, the paper's chain and the default one; for ``plot_kw51_study.py``."""
 
 import time
 import warnings
@@ -14,7 +14,7 @@ from skthermo.datasets import load_kw51, make_kw51, make_kw51_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper, paper_network
+from skthermo.surrogate import DataInformedFEM, TemperatureMapper, paper_chain, paper_network
 
 MODES = [f"f{mode}" for mode in range(1, 7)]
 PAIR = ["f2", "f4"]  # the modes that the paper's index sees
@@ -74,28 +74,28 @@ class Records:
         return replace(self, temperatures=filled[self.temperatures.columns], frequencies=filled[MODES])
 
 
-def network_inverse(**settings):
-    """M1 as in the paper: the network of Table 4, without noise."""
-    return InverseSurrogate(regressor=paper_network(4), noise=0.0, **settings)
+PUBLISHED, WITHOUT, DEFAULT = "the paper's chain", "without dropout", "skthermo"
+CHAINS = (PUBLISHED, WITHOUT, DEFAULT)
 
 
-NETWORK = {"impute": True, "inverse": network_inverse(), "mapper": TemperatureMapper(paper_network(6))}
-SOLVED = PosteriorInverse()
-RECIPES = {  # each but the last changes one more of the paper's choices
-    "the paper's": NETWORK,
-    "M1 solved": NETWORK | {"inverse": SOLVED},
-    "piecewise-linear M2": NETWORK | {"inverse": SOLVED, "mapper": TemperatureMapper()},
-    "nothing imputed": {"inverse": SOLVED, "mapper": TemperatureMapper()},
-    "the paper's networks, nothing imputed": NETWORK | {"impute": False},
-}
-DEFAULT = "nothing imputed"
+def chain(name):
+    """An unfitted chain that sees the temperatures of a day: the paper's, the same without dropout, or the default."""
+    if name == DEFAULT:
+        mapper = make_pipeline(LagFeatures(LAGS, freq="h"), TemperatureMapper())
+        return DataInformedFEM(bridge(), mapper=mapper, aligner=BiasAligner(bridge()))
+    fem = paper_chain(bridge(), network="kw51", lags=LAGS)
+    if name == WITHOUT:
+        networks = {part: paper_network(table, dropout=False) for part, table in (("inverse", 4), ("mapper", 6))}
+        fem.set_params(inverse__regressor=networks["inverse"], mapper__temperaturemapper__regressor=networks["mapper"])
+    return fem
+
+
 EXPECTED_WARNINGS = (
     ".*uncalibrated-model",
     ".*few-records",
     ".*outside-bounds",
     ".*other-weather",
     ".*poor-fit",
-    "Got `batch_size` less than 1",
 )
 
 
@@ -110,7 +110,7 @@ def quiet():
 
 @dataclass
 class Fitted:
-    """A chain that has learned from the first records, and the records that it has seen."""
+    """A chain that has learned from the first records, and records as it sees them: the paper's chain, imputed."""
 
     records: Records
     fem: DataInformedFEM
@@ -118,20 +118,14 @@ class Fitted:
     noise_free: dict = field(default_factory=dict)
 
     @classmethod
-    def by(cls, records, recipe, seed=0):
-        """The chain of a recipe; with imputed records, where it asks for them."""
-        records = records.imputed() if recipe.get("impute") else records
-        fem = DataInformedFEM(
-            bridge(),
-            inverse=recipe["inverse"],
-            mapper=make_pipeline(LagFeatures(LAGS, freq="h"), recipe["mapper"]),
-            aligner=BiasAligner(bridge()),
-            random_state=seed,
-        )
+    def by(cls, records, name, seed=0):
+        """The chain of this name."""
+        fem = chain(name).set_params(random_state=seed)
         began = time.perf_counter()
         with quiet():
             fem.fit(records.temperatures[:TRAINED], records.frequencies[:TRAINED])
-        return cls(records, fem, time.perf_counter() - began)
+        seconds = time.perf_counter() - began
+        return cls(records if name == DEFAULT else records.imputed(), fem, seconds)
 
     def test(self, table):
         """The last fifth of the first records."""

@@ -197,7 +197,9 @@ print((100 * (thin / fem.predict(later.temperatures) - 1)).mean().round(1).to_st
 # The paper's tables, beside ours
 # -------------------------------
 # One realisation of noise and weather says little. The tables below are means of some realisations, beside the
-# paper's only one, in percent. Table 2 has the errors of the frequencies.
+# paper's only one, in percent, and in its words: SH-0 is healthy, SB-50 the bottom chord halved; ST and SD are top
+# chord and diagonals; thermo-mechanical is the truth, data-informed the chain. Table 2 has the errors of frequencies.
+# :doc:`/accuracy_paper` has both tables for the paper's own chain, too.
 
 realisations = [Realisation(seed) for seed in range(options.seeds)]
 print(f"{options.seeds} realisations\n")

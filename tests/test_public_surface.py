@@ -25,7 +25,7 @@ LIMITS = pd.DataFrame.from_dict(
         "preprocessing": (12, 7, 7, 6),
         "reporting": (1, 11, 0, 0),
         "studies": (13, 17, 11, 24),
-        "surrogate": (10, 11, 9, 11),
+        "surrogate": (11, 11, 9, 11),
         "updating": (4, 10, 0, 3),
     },
     orient="index",

@@ -318,10 +318,12 @@ class BiasAligner(RecordTransformer):
 
     Parameters
     ----------
-    reference : array-like of shape (n_modes,), FE model or None, default=None
-        Means of the frequencies after `transform`: a vector in Hz, or an FE model, which stands for
-        its nominal frequencies. None stands for the model of the `~skthermo.surrogate.DataInformedFEM` whose aligner
-        this is; elsewhere for zeros, or for ones with ``method="scale"``.
+    reference : array-like of shape (n_modes,) or (n_samples, n_modes), FE model, "simulations" or None, default=None
+        Means of the frequencies after `transform`: a vector in Hz; a table, such as simulated frequencies, which stands
+        for its means; or an FE model, which stands for its nominal frequencies. For the aligner of a
+        `~skthermo.surrogate.DataInformedFEM`, None stands for the chain's model, and "simulations" for the frequencies
+        by which its `~skthermo.surrogate.InverseSurrogate` has learned, the paper's reference. Elsewhere, None stands
+        for zeros, or for ones with ``method="scale"``.
     method : {"shift", "scale"}, default="shift"
         ``F - mean(F) + reference``, or ``F / mean(F) * reference``, which keeps relative changes.
 
@@ -347,7 +349,7 @@ class BiasAligner(RecordTransformer):
     """
 
     _parameter_constraints: dict = {
-        "reference": ["array-like", HasMethods(["frequencies"]), None],
+        "reference": ["array-like", HasMethods(["frequencies"]), StrOptions({"simulations"}), None],
         "method": [StrOptions({"shift", "scale"})],
     }
 
@@ -403,11 +405,17 @@ class BiasAligner(RecordTransformer):
     def _read_reference(self, n_modes: int) -> NDArray[np.float64]:
         if self.reference is None:
             return np.full(n_modes, 1.0 if self.method == "scale" else 0.0)
+        if isinstance(self.reference, str):
+            raise ValueError(
+                "reference is 'simulations', but no InverseSurrogate has simulated any; expected the aligner of a "
+                "DataInformedFEM with one"
+            )
         if is_model(self.reference):
             reference = as_floats(self.reference.frequencies(np.ones((1, len(self.reference.parameter_names)))))[0]
         else:
             names = getattr(self, "feature_names_in_", None)
-            reference = real_array(by_mode(self.reference, n_modes, names, "reference"), "reference")
+            means = np.mean(self.reference, axis=0) if np.ndim(self.reference) == 2 else self.reference
+            reference = real_array(by_mode(means, n_modes, names, "reference"), "reference")
         if reference.shape != (n_modes,) or not np.isfinite(reference).all():
             raise ValueError(
                 f"reference {reference} has shape {reference.shape}; expected a frequency for each of the "

@@ -9,7 +9,8 @@ from skthermo.surrogate._fit_report import FitReport
 from skthermo.surrogate._fleet_mapper import FleetMapper
 from skthermo.surrogate._inverse import InverseSurrogate
 from skthermo.surrogate._posterior import PosteriorInverse
-from skthermo.surrogate._regression import TemperatureMapper, paper_network
+from skthermo.surrogate._published import paper_chain, paper_network
+from skthermo.surrogate._regression import TemperatureMapper
 
 __all__ = [
     "DataInformedFEM",
@@ -18,6 +19,7 @@ __all__ = [
     "InverseSurrogate",
     "PosteriorInverse",
     "TemperatureMapper",
+    "paper_chain",
     "paper_network",
     "refitted",
     "resampled",

@@ -118,25 +118,28 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     model : FE model
         Its modes are the columns of the frequencies.
     inverse : transformer, optional
-        M1. By default ``PosteriorInverse(model)``; ``InverseSurrogate()`` is the paper's. Either gets this model if it
-        has none. Names such as ``inverse__noise`` in ``set_params`` and grids reach the default parts, too.
+        M1. By default ``PosteriorInverse(model)``; the paper's is an ``InverseSurrogate`` (`paper_chain`). Either gets
+        this model if it has none. Names such as ``inverse__noise`` in ``set_params`` and grids reach the default parts,
+        too.
     mapper : regressor, optional
         M2. By default ``TemperatureMapper()``. With lags of hours, for example ``make_pipeline(LagFeatures(),
         TemperatureMapper())``. Means of earlier temperatures that a mapper chooses are those that explain the
         frequencies, and ``mapper_`` is a pipeline that begins with them.
     aligner : transformer, "auto" or "passthrough", default="auto"
         Maps measured frequencies onto the model's and back. "auto" is ``BiasAligner(method="scale")``, and
-        ``BiasAligner()`` the paper's shift. A `~skthermo.preprocessing.BiasAligner` without a reference gets this
-        model.
+        ``BiasAligner("simulations")`` the paper's shift. A `~skthermo.preprocessing.BiasAligner` without a reference
+        gets this model.
     imputer : transformer or "passthrough", default="passthrough"
-        Fills gaps in the frequencies, given temperatures and frequencies side by side; used in `fit` only. Without one,
-        a `PosteriorInverse` inverts rows with gaps from the modes that are there; other inverses leave them out.
+        Fills gaps in temperatures and frequencies, given both side by side; used in `fit` only. Without one, missing
+        temperatures are filled from the other sensors, a `PosteriorInverse` inverts rows with gaps from the modes that
+        are there, and other inverses leave them out.
     discrepancy : "auto", regressor or None, default="auto"
         Learns the ratio of measured over modelled frequencies from the inputs of M2, mode by mode, because the FE model
-        cannot follow all of the weather's effects. "auto" is a `TemperatureMapper`; None is the paper's chain.
+        cannot follow all of the weather's effects. "auto" is a `TemperatureMapper`; None, as in the paper, none.
     reduce : "auto", bool or float, default="auto"
-        Whether M1, predictions and simulations use a reduced model, as ``reduce`` of `PosteriorInverse` says, which
-        gets this value if its own is "auto" (:doc:`/guide/costs`). ``report_`` says which model solved.
+        Whether predictions, simulations and a `PosteriorInverse` use a reduced model, as its ``reduce`` says, which
+        gets this value if its own is "auto" (:doc:`/guide/costs`). An `InverseSurrogate` learns from the full model.
+        ``report_`` says which model solved.
     memory : str or joblib.Memory, optional
         Folder for the means of earlier temperatures that the records have and, unless the inverse has a memory of its
         own, for all that its ``memory`` stores.
@@ -188,9 +191,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     ``predict(T)`` is ``aligner_.inverse_transform(model.frequencies(predict_parameters(T))) * exp(discrepancy_(T))``,
     and simulations of damage have the same discrepancy, as Kennedy and O'Hagan [KOH01]_ separate the parameters of a
     calibrated model from it. Outliers train neither aligner nor M1; they stay in the records, so that ``recorder_``
-    knows them. A missing temperature is filled from the other sensors, in `fit` and later, also if the mapper would
-    deal with it in another way. If temperatures are a frame, results are frames. A row that cannot be computed, such as
-    one without any temperature, is NaN; no row is dropped.
+    knows them. Without an imputer in `fit`, and later, a missing temperature is filled from the other sensors, also if
+    the mapper would deal with it in another way. If temperatures are a frame, results are frames. A row that cannot be
+    computed, such as one without any temperature, is NaN; no row is dropped.
 
     A mapper whose ``predict`` takes ``return_std``, such as ``TemperatureMapper(BayesianRidge())`` or a `FleetMapper`,
     makes standard deviations and intervals as wide as it is uncertain; errors of different parameters count as
@@ -310,16 +313,19 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         stages = Stages(self, 5, X, y)
         with collected(), stages.stage("noise"):
             self.sensors_ = SensorRegression.fitted(T)
-            filled = frame_like(T, self.sensors_.fill(T)[0])
+            filled, complete = frame_like(T, self.sensors_.fill(T)[0]), usable
+            if self.imputer_ is not None:
+                filled, complete = imputed(self.imputer_, T, usable)
             self.mapper_ = mapper = with_means(mapper, filled, usable)
             self.noise_ = measurement_noise(mapper, filled, usable)
         with collected() as findings, stages.stage("inverse", inverse):
-            complete = usable if self.imputer_ is None else imputed(self.imputer_, T, usable)
-            aligned = with_shapes(inverse, self.aligner_.fit(complete).transform(complete), shapes)
             for part in inverses_within(inverse):
                 if isinstance(part, InverseSurrogate) and isinstance(part.noise, str):
                     part.set_params(noise=self.noise_)
-            inverse.fit(aligned)
+            has_learned = learn_from_simulations(inverse, self.aligner_, complete)
+            aligned = with_shapes(inverse, self.aligner_.fit(complete).transform(complete), shapes)
+            if not has_learned:
+                inverse.fit(aligned)
         with stages.stage("parameters of the records"):
             found = invert(inverse, aligned, self.parameter_names_)
             if shapes is not None:
@@ -768,6 +774,21 @@ def with_reference(aligner: BaseEstimator | None, model: FEModel) -> BaseEstimat
     return aligner
 
 
+def learn_from_simulations(inverse: Any, aligner: BaseEstimator, F: Table) -> bool:
+    """Whether an aligner asks for simulations; if so, the inverse has learned from them, and it has their means."""
+    parts = [part for part in (aligner, *aligner.get_params().values()) if isinstance(part, BiasAligner)]
+    asking = [part for part in parts if isinstance(part.reference, str)]
+    if asking and not isinstance(inverse, InverseSurrogate):
+        raise ValueError(
+            f"the aligner's reference is 'simulations', but {inverse!r:.100} has none; expected an InverseSurrogate"
+        )
+    if asking:
+        inverse.fit(F)  # whose columns are all that it takes from F
+    for part in asking:
+        part.set_params(reference=inverse.samples_.frequencies.mean(axis=0))
+    return bool(asking)
+
+
 def inverses_within(inverse: BaseEstimator) -> list[Any]:
     """The inverses of an FE model in an estimator and its parts."""
     return [one for one in (inverse, *inverse.get_params().values()) if isinstance(one, FrequencyInverse)]
@@ -799,11 +820,12 @@ def with_shapes(inverse: BaseEstimator, F: Table, shapes: ArrayLike | None) -> T
     return F
 
 
-def imputed(imputer: BaseEstimator, T: Table, F: Table) -> Table:
-    """Frequencies whose gaps an imputer fills, given temperatures and frequencies side by side."""
+def imputed(imputer: BaseEstimator, T: Table, F: Table) -> tuple[Table, Table]:
+    """Temperatures and frequencies whose gaps an imputer fills, given both side by side."""
     n_sensors, n_modes = T.shape[1], F.shape[1]
     values = as_floats(imputer.fit_transform(np.hstack([T, F])))
-    return frame_like(F, values[:, n_sensors : n_sensors + n_modes], column_names(F, "f"))
+    frequencies = values[:, n_sensors : n_sensors + n_modes]
+    return frame_like(T, values[:, :n_sensors]), frame_like(F, frequencies, column_names(F, "f"))
 
 
 def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:

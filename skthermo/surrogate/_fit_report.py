@@ -41,12 +41,15 @@ class FittedRows(SavesFrames):
     filled: pd.DataFrame
 
     @classmethod
-    def counted(cls, records: TrainingRecords, sensors: SensorRegression) -> FittedRows:
-        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found."""
+    def counted(cls, records: TrainingRecords, sensors: SensorRegression | None) -> FittedRows:
+        """Rows that train, and those that do not: a sensor or a mode is missing, or no parameters were found.
+
+        Sensors are those that fill gaps of others, if any do.
+        """
         T, trained = records.temperatures, records.trained
         index = T.index if isinstance(T, pd.DataFrame) else pd.RangeIndex(len(T))
         temperatures, F = as_floats(T), as_floats(records.frequencies)
-        deviations, filled, missing = sensors.fill(T)[1], {}, {}
+        deviations, filled, missing = np.zeros_like(temperatures) if sensors is None else sensors.fill(T)[1], {}, {}
         for sensor, columns in columns_by_sensor(T).items():
             missing[f"temperature {sensor!r} is missing"] = np.isnan(temperatures[:, columns]).any(axis=1) & ~trained
             values = deviations[:, columns]
@@ -263,7 +266,7 @@ class FitReport(SavesFrames):
 def report_of(chain: Any, found: Bunch, findings: RecordFindings, doubts: Iterable[SkthermoWarning]) -> FitReport:
     """The report of a chain that is fitted otherwise; its inverse has ``found`` parameters of the records."""
     modes, unexplained = modes_of(chain)
-    rows = FittedRows.counted(chain.records_, chain.sensors_)
+    rows = FittedRows.counted(chain.records_, chain.sensors_ if chain.imputer_ is None else None)
     expected = 0 if isinstance(last_step(chain.mapper_), FleetMapper) else 10 * len(chain.parameter_names_)
     doubts = [*doubts, *rows.doubts(expected), *doubts_of_modes(modes, unexplained)]
     return FitReport(

@@ -66,53 +66,6 @@ def default_lines(penalties: ArrayLike | None = None, **options: Any) -> Pipelin
     return make_pipeline(hinges, RidgeCV(np.logspace(-3, 5, 33) if penalties is None else penalties, **options))
 
 
-def paper_network(network: Literal["truss", "kw51-inverse", "kw51-mapper", 1, 4, 6], **parameters: Any) -> MLPRegressor:
-    """The deep networks of Kamali et al. (2026) [KCM26]_, as closely as ``MLPRegressor`` allows.
-
-    Parameters
-    ----------
-    network : {"truss", "kw51-inverse", "kw51-mapper"} or {1, 4, 6}
-        Purpose of the network, or its table in the paper: both networks of the truss (Table 1, 6 hidden layers), the
-        inverse surrogate of the KW51 bridge (Table 4, 5 layers), its temperature mapper (Table 6, 4 layers).
-    **parameters
-        Parameters of ``MLPRegressor`` that replace the paper's.
-
-    Returns
-    -------
-    MLPRegressor
-        ReLU, Adam with learning rate 0.001, at most 1000 epochs, no early stopping.
-
-    Raises
-    ------
-    ValueError
-        If the paper has no such network.
-
-    Notes
-    -----
-    ``MLPRegressor`` has no dropout and no learning-rate schedule for Adam. The dropout of Table 1 (0.05 after the
-    input) and Table 6 (0.2 after the first two layers) is replaced by the L2 penalty ``alpha``, 0.1 and 1 here, and,
-    for the inverse surrogate, by ``noise`` on the simulated frequencies. No rows are held out to decide when the loss
-    has stopped falling. The estimators themselves standardise inputs and outputs.
-
-    Examples
-    --------
-    >>> from skthermo.surrogate import paper_network
-    >>> paper_network("kw51-inverse", alpha=0.01).hidden_layer_sizes
-    (256, 128, 64, 32, 16)
-    """
-    networks: dict[str, dict[str, Any]] = {
-        "truss": {"hidden_layer_sizes": (128, 128, 64, 64, 32, 16), "alpha": 0.1, "batch_size": "auto"},
-        "kw51-inverse": {"hidden_layer_sizes": (256, 128, 64, 32, 16), "alpha": 1e-4, "batch_size": 128},
-        "kw51-mapper": {"hidden_layer_sizes": (256, 128, 64, 32), "alpha": 1.0, "batch_size": 256},
-    }
-    tables = {1: "truss", 4: "kw51-inverse", 6: "kw51-mapper"}
-    is_name = isinstance(network, str | int) and not isinstance(network, bool)
-    purpose = tables.get(network, network) if is_name else None
-    if purpose not in networks:
-        raise ValueError(f"network is {network!r}; expected one of {[*networks]} or of the tables {[*tables]}")
-    return MLPRegressor(**(networks[purpose] | {"learning_rate_init": 0.001, "max_iter": 1000} | parameters))
-
-
 class TableRegressor(RegressorMixin, Estimator):
     """Base of regressors whose inputs and outputs are tables with gaps, and names where frames have them."""
 

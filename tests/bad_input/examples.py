@@ -748,7 +748,31 @@ method(
     X=(T, table(T, rows=True)),
     y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True)),
 )
-use("surrogate.paper_network", lambda **a: surrogate.paper_network(**a).hidden_layer_sizes, network=("truss", choice()))
+use(
+    "surrogate.paper_network",
+    lambda **a: surrogate.paper_network(**a).hidden_layer_sizes,
+    network=("truss", choice()),
+    dropout=(True, flag()),
+)
+
+
+def published(**values):
+    """The paper's chain after one epoch."""
+    fem = surrogate.paper_chain(**values)
+    mapper = "mapper__temperaturemapper" if values["lags"] is not None else "mapper"
+    fem.set_params(**{"inverse__regressor__max_iter": 1, f"{mapper}__regressor__max_iter": 1})
+    return fem.fit(T, F).predict(T)
+
+
+use(
+    "surrogate.paper_chain",
+    published,
+    usual="model random_state",
+    network=("truss", choice()),
+    lags=(2, count()),
+    bounds=INVERTING["bounds"],
+    n_samples=(50, count(1)),
+)
 
 # updating
 UPDATED = frequencies(F, rows=False, fitting=True, but=("constant", "unknown names", "columns in another order"))

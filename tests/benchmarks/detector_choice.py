@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 from harness import arguments, autoregression, compensated, recipes, shown
 from joblib import Parallel, delayed
-from kw51_recipes import DEFAULT, NOISE, RECIPES, TRAINED, Fitted, Records
+from kw51_recipes import DEFAULT, NOISE, TRAINED, Fitted, Records
 from scipy.stats import spearmanr
 from sklearn.ensemble import RandomForestRegressor
 from sklearn.neighbors import KNeighborsRegressor, LocalOutlierFactor
@@ -158,7 +158,7 @@ class KW51:
         self.campaign = partial(make_kw51_campaign, n_hours=records, retrofit=False)
         year, self.later = self.campaign(random_state=2 * seed), self.campaign(random_state=2 * seed + 1)
         learned = Records("KW51", year.temperatures, year.frequencies, year.state, year.retrofit)
-        self.fem = Fitted.by(learned, RECIPES[DEFAULT], seed=seed).fem
+        self.fem = Fitted.by(learned, DEFAULT, seed=seed).fem
         self.later_seed, self.clean = 2 * seed + 1, {}
         self.baseline = self.records_of(year.temperatures, year.frequencies)[:TRAINED]
         self.weather = self.later.temperatures[self.later.temperatures.notna().all(axis=1)]

@@ -146,12 +146,13 @@ def test_gaps_flow_through_fit_predict_and_score():
 
 @pytest.mark.nightly
 @pytest.mark.filterwarnings(FILLED)
-def test_imputer_completes_frequencies_in_fit_only():
+def test_imputer_completes_temperatures_and_frequencies_in_fit_only():
     holed_T, holed_F = gappy()
     with_imputer = chain(imputer=KNNGapImputer(), mapper=mapper(lags=1)).fit(holed_T, holed_F)
     assert with_imputer.parameters_.notna().all(axis=None)
     side_by_side = np.hstack([holed_T, holed_F])
-    completed = KNNGapImputer().fit_transform(side_by_side)[:, 3:]
+    air, completed = np.split(KNNGapImputer().fit_transform(side_by_side), [3], axis=1)
+    np.testing.assert_array_equal(with_imputer.records_.inputs, air)
     np.testing.assert_allclose(
         with_imputer.parameters_,
         with_imputer.inverse_.transform(with_imputer.aligner_.transform(pd.DataFrame(completed, columns=F.columns))),

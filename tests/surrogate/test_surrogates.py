@@ -11,7 +11,7 @@ from sklearn.preprocessing import PolynomialFeatures
 
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, add_noise, sample
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper, paper_network
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
 
 TRUSS = make_truss()
 QUADRATIC = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
@@ -145,21 +145,6 @@ def test_seeds_reach_parts_without_one_and_leave_the_others():
     first, second = (none.fit(T, THETA).regressor_.random_state for _ in range(2))
     assert isinstance(first, int)
     assert first == second
-
-
-@pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
-@pytest.mark.parametrize(
-    ("table", "purpose", "hidden_layers"), [(1, "truss", 6), (4, "kw51-inverse", 5), (6, "kw51-mapper", 4)]
-)
-def test_paper_networks(table, purpose, hidden_layers):
-    network = paper_network(purpose, max_iter=3)
-    assert network.get_params() == paper_network(table, max_iter=3).get_params()
-    assert network.max_iter == 3
-    assert not network.early_stopping
-    inverse = InverseSurrogate(TRUSS, network, bounds=0.2, n_samples=300, random_state=0).fit()
-    assert inverse.regressor_.n_layers_ == hidden_layers + 2  # and input and output
-    with pytest.raises(ValueError, match=r"network is 2; expected one of \['truss', .* tables \[1, 4, 6\]"):
-        paper_network(2)
 
 
 def test_linear_regression_of_logarithms_is_exact_where_all_stiffness_scales_together():
