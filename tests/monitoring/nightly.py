@@ -19,7 +19,7 @@ def truss_records():
 def fitted_monitor(records, regressor=None, **parameters):
     targets = [name for name in records if name.startswith("f")]
     regressor = regressor or LinearRegression()
-    detector = CompensatedDetector(MahalanobisDetector(), regressor, targets=targets, window="5D")
+    detector = CompensatedDetector(MahalanobisDetector(), regressor, targets=targets, window="5D", regimes=None)
     return Monitor(detector, **parameters).fit(records[:FIRST])
 
 
