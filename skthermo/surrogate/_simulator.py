@@ -95,7 +95,9 @@ class Simulator:
         options = kind_option(self.model, kind)
         return self.changed("damaged", damage, **options) if damage else self
 
-    def with_damage_parameters(self, groups: list[str], lowest: float, highest: float, kind: LossKind) -> Simulator:
+    def with_damage_parameters(
+        self, groups: list[str], lowest: float, highest: float, kind: LossKind = "stiffness"
+    ) -> Simulator:
         """The simulator whose rows of theta end with 1 - severity of each group.
 
         A reduced model is accurate for severities from the lowest to the highest, with a margin.
