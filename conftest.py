@@ -1,5 +1,6 @@
-"""One BLAS thread for each worker of the tests, which share the machine's cores; figures without a screen; little time
-for the garbage collector; chains of examples, most of which are the same, fitted once."""
+"""One BLAS thread for each worker of the tests, which share the machine's cores; figures without a screen; the same
+drawn examples in each run; little time for the garbage collector; chains of examples, most of which are the same,
+fitted once."""
 
 import copy
 import functools
@@ -8,11 +9,14 @@ import os
 import sys
 
 import pytest
+from hypothesis import settings
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+settings.register_profile("fixed", derandomize=True)
+settings.load_profile("fixed")  # ``--hypothesis-profile default`` draws others
 collect_ignore = [f"tests/bad_input/{name}.py" for name in ("examples", "in_service")]  # test_bad_input imports them
 FITTED = {}  # what chains of examples have learned, by all that tells them and their records from others
 gc.set_threshold(50_000)  # by default 700: a fifth of the time in which tests are collected
