@@ -181,7 +181,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             self.feature_names_in_ = self.compensator_.feature_names_in_
         T, R = self.compensator_.inputs(X)[0], as_floats(residuals)
         self.regime_ = self._chosen_regime(X, T, R)
-        regime = self._regime_of(T)
+        regime = regimes_of(T, self.regime_)
         self.means_ = None
         Z = as_frame(X, residuals)
         if self.window is not None:
@@ -240,7 +240,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         DataFrame of shape (n_samples, n_directions)
             NaN where a record, or its window, has no mode.
         """
-        options = {} if kind == "stiffness" else {"kind": kind}  # a detector of your own may have no kinds
+        options = of_other_kind(kind)
         amounts = self._by_regime(X, lambda detector, Z: detector.severities(Z, **options).to_numpy())
         index = X.index if isinstance(X, pd.DataFrame) else None
         names = self.detectors_[0].directions_.index
@@ -262,7 +262,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         ndarray of shape (n_samples,)
             From 0 to 1; NaN where a record, or its window, has no mode.
         """
-        options = {} if kind == "stiffness" else {"kind": kind}
+        options = of_other_kind(kind)
         return self._by_regime(X, lambda detector, Z: detector.explained(Z, **options))
 
     @available_if(_detector_has("pod"))
@@ -282,7 +282,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             Share of records above the threshold, in the regimes as often as in the baseline.
         """
         check_is_fitted(self)
-        options = {} if kind == "stiffness" else {"kind": kind}  # a detector of your own may have no kinds
+        options = of_other_kind(kind)
         rates = (one.pod(severities, **options) for one in self.detectors_)
         return sum(share * rate for share, rate in zip(self.shares_, rates, strict=True))
 
@@ -305,7 +305,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             As `DirectionalDetector.minimum_detectable_damage`, in the regimes as often as in the baseline.
         """
         check_is_fitted(self)
-        level, options = check_probability(level, "level"), {} if kind == "stiffness" else {"kind": kind}
+        level, options = check_probability(level, "level"), of_other_kind(kind)
         alone = [one.minimum_detectable_damage(level, **options) for one in self.detectors_]
         if len(alone) == 1:
             return alone[0]
@@ -363,7 +363,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         """Residuals of records or their means, the regime of each record, and findings."""
         check_is_fitted(self)
         residuals, T, findings = self.compensator_.evaluated(X)
-        Z, regime = as_frame(X, residuals), self._regime_of(T)
+        Z, regime = as_frame(X, residuals), regimes_of(T, self.regime_)
         if self.means_ is None:
             return Z, regime, findings
         self._check_order(X)
@@ -396,20 +396,11 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         Means over a window scatter so little that a slow change counts as damage in the narrower regime.
         """
         n_first = 2 * len(T) // 3
-        is_low = as_floats(T[name] if isinstance(T, pd.DataFrame) else T[:, name])[:n_first] <= value
-        if min(is_low.sum(), (~is_low).sum()) < least_rows:
+        if np.bincount(regimes_of(T, (name, value))[:n_first], minlength=2).min() < least_rows:
             return False
         with collected():
             earlier = clone(self).set_params(regimes=(name, value), cv=None).fit(X[:n_first])
             return bool(np.mean(earlier.predict(X[n_first:]) == -1) <= most)
-
-    def _regime_of(self, T: Any) -> Regimes:
-        """The number of the regime of each record: 0 up to the value, 1 above; a missing input counts as above."""
-        if self.regime_ is None:
-            return np.zeros(len(T), dtype=np.intp)
-        name, value = self.regime_
-        column = T[name] if isinstance(T, pd.DataFrame) else T[:, name]
-        return (~(as_floats(column) <= value)).astype(np.intp)
 
     def _check_order(self, X: Any) -> None:
         """Refuse records whose windows are not defined."""
@@ -439,6 +430,20 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         if name == "regressor":
             return TemperatureCompensator(targets=self.targets)._default_part("estimator")
         return DirectionalDetector() if name == "detector" else None
+
+
+def regimes_of(T: Any, regime: tuple[Any, float] | None) -> Regimes:
+    """The number of the regime of each record: 0 up to the value, 1 above; a missing input counts as above."""
+    if regime is None:
+        return np.zeros(len(T), dtype=np.intp)
+    name, value = regime
+    column = T[name] if isinstance(T, pd.DataFrame) else T[:, name]
+    return (~(as_floats(column) <= value)).astype(np.intp)
+
+
+def of_other_kind(kind: str) -> dict[str, str]:
+    """The argument for a kind of loss; none for stiffness, since a detector of your own may have no kinds."""
+    return {} if kind == "stiffness" else {"kind": kind}
 
 
 def as_frame(X: Any, values: Any) -> pd.DataFrame:

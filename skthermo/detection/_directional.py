@@ -162,8 +162,7 @@ class DirectionalDetector(MahalanobisDetector):
         is_conformal = self.threshold == "conformal"
         tests = self._by_others(self._tests, F, times) if is_conformal else self._tests(normal_of(self.covariance_), F)
         scales = self._learned_scales(tests)
-        has_section = self.directions_.index.str.endswith(", section").any()
-        self.omnibus_scale_, self.section_scale_ = float(scales[0]), float(scales[-1] * has_section)
+        self.omnibus_scale_, self.section_scale_ = float(scales[0]), float(scales[-1] * ("section" in self._cones))
         return self._joined(tests)
 
     def _index(self, F: Array) -> Array:
@@ -184,16 +183,18 @@ class DirectionalDetector(MahalanobisDetector):
     def _tests(self, normal: Gaussian, F: Array) -> Array:
         """Mahalanobis distance of each row and its length in each cone, as if no mode were missing."""
         present = ~np.isnan(F)
-        lengths = np.column_stack([project(normal, self.directions_.to_numpy()[c], F)[1] for c in self._cones])
+        cones = [self.directions_.to_numpy()[numbers] for numbers in self._cones.values()]
+        lengths = np.column_stack([project(normal, cone, F)[1] for cone in cones])
         lengths[~present.any(axis=1)] = np.nan
         lengths *= np.sqrt(F.shape[1] / np.maximum(present.sum(axis=1), 1))[:, np.newaxis]
         return np.column_stack([self._indices(normal, F), lengths])
 
     @property
-    def _cones(self) -> list[NDArray[np.intp]]:
-        """Numbers of the directions of each kind of loss, those of section last."""
+    def _cones(self) -> dict[str, NDArray[np.intp]]:
+        """Numbers of the directions of each kind of loss that has some, those of section last."""
         are_section = self.directions_.index.str.endswith(", section")
-        return [np.flatnonzero(some) for some in (~are_section, are_section) if some.any()]
+        numbers = {"stiffness": np.flatnonzero(~are_section), "section": np.flatnonzero(are_section)}
+        return {kind: own for kind, own in numbers.items() if len(own)}
 
     def severities(self, X: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
         """Losses by which the test explains each record.
@@ -303,18 +304,12 @@ class DirectionalDetector(MahalanobisDetector):
         """Names and numbers of the directions of one kind of loss."""
         if kind not in ("stiffness", "section"):
             raise ValueError(f"kind is {kind!r}; expected 'stiffness' or 'section'")
-        are_section = self.directions_.index.str.endswith(", section")
-        chosen = {
-            name: number
-            for number, (name, is_section) in enumerate(zip(self.directions_.index, are_section, strict=True))
-            if is_section == (kind == "section")
-        }
-        if not chosen:
+        if kind not in self._cones:
             raise ValueError(
                 f"directions are {list(self.directions_.index)}, none of a loss of {kind}; expected the other kind, or "
                 "an FE model that knows the mass of its groups, as Structure.assemble or group_mass gives it"
             )
-        return chosen
+        return {self.directions_.index[number]: int(number) for number in self._cones[kind]}
 
     def _rates(self, direction: int, amounts: Array) -> Array:
         """Shares of the records of the baseline that are above the threshold with each amount of a direction."""
