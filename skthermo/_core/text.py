@@ -20,15 +20,19 @@ def percent(share: float, digits: str = ".4g") -> str:
 
 
 def share_text(share: float) -> str:
-    """A share in percent with two significant digits; shares of nearly 1 do not become 100 %."""
+    """A share in percent with two significant digits; shares of nearly 1 do not become 100 %, nor tiny ones long."""
     value = 100 * float(share)
+    if 0 < value < 0.005:
+        return f"below{SPACE}0.01{SPACE}%"
     if 99.5 <= value < 100:
         return percent(share, ".1f") if value < 99.95 else f"over{SPACE}99.9{SPACE}%"
     return f"{significant(value)}{SPACE}%" if np.isfinite(share) else "not known"
 
 
 def bounds_text(lowest: float, highest: float) -> str:
-    """Bounds of a share in percent, on one line."""
+    """Bounds of a share in percent, on one line; a tiny lower one is none."""
+    if 0 < lowest < 0.0005:
+        return f"up{SPACE}to{SPACE}{share_text(highest)}"
     return f"{share_text(lowest)}{SPACE}to{SPACE}{share_text(highest)}"
 
 
