@@ -59,7 +59,7 @@ def identify_damage(
     noise: ArrayLike | str = "fitted",
     prior: DamagePrior | None = None,
     stiffening: bool | Iterable[str] | None = None,
-    parameters: Iterable[str] | None = None,
+    parameters: Iterable[str] = (),
     added_mass: Mapping[str, Any] | None = None,
     added_stiffness: Mapping[str, Any] | None = None,
     shapes: tuple[ArrayLike, ArrayLike] | None = None,
