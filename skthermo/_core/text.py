@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from skthermo._core.frames import midnight
+
 SPACE = "\N{NO-BREAK SPACE}"
 
 
@@ -107,6 +109,15 @@ def duration_text(wait: Any) -> str:
     )
     text = f"{size:.2g}" if size < 99 else f"{size:.0f}"
     return f"{text} {unit}{'' if text == '1' else 's'}"
+
+
+def day_text(time: Any, *, is_short: bool = False) -> str:
+    """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
+    if pd.isna(time):
+        return ""
+    stamp = pd.Timestamp(time)
+    day = f"{stamp.day} {stamp.month_name()[: 3 if is_short else None]} {stamp.year}".replace(" ", SPACE)
+    return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"
 
 
 def plain(value: Any) -> Any:
