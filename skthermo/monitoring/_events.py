@@ -18,8 +18,8 @@ from skthermo._core.frames import DAY, YEAR
 from skthermo._core.text import counted_number, duration_text, percent, plain
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning
 
-DAMAGE, MEASUREMENT, WATCH = "damage", "measurement or structure", "watch"
-"""Kinds of events; the second is that of responses set aside as implausible or stuck, the last of a raised index."""
+DAMAGE, DRIFT, WATCH, FAULT = "damage", "drift", "watch", "fault"
+"""Kinds of events: an alarm, a mean of 30 days that has moved, a raised index, and values of sensors at fault."""
 
 
 def levels(index: Array, persistence: int) -> Array:
@@ -118,7 +118,7 @@ class Events:
         limits = {
             DAMAGE: decisions[["threshold", "release"]],
             WATCH: decisions[["watch", "watch_release"]].set_axis(["threshold", "release"], axis=1),
-            MEASUREMENT: pd.DataFrame({"threshold": 0.5, "release": 0.5}, decisions.index),
+            FAULT: pd.DataFrame({"threshold": 0.5, "release": 0.5}, decisions.index),
         }
         # where a response was set aside the others cannot close an event
         is_held, held = decisions["n_held"].to_numpy() > 0, decisions["n_held"].to_numpy()
@@ -127,16 +127,16 @@ class Events:
         effects = decisions.filter(regex="^effect ")
         rows, spans = [], []
         for kind, limit in limits.items():
-            if limit["threshold"].isna().all() or (kind == MEASUREMENT and not is_held.any()):
+            if limit["threshold"].isna().all() or (kind == FAULT and not is_held.any()):
                 continue
-            of_kind = (held, 3) if kind == MEASUREMENT else (shown, persistence)
+            of_kind = (held, 3) if kind == FAULT else (shown, persistence)
             level, found = followed(of_kind[0], times, limit, of_kind[1], starts)
-            modes = decisions["held" if kind == MEASUREMENT else "modes"]
+            modes = decisions["held" if kind == FAULT else "modes"]
             for first, stop in found:
                 peak = first + int(np.nanargmax(level[first:stop]))
                 n_alarms = int((~np.isnan(level[first:stop])).sum())
                 means = effects[first:stop].sum() / n_alarms
-                groups = "" if kind == MEASUREMENT else leading(means[means > 2].rename(lambda name: name[7:]))
+                groups = "" if kind == FAULT else leading(means[means > 2].rename(lambda name: name[7:]))
                 size = decisions[f"loss {groups.split(', ')[0]}"][first:stop].sum() / n_alarms if groups else np.nan
                 end = decisions.index[stop] if stop < len(times) else pd.NaT
                 stamps = decisions.index[first], end, level[peak], decisions.index[peak]
@@ -169,7 +169,7 @@ def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFr
 def evaluations(decisions: pd.DataFrame, events: Events, said: pd.DataFrame) -> pd.DataFrame:
     """State, event and what drives it of each record."""
     index, n_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy()
-    damage, measurement, watch = (events.numbers[kind] for kind in (DAMAGE, MEASUREMENT, WATCH))
+    damage, measurement, watch = (events.numbers[kind] for kind in (DAMAGE, FAULT, WATCH))
     is_unexplained = measurement > 0
     for event in with_acknowledgements(events.table, said).query("harmless").itertuples():
         own = said[(said["kind"] == event.kind) & (said["time"] >= event.start.value)]

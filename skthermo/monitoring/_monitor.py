@@ -40,7 +40,7 @@ from skthermo.monitoring._evaluation import (
 )
 from skthermo.monitoring._events import (
     DAMAGE,
-    MEASUREMENT,
+    FAULT,
     WATCH,
     EventLevels,
     Events,
@@ -493,9 +493,7 @@ class Monitor(SavesFrames, Estimator):
             return
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
             self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
-        said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT].drop_duplicates(
-            "time", keep="last"
-        )
+        said = self.acknowledgements_[self.acknowledgements_["kind"] == FAULT].drop_duplicates("time", keep="last")
         seen, notes, states = self.corrections_.corrected(begin, raw, said["at"][said["harmless"]].tolist())
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen])
         states = [*(one for one in earlier if one.day < begin.day), *states]

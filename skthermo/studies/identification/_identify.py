@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 from joblib import delayed
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from skthermo._core.arrays import Array, RandomState, as_random_state, check_jobs, check_probability
 from skthermo._core.parallel import run_jobs
@@ -31,6 +30,7 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
 from skthermo.fem.damage import LossKind, check_kind
+from skthermo.residuals.mean_errors import chance_of
 from skthermo.studies._scenarios import UncertainDamage, check_chain, checked_models
 from skthermo.studies.identification._causes import (
     NO_DAMAGE,
@@ -228,8 +228,8 @@ def identify_damage(
         shifts=_shifts(shift, explained, fem.mode_names_),
         draws=draws,
         damage=_severities(whole[0], whole[0].draws.mean(axis=0)),
-        p_value=_p_value(seen.change @ np.linalg.solve(seen.covariance, seen.change), n_observed, shift),
-        misfit_p_value=_p_value(best.misfit, n_observed - len(best.causes), shift),
+        p_value=chance_of(seen.change @ np.linalg.solve(seen.covariance, seen.change), n_observed, shift.freedom),
+        misfit_p_value=chance_of(best.misfit, n_observed - len(best.causes), shift.freedom),
         similarity=similarity,
         records=shift.counts,
         explained=explained,
@@ -272,7 +272,7 @@ def _located(
     """Evidence of stretches of groups that may be damaged, of all if whole ones do not explain the shifts; members."""
     n_left = len(evidence.change) - len(whole[0].causes)
     is_open = sum(one.probability for one in whole if one.has_else) > 0.1
-    is_open |= _p_value(whole[0].misfit, n_left, shift) < 0.05
+    is_open |= chance_of(whole[0].misfit, n_left, shift.freedom) < 0.05
     asked = [cause for cause in evidence.causes if not cause.alone]
     probable = tabulated(whole, [cause.name for cause in asked if cause.kind == "damage"])["probability"]
     causes: list[Cause] = []
@@ -310,11 +310,6 @@ def _located(
     effects = np.einsum("cu,suo->sco", is_in, effects_of(seen, units, 7))
     table = pd.DataFrame(list(members.values()), pd.Index(list(members), name="member", tupleize_cols=False))
     return Evidence(seen, causes, effects, evidence.prior, shift.freedom), table
-
-
-def _p_value(misfit: float, n_free: int, shift: FrequencyShift) -> float:
-    """Probability (F) of a larger misfit by chance; NaN without more observations than causes."""
-    return float(stats.f.sf(misfit / n_free, n_free, shift.freedom)) if n_free > 0 else float("nan")
 
 
 def _shifts(shift: FrequencyShift, explained: Sequence[DamageExplanation], names: Sequence[Any]) -> pd.DataFrame:
