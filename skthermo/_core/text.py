@@ -90,6 +90,11 @@ def listed(names: Sequence[Any], word: str = "and") -> str:
     return f"{', '.join(first)} {word} {last}" if first else last
 
 
+def bare(name: Any) -> str:
+    """The name of a column without a unit in brackets, as sentences have it."""
+    return re.sub(r"\s*[\[(][^\])]*[\])]$", "", str(name)) or str(name)
+
+
 def capital(text: str) -> str:
     """A text as the beginning of a sentence."""
     return text[:1].upper() + text[1:]

@@ -24,7 +24,7 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._settings import RecordSettings, Settings, read_settings
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
-from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, read_file, text_of
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, look_at, read_file, text_of
 from skthermo.preprocessing.loggers.together import in_celsius, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
@@ -32,6 +32,7 @@ CODES = {
     "healthy": HEALTHY, "watch": HEALTHY, "known damage": HEALTHY, "drift": ALARM, "alarm": ALARM,
     "not evaluated": NOT_EVALUATED,
 }  # fmt: skip
+AS_BEFORE = ("records:", "damage events:", "expected:", "smallest change:")  # of a summary, what no night changes
 COUNTS = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
 
 logger = logging.getLogger("skthermo.commands")
@@ -249,8 +250,16 @@ class Bridge:
             if settings is None:
                 table = read_file(file, form, leave_unfinished=leave_unfinished)
             else:
-                table = read_columns(file, form, settings.records, leave_unfinished=leave_unfinished)
+                options = {"leave_unfinished": leave_unfinished}
+                try:
+                    table = read_columns(file, form, settings.records, **options)
+                except ValueError:
+                    if settings.has_text_baseline or file.suffix.lower() in NO_TEXT_FILES:
+                        raise
+                    own = look_at(file, form.time_zone, wanted=settings.records.columns).form
+                    table = read_columns(file, replace(own, missing=form.missing), settings.records, **options)
                 check_layout(table, file, settings.records, taken.layouts)
+            table = self._possible(table, file)
             table = in_zone(table, monitor.last_.tz, file).rename_axis(monitor.baseline_.index.name)
             return table if after is None else table[table.index > after]
 
@@ -269,6 +278,14 @@ class Bridge:
                 reader = partial(read, after=after)
                 found.append(NewFile(file, reader(file), pd.DataFrame(), {}) if named else taken.new_in(file, reader))
         return [file for file in found if file is not None]
+
+    def _possible(self, table: pd.DataFrame, file: Path) -> pd.DataFrame:
+        """Records without those whose stamps no clock of a logger has; these are named."""
+        is_possible = (table.index.year > 1900) & (table.index.year < 2200)
+        if not is_possible.all():
+            n_left, first = int((~is_possible).sum()), table.index[~is_possible][0]
+            self.lines.append(f"left out of {file}, as the year is impossible: {n_left}, the first of {first}")
+        return table[is_possible]
 
     def _take_in(self, monitor: Monitor, new: Sequence[NewFile]) -> tuple[pd.DataFrame, dict[Path, pd.DatetimeIndex]]:
         """Evaluations of the records of some files, and which stamps of each file were handed over.
@@ -313,12 +330,13 @@ class Bridge:
         is healthy.
         """
         counts = {name: number - before[name] for name, number in monitor.counts_.items()}
-        n_ahead, new = monitor.counts_["n_ahead"], evaluated[~evaluated["revised"].astype(bool)]
+        n_ahead, new = counts["n_ahead"], evaluated[~evaluated["revised"].astype(bool)]
         states = new["state"].value_counts().reindex(list(CODES), fill_value=0).to_dict()
         is_unknown = new["state"] == "not evaluated"
         reasons = new.loc[is_unknown, "reason"].value_counts().to_dict()
         remarks = new.loc[~is_unknown & (new["reason"] != ""), "reason"].value_counts()
-        shown = ", ".join(f"{number} {state}" for state, number in states.items() if number or state != "watch")
+        always = ("healthy", "alarm", "not evaluated")
+        shown = ", ".join(f"{number} {state}" for state, number in states.items() if number or state in always)
         others = ", ".join(f"{counts[name]} {text}" for name, text in COUNTS.items())
         self.lines.append(f"new: {len(new)}{f' ({shown})' if len(evaluated) else ''}; {others}")
         notes = {"evaluated anew, as records came late": len(evaluated) - len(new)}
@@ -327,12 +345,15 @@ class Bridge:
         notes |= {f"evaluated, with a remark, {remark}": number for remark, number in remarks.items()}
         self.lines += [f"{note}: {number}" for note, number in notes.items() if number]
         self.records = {"new": len(new), **{state.replace(" ", "_"): number for state, number in states.items()}}
-        self.records |= {"revised": len(evaluated) - len(new), "ahead": n_ahead, "reasons": reasons}
+        ahead = monitor.counts_["n_ahead"]
+        self.records |= {"revised": len(evaluated) - len(new), "ahead": ahead, "reasons": reasons}
         self.records |= {name.removeprefix("n_"): counts[name] for name in COUNTS}
-        doubt = "records are stamped too far ahead" if counts["n_ahead"] > 0 else ""
+        doubt = "records are stamped too far ahead" if n_ahead > 0 else ""
         if not (doubt or states["healthy"] or states["watch"]):
             doubt = "no new record could be evaluated"
         self.describe(monitor, doubt, bool((evaluated["state"] == "alarm").any()))
+        if not self.options.verbose:
+            self.lines = [line for line in self.lines if not line.startswith(AS_BEFORE)]
         is_usual = len(new) == len(evaluated) and not (n_ahead or any(counts[name] for name in COUNTS))
         return is_usual and self.state == Taken.read(self.taken_file).state
 

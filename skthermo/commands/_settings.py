@@ -27,7 +27,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import CompensatedDetector, DirectionalDetector
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing.loggers.logger_files import CsvFormat
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
 REQUIRED = inspect.Parameter.empty  # the default of what has none
@@ -192,6 +192,11 @@ class Settings:
 
         now, then = flat(self.of_a_fit), flat(before)
         return [name for name in now | then if now.get(name) != then.get(name) and name != "[records] folder"]
+
+    @property
+    def has_text_baseline(self) -> bool:
+        """Whether [csv] was found in text files, and not in workbooks, which say nothing of the form of texts."""
+        return not all(Path(name).suffix.lower() in NO_TEXT_FILES for name in self.records.baseline)
 
     @property
     def code(self) -> list[str]:

@@ -51,7 +51,7 @@ POLICY = (
     f"script-src 'sha256-{b64encode(sha256(SCRIPT.encode()).digest()).decode()}'"
 )
 """What a browser may load: drawings within the page, and the page's own script; nothing from a network."""
-UNSAFE = r"to_(?!dict$)\w+|tofile|dumps?|save(fig)?|eval|query|pipe|apply|(re)?fit|update|acknowledge|discard"
+UNSAFE = r"to_(?!dict$)\w+|tofile|save(fig)?|eval|query|pipe|apply|fit|update|acknowledge|discard|re(fit|base\w+)"
 """Names of methods and attributes of facts that write files, run code or change a monitor."""
 
 

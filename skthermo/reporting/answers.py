@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._core.text import SPACE, day_text, listed, share_text, significant
+from skthermo._core.text import SPACE, bare, day_text, listed, share_text, significant
 from skthermo._core.warnings import collected
 
 LONGEST = pd.Timedelta("30D")  # records of the state as it is now
@@ -56,9 +56,10 @@ def change_text(shifts: Mapping[str, float], names: list[str], units: Mapping[st
     parts = []
     for name in names:
         shift = shifts.get(name, np.nan)
+        unit = units.get(name, "")
         if np.isfinite(shift):
-            size = share_text(abs(shift)) if is_relative else f"{significant(abs(shift))}{SPACE}{units.get(name, '')}"
-            parts.append(f"{name} {'' if parts else 'is '}{size} {'lower' if shift < 0 else 'higher'}")
+            size = share_text(abs(shift)) if is_relative else f"{significant(abs(shift))}{SPACE}{unit}".strip()
+            parts.append(f"{bare(name)} {'' if parts else 'is '}{size} {'lower' if shift < 0 else 'higher'}")
     return listed(parts)
 
 
@@ -69,18 +70,19 @@ def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = No
     begun = f"Event {event['event']} ({kind}) since {day_text(since)}"
     begun += f", {times} times in alarm" if times > 1 and kind == "damage" else ""
     if kind == "fault":
-        of = f" of {listed(event['modes'])}" if event["modes"] else ""
+        of = f" of {listed([bare(name) for name in event['modes']])}" if event["modes"] else ""
         yield f"{begun}: values{of} cannot be those of the structure as it was. A sensor or the structure has changed."
         return
     shifts = shifts_of(monitor, since)
     moved = change_text(shifts, event["modes"], monitor.units_, monitor.smallest_changes_.is_relative)
-    yield f"{begun}: {moved} than in the healthy structure in the same weather." if moved else f"{begun}."
+    named = f"; most changed: {listed(event['modes'])}" if event["modes"] else ""
+    yield f"{begun}: {moved} than in the healthy structure in the same weather." if moved else f"{begun}{named}."
     if identified is not None:
         yield from identified.answer()[:2]
     elif event["groups"]:
         size = event.get("size", np.nan)
         loss = f"A loss of stiffness{f' of about {share_text(size)}' if np.isfinite(size) else ''}"
-        yield f"{loss} in {listed(event['groups'])} explains most of it."
+        yield f"{loss} in {', '.join(event['groups'])} explains most of it."
 
 
 def acknowledgement(event: int, settings: str | None) -> str:
