@@ -516,13 +516,12 @@ class Monitor(SavesFrames, Estimator):
         if not len(raw):
             self.states_ = (begin,)
             return
-        if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
-            self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
         states = self.corrections_.advanced(begin, raw)
         first = midnight(min([first, *changed_times(self._faults_of(self.states_[-1]), self._faults_of(states[-1]))]))
+        if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
+            self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
         drifts = self.corrections_.drifts(states, raw.index)
-        known = self.decisions_.loc[self.decisions_.index < begin.day, list(drifts)]
-        drifts = pd.concat([known, drifts[drifts.index >= begin.day]])
+        drifts = pd.concat([self._drifts_before(begin.day, drifts), drifts])
         states = [*(one for one in earlier if one.day < begin.day), *states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
@@ -535,6 +534,10 @@ class Monitor(SavesFrames, Estimator):
             [self.weeks_[self.weeks_.index <= first], self.mean_test_.weeks(self.means_, self._test_times(first))]
         )
         self._explain(first)
+
+    def _drifts_before(self, time: pd.Timestamp, like: pd.DataFrame) -> pd.DataFrame:
+        """Shares of stiffness that were taken out of records before a time."""
+        return self.decisions_[self.decisions_.index < time].reindex(columns=list(like))
 
     def _faults_of(self, state: Any) -> Sequence[Any]:
         return () if state.sensors is None else state.sensors.faults
@@ -580,7 +583,7 @@ class Monitor(SavesFrames, Estimator):
     def _index_then(self, records: pd.DataFrame, place: int, index: Array, drifts: pd.DataFrame) -> Array:
         """Damage indices as they were before sensors at fault had been found."""
         raw = self.records_[self.records_.index >= records.index[0]]
-        drifts = pd.concat([self.decisions_.loc[self.decisions_.index < drifts.index[0], list(drifts)], drifts])
+        drifts = pd.concat([self._drifts_before(drifts.index[0], drifts), drifts])
         then = self._corrected(raw, drifts, once_found=True)[0]
         if then.equals(records.loc[raw.index]):
             return index
