@@ -57,21 +57,21 @@ terms = {
 }
 M = beams(m, range(16))
 savemat(folder / "bridge.mat", {"K0": sum(terms.values()), "M0": M} | terms)
-hours = pd.date_range("2023-03-01", "2024-04-30 23:00", freq="h", tz="UTC")
+hours = pd.date_range("2023-03-01", "2024-04-30 23:00", freq="h")
 h = np.arange(len(hours))
 fronts = 12 * pd.Series(random.normal(0, 1, len(h))).ewm(halflife=36).mean().to_numpy()
 air = 10 - 11 * np.cos(2 * np.pi * (h / 24 + 44) / 365) + 4 * np.sin(2 * np.pi * (h - 9) / 24) + fronts
 deck = 1 + pd.Series(air).ewm(halflife=5).mean().to_numpy()
-T = pd.DataFrame({"air": air, "deck": deck}, hours.tz_localize(None).rename("time")).round(1)
+T = pd.DataFrame({"air": air, "deck": deck}, hours.rename("time")).round(1)
 T.loc["2023-07-10":"2023-07-12", "deck"] = -999  # a sensor fails
-T.drop(T.loc["2023-11-02":"2023-11-04"].index).to_csv(folder / "temperatures.csv")  # the logger fails
 core = pd.Series(air).ewm(halflife=10).mean().to_numpy()  # not measured
 theta = 1 - np.column_stack([0.003 * (core - 10), 0.0035 * (core - 10), 0.01 * (air - 10), 0 * air])
 bridge = AffineModel({(name,): matrix for name, matrix in terms.items()}, M, n_modes=5)
 clean = bridge.frequencies(theta[::6] * [0.96, 0.96, 0.9, 1.05])
-stamps = hours[::6] + pd.to_timedelta(random.integers(300, 1500, len(clean)), unit="s")
 names = [f"mode {i}" for i in range(1, 6)]
-stamps = stamps.tz_convert("Europe/Rome").rename("time")
-F = pd.DataFrame(add_noise(clean, 0.004, random_state=0).round(4), stamps, names)
+F = pd.DataFrame(add_noise(clean, 0.004, random_state=0).round(4), T.index[::6], names)
 F = F.mask(random.random(F.shape) < [0.02, 0.05, 0.1, 0.1, 0.25])  # modes that were not identified
-F[random.random(len(F)) < 0.9].to_csv(folder / "frequencies.csv")
+F = F[random.random(len(F)) < 0.9]
+T = T.loc[F.index].mask(F.index.to_series().between("2023-11-02", "2023-11-05"))  # the logger fails
+for name, table in {"temperatures": T, "frequencies": F}.items():
+    table.to_csv(folder / f"{name}.csv", date_format="%Y-%m-%d %H:%M")
