@@ -12,7 +12,7 @@ from skthermo.monitoring import Monitor
 from skthermo.studies import DetectabilityStudy, identify_damage, sweep
 from skthermo.surrogate import DataInformedFEM
 
-PAGE = (Path(__file__).parents[1] / "docs" / "guide" / "data_model.rst").read_text()
+PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "data_model.rst").read_text()
 
 
 @pytest.fixture(scope="module")
