@@ -22,7 +22,9 @@ def event_row(start, end, kind="damage", modes="f1", groups="", acknowledged=Fal
         "peak_time": pd.Timestamp(start),
         "modes": modes,
         "groups": groups,
+        "size": np.nan,
         "n_alarms": 3,
+        "n_times": 1,
         "acknowledged": acknowledged,
         "harmless": harmless,
         "note": note,
@@ -78,7 +80,9 @@ class FakeMonitor:
             "peak_time",
             "modes",
             "groups",
+            "size",
             "n_alarms",
+            "n_times",
             "acknowledged",
             "harmless",
             "note",
@@ -114,6 +118,13 @@ class FakeMonitor:
 
     def transitions(self, after=0):
         return []
+
+    def _events(self):
+        """What stands after the newest record by the events that are open, and whether a response is set aside."""
+        kinds = set(self.events_["kind"][self.events_["end"].isna()])
+        states = {"damage": "alarm", "drift": "drift", "watch": "watch"}
+        state = next((state for kind, state in states.items() if kind in kinds), "")
+        return SimpleNamespace(standing=lambda: ([state], None), set_aside=lambda number: ([("fault" in kinds)],))
 
     def status(self, now=None):
         return status_of(self).at(now)
