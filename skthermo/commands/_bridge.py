@@ -8,7 +8,7 @@ import logging
 import os
 import re
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -213,7 +213,7 @@ class Bridge:
         """Evaluate what is new, and save the monitor."""
         with self.alone():
             monitor, taken = self.load(), Taken.read(self.taken_file)
-            before, new = monitor.counts_, self._new_files(monitor, taken)
+            before, n_known, new = monitor.counts_, len(monitor.transitions()), self._new_files(monitor, taken)
             read = list(self.lines)  # that a file is empty, or holds no records
             with collected() as findings:
                 evaluated, handed = self._take_in(monitor, new)
@@ -228,18 +228,13 @@ class Bridge:
             is_usual = self._describe_update(monitor, evaluated, before)
             self.append_transitions(monitor)
             if not self.options.verbose:
-                self.lines = [line for line in self.lines if self._is_news(line)]
-                if is_usual and not (self.transitions or self.errors or read):
+                changed = {str(one["event"]) for one in monitor.transitions(n_known)}
+                self.lines = [line for line in self.lines if _is_news(line, changed)]
+                if is_usual and not (changed or self.errors or read):
                     self.lines = [f"{self.said}; {self._came(evaluated)}, nothing has changed"]
             taken.state = self.state
             taken.write()
         self.write_page(monitor)
-
-    def _is_news(self, line: str) -> bool:
-        """Whether a line of a summary is not as after the call before: of events, those that are open or changed."""
-        event = re.match(r"event (\d+):", line)
-        changed = {str(one["event"]) for one in self.transitions}
-        return not line.startswith(AS_BEFORE) and (not event or "still open" in line or event[1] in changed)
 
     def _came(self, evaluated: pd.DataFrame) -> str:
         """How many records came, and how many of these could not be evaluated."""
@@ -458,6 +453,12 @@ class Bridge:
             if refused:
                 self.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
             self.append_transitions(monitor)
+
+
+def _is_news(line: str, changed: Collection[str]) -> bool:
+    """Whether a line of a summary is not as after the call before: of events, those that are open or have changed."""
+    event = re.match(r"event (\d+):", line)
+    return not line.startswith(AS_BEFORE) and (not event or "still open" in line or event[1] in changed)
 
 
 def sentence(error: Exception) -> str:
