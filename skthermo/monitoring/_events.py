@@ -20,7 +20,7 @@ from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning
 
 DAMAGE, DRIFT, WATCH, FAULT = "damage", "drift", "watch", "fault"
 """Kinds of events, the gravest first: an alarm, a mean of 30 days that has moved, a raised index; sensors at fault."""
-KINDS = (DAMAGE, DRIFT, WATCH, FAULT)
+RANKED_KINDS = (DAMAGE, DRIFT, WATCH, FAULT)
 STATES = ("alarm", "drift", "watch", "known damage")
 
 
@@ -166,7 +166,7 @@ class Events:
         self.starts, self.within = np.asarray(starts, dtype=np.int64), within
         causes: list[list[Run]] = []
         found = [*self._raised(persistence), *self._drifts(weeks), *self._faults(persistence)]
-        for run in sorted(found, key=lambda run: (run.first, KINDS.index(run.kind))):
+        for run in sorted(found, key=lambda run: (run.first, RANKED_KINDS.index(run.kind))):
             cause = next((one for one in reversed(causes) if self._is_same(one, run)), None)
             if cause is None:
                 causes.append([run])
@@ -257,7 +257,7 @@ class Events:
 
     def _row(self, runs: list[Run]) -> tuple[Any, ...]:
         """What the table says of an event."""
-        stamps, kind = self.decisions.index, min((run.kind for run in runs), key=KINDS.index)
+        stamps, kind = self.decisions.index, min((run.kind for run in runs), key=RANKED_KINDS.index)
         own, stop = [run for run in runs if run.kind == kind], max(run.stop for run in runs)
         highest = max(own, key=lambda run: np.nanmax(run.level))
         number = sum(run.number for run in own)
@@ -286,7 +286,7 @@ class Events:
         ranks = np.full(len(self.times), len(STATES))
         answers = with_acknowledgements(self.table, self.said)
         for number, runs in self.runs.items():
-            event, ordered = answers.loc[number], sorted(runs, key=lambda run: -KINDS.index(run.kind))
+            event, ordered = answers.loc[number], sorted(runs, key=lambda run: -RANKED_KINDS.index(run.kind))
             if event["kind"] == FAULT:
                 continue
             for run in ordered:

@@ -94,11 +94,12 @@ class MeanTest(SavesFrames):
         white = np.linalg.solve(root, mean)
         squared, n_free = float(white @ white), int(some.sum())
         limit = n_free * stats.f.isf(self.chance, n_free, freedom)
-        departures, sizes = np.zeros(len(some)), np.abs(mean) / np.sqrt(np.diag(covariance))
-        departures[some] = mean / self.scales[some]
+        departures, sizes = np.zeros(len(some)), np.round(np.abs(mean) / np.sqrt(np.diag(covariance)), 2)
+        departures[some] = np.round(mean / self.scales[some], 4)
         modes = leading(dict(zip(np.array(self.names, dtype=object)[some], sizes, strict=True)))
         values = [*departures, *self._explained(root, white, some)]
-        return float(np.sqrt(squared / limit)), chance_of(squared, n_free, freedom), modes, values
+        level, p_value = np.sqrt(squared / limit), chance_of(squared, n_free, freedom)
+        return float(np.round(level, 6)), float(np.round(p_value, 6)), modes, values
 
     def _explained(self, root: Array, white: Array, some: NDArray[np.bool_]) -> list[float]:
         """Effects of the groups in standard errors of the mean, then their losses; none where they explain less than

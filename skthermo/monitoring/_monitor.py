@@ -539,9 +539,8 @@ class Monitor(SavesFrames, Estimator):
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < first], seen])
         new = self._decided(first, notes, drifts)
         self.decisions_ = pd.concat([self.decisions_[self.decisions_.index < first], new])
-        self.weeks_ = pd.concat(
-            [self.weeks_[self.weeks_.index <= first], self.mean_test_.weeks(self.means_, self._test_times(first))]
-        )
+        weeks = self.weeks_[self.weeks_.index <= first]
+        self.weeks_ = pd.concat([weeks, self.mean_test_.weeks(self.means_, self._test_times(weeks.index))])
         self._explain(first)
 
     def _drifts_before(self, time: pd.Timestamp, like: pd.DataFrame) -> pd.DataFrame:
@@ -598,12 +597,12 @@ class Monitor(SavesFrames, Estimator):
             return index
         return rounded(self._index(pd.concat([records[records.index < raw.index[0]], then]))[place:])
 
-    def _test_times(self, first: pd.Timestamp) -> list[pd.Timestamp]:
-        """When means of the last days are tested after a record: each week of service."""
-        begin = midnight(self.baseline_.index[-1])
-        number = (first - begin) // (7 * DAY), (self.last_ - begin) // (7 * DAY) + 1
-        times = [days_later(begin, 7 * n) for n in range(max(number[0], 1), number[1] + 1)]
-        return [time for time in times if first < time <= self.last_]
+    def _test_times(self, known: pd.DatetimeIndex) -> list[pd.Timestamp]:
+        """When means of the last days are to be tested after those that are known: each week of service."""
+        begin, last = midnight(self.baseline_.index[-1]), self.last_
+        first = round((known[-1] - begin) / (7 * DAY)) + 1 if len(known) else 1
+        times = (days_later(begin, 7 * number) for number in range(first, (last - begin) // (7 * DAY) + 2))
+        return [time for time in times if time <= last]
 
     def _with_memory(self, n_before: int) -> tuple[pd.DataFrame, int]:
         """Records as the detector sees them, from those on that it looks back to, and the position of the first."""
@@ -981,6 +980,7 @@ class Monitor(SavesFrames, Estimator):
                     event["kind"], event["peak_time"], True, f"ended by the new baseline since {retraining.since}"
                 )
             after.restarts_ = (*self.restarts_, today.as_unit("ns").value)
+            after.means_ = self.means_[:0]  # of the structure as it was
             raw = pd.concat([self.baseline_, self.records_])[self.reference_]
             T, F = trained.drop(columns=self.targets_), trained[self.targets_]
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now
