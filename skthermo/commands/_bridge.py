@@ -25,7 +25,7 @@ from skthermo.commands._settings import RecordSettings, Settings, read_settings
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, read_file
-from skthermo.preprocessing.loggers.together import in_celsius, joined, once
+from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
@@ -482,7 +482,7 @@ def files_in(folder: Path) -> list[Path]:
 def read_columns(
     file: Path, form: CsvFormat, records: RecordSettings, *, leave_unfinished: bool = False
 ) -> pd.DataFrame:
-    """Records of a file in the columns that the settings name, temperatures in degrees Celsius."""
+    """Records of a file in the columns that the settings name, in degrees Celsius and Hz."""
     table = read_file(file, form, ignore=records.ignore, leave_unfinished=leave_unfinished)
     unknown = [name for name in table if name not in records.columns]
     if unknown:
@@ -490,7 +490,7 @@ def read_columns(
             f"{file} has the columns {unknown}, which [records] does not name; expected {records.columns}, and other "
             "columns under ignore"
         )
-    return in_celsius(table, records.convert)
+    return in_usual_units(table, records.convert)
 
 
 def check_layout(table: pd.DataFrame, file: Path, records: RecordSettings, layouts: Sequence[Sequence[str]]) -> None:

@@ -89,8 +89,9 @@ class Proposal:
             shape = f"values with {form.separator!r} between and the decimal sign {form.decimal!r}, " if is_csv else ""
             zone = f" in {index.tz}" if index.tz else ", without a time zone"
             yield f"{look.file}: {len(index)} records, {shape}{index.min()} to {index.max()}{zone}"
-            yield from (f"not used: {name!r}, as {why}" for name, why in look.ignored.items())
             yield from (f"see: {note}" for note in look.notes)
+        yield from (f"not used: {name!r}, as {why}" for name, why in self.read.ignored.items())
+        yield from (f"see: {note}" for note in self.read.notes)
         if len(self.read.waiting):
             yield f"stamps that are not in all files, and are left out: {len(self.read.waiting)}"
         usual, missing = duration_text(self.step), self.baseline.isna().to_numpy().mean()

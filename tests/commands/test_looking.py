@@ -52,7 +52,7 @@ def test_every_form_is_found(
     found = look_at(file)
     pd.testing.assert_frame_equal(found.records, RECORDS, check_exact=True, check_freq=False, check_index_type=False)
     assert found.ignored == {"state": "it holds text"}
-    assert found.units == {"T air [°C]": "°C", "f1 (Hz)": "Hz"}
+    assert {name: unit.name for name, unit in found.units.items()} == {"T air [°C]": "°C", "f1 (Hz)": "Hz"}
     again = read_file(file, found.form, ignore=found.ignored)
     pd.testing.assert_frame_equal(again, found.records, check_exact=True)
 

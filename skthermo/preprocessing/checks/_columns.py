@@ -3,7 +3,6 @@ units."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import HUGE, Array, as_floats, median, spread_evenly
 from skthermo._core.frames import MISSING_CODES, columns_by_sensor, named_frame
+from skthermo.preprocessing._quantities import OPEN, TEMPERATURE, kind_of
 from skthermo.preprocessing.checks._record_findings import ASIDE_REASONS, RecordFinding
 
 LOGGED = (*MISSING_CODES, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
@@ -170,18 +170,14 @@ def texts_of(levels: Array) -> str:
 
 
 def are_temperatures(T: Reading) -> NDArray[np.bool_]:
-    """Which columns hold temperatures: those with such a name, and others whose values can be temperatures.
-
-    Inputs may be flags, radiation, wind or powers of temperatures too, which have no degrees.
-    """
+    """Which columns hold temperatures: those that a name says to be, and of those that stay open the ones whose values
+    can be temperatures. Inputs may be flags, radiation, wind or powers of temperatures too, which have no degrees."""
     found = np.ones(len(T.columns), dtype=bool)
     for place, (name, column) in enumerate(zip(T.columns, T.values.T, strict=True)):
-        text = str(name).strip().lower()
-        is_named = re.search(r"temp|°c|deg ?c|celsius", text) or re.fullmatch(r"t[a-z]{0,2}[-_ .]?\d*", text)
-        known = column[~np.isnan(column) & ~np.isin(column, LOGGED)]
-        if not is_named and known.size:
+        known, (kind, _) = column[~np.isnan(column) & ~np.isin(column, LOGGED)], kind_of(name)
+        if kind != TEMPERATURE and known.size:
             could_be = [((known > COLDEST + zero) & (known < HOTTEST + zero)).mean() for zero in (0.0, 273.15)]
-            found[place] = max(could_be) > 0.8 and not np.isin(known, (0.0, 1.0)).all()
+            found[place] = kind == OPEN and max(could_be) > 0.8 and not np.isin(known, (0.0, 1.0)).all()
     return found
 
 

@@ -20,6 +20,7 @@ from skthermo._core.estimators import import_optional
 from skthermo._core.frames import MISSING_CODES
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing._quantities import Unit, unit_called, unit_in
 
 ISO, UNIX, UNIX_MS, EXCEL = "ISO8601", "unix", "unix_ms", "excel"
 NUMERIC_STAMPS = {
@@ -36,10 +37,6 @@ DAYS = (
 )  # fmt: skip
 CLOCKS = (" %H:%M:%S", " %H:%M", "", " %H:%M:%S.%f", " %I:%M:%S %p", " %I:%M %p")
 WRITTEN_STAMPS = (ISO, *(day + clock for day, clock in product(DAYS, CLOCKS)))
-UNIT_NAMES = {
-    "°c": "°C", "degc": "°C", "deg c": "°C", "c": "°C", "k": "K", "kelvin": "K", "°f": "°F", "degf": "°F", "f": "°F",
-    "hz": "Hz", "mm": "mm", "m": "m", "mrad": "mrad", "rad": "rad", "°": "°", "deg": "°", "µm/m": "µm/m", "%": "%",
-}  # fmt: skip
 MOST_LOOKED_AT = 2000  # lines, by which the form of a file is found
 MOSTLY = 0.9  # share of the cells that are numbers, from which a column holds numbers
 
@@ -431,7 +428,7 @@ class FileLook:
     form: CsvFormat
     records: pd.DataFrame
     ignored: dict[str, str]
-    units: dict[str, str]
+    units: dict[str, Unit]
     notes: tuple[str, ...]
     findings: tuple[RecordsWarning, ...] = ()
 
@@ -451,16 +448,13 @@ def look_at(file: Path, zone: str | None = None, stamps: str | None = None, want
     marked = [marker for marker in MISSING_CODES if records.isin([marker]).to_numpy().any()]
     if marked:
         records, form = records.mask(records.isin(marked)), replace(form, missing=marked)
-    for name in records:
-        named = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]", str(name))
-        if named and named[1].lower() in UNIT_NAMES:
-            units[name] = UNIT_NAMES[named[1].lower()]
+    units |= {name: unit for name in records if (unit := unit_in(name))}
     return FileLook(file, form, records, ignored, units, tuple(notes), tuple(findings))
 
 
 def _look_at_table(
     file: Path, zone: str | None, stamps: str | None
-) -> tuple[CsvFormat, dict[str, str], dict[str, str], list[str]]:
+) -> tuple[CsvFormat, dict[str, Unit], dict[str, str], list[str]]:
     """Form of a CSV file or workbook, units of its columns as a line below the names has them, columns of text, and
     notes."""
     if file.suffix.lower() in WORKBOOKS:
@@ -489,11 +483,11 @@ def _look_at_table(
     columns = dict(zip(names, zip(*compress(cells, is_record), strict=True), strict=True))
     stamp_columns = [names[place] for place in places]
     units = {
-        name: UNIT_NAMES[cell.lower()]
+        name: unit
         for line, row in above
         if line > names_line
         for name, cell in zip(names, row, strict=True)
-        if cell.lower() in UNIT_NAMES
+        if (unit := unit_called(cell))
     }
     texts = {}
     for name, column in columns.items():
