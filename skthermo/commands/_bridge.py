@@ -24,7 +24,13 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._settings import RecordSettings, Settings, read_settings
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
-from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, read_file
+from skthermo.preprocessing.loggers.logger_files import (
+    NO_TEXT_FILES,
+    CsvFormat,
+    in_zone,
+    of_the_right_clock,
+    read_file,
+)
 from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
@@ -507,6 +513,9 @@ def read_baseline(
 ) -> tuple[pd.DataFrame, list[list[str]]]:
     """Records of the baseline's files, in order of time, and the columns of each file."""
     tables = [read_columns(file, form, records) for file in files]
+    of_clocks = [of_the_right_clock(table, file) for table, file in zip(tables, files, strict=True)]
+    tables = [table for table, _ in of_clocks]
+    warn_each(finding for _, findings in of_clocks for finding in findings)
     lacking = [name for name in records.columns if not any(name in table for table in tables)]
     if lacking:
         raise ValueError(f"no file of the baseline has the columns {lacking}; expected {records.columns}")

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import HUGE, Array, as_floats, median, spread_evenly
-from skthermo._core.frames import MISSING_CODES, columns_by_sensor, named_frame
+from skthermo._core.frames import MISSING_CODES, columns_by_sensor, named_frame, of_a_wrong_clock
 from skthermo.preprocessing._quantities import OPEN, TEMPERATURE, kind_of
 from skthermo.preprocessing.checks._record_findings import ASIDE_REASONS, RecordFinding
 
@@ -55,6 +55,8 @@ class Reading:
         if isinstance(self.index, pd.DatetimeIndex) and not self.index.is_monotonic_increasing:
             self.order = self.order if self.index.hasnans else self.index.argsort(kind="stable")
             self.index, self.values = self.index[self.order], self.values[self.order]
+        if isinstance(self.given_index, pd.DatetimeIndex) and len(self.given_index) == n_rows:
+            self.values[of_a_wrong_clock(self.given_index)[self.order]] = np.nan
         self.before = self.values.copy()
         with np.errstate(invalid="ignore"):
             too_large = np.abs(self.values) > HUGE

@@ -11,7 +11,6 @@ from zoneinfo import ZoneInfo
 
 import pandas as pd
 
-from skthermo._core.text import counted
 from skthermo.preprocessing._quantities import (
     FREQUENCY,
     OPEN,
@@ -21,7 +20,7 @@ from skthermo.preprocessing._quantities import (
     in_usual_units,
     kind_of,
 )
-from skthermo.preprocessing.loggers.logger_files import MOSTLY, FileLook, look_at
+from skthermo.preprocessing.loggers.logger_files import MOSTLY, FileLook, look_at, once
 
 HZ = "Hz"
 
@@ -183,19 +182,3 @@ def joined(tables: Iterable[pd.DataFrame], columns: Sequence[str]) -> tuple[pd.D
     if not whole:
         return pd.DataFrame(columns=list(columns), index=waiting[:0], dtype=float), waiting
     return pd.concat([one[list(columns)] for one in whole]), waiting
-
-
-def once(table: pd.DataFrame) -> pd.DataFrame:
-    """Records that come twice with the same values are one; with other values they are an error."""
-    again = table.index.duplicated()
-    if not again.any():
-        return table
-    table = table[~table.reset_index().duplicated().to_numpy()]
-    again = table.index.duplicated()
-    if again.any():
-        raise ValueError(
-            f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
-            f"{table.index[again][0]}; expected each once. If the clocks go back then, give the time zone ([csv] "
-            "time_zone of settings)"
-        )
-    return table
