@@ -85,7 +85,7 @@ def kind_of(name: Any, unit: Unit | None = None, values: ArrayLike | None = None
     if others or (TEMPERATURE in named and FREQUENCY in named):
         return (others or [OPEN])[0], f"its name says {' and '.join(dict.fromkeys(named))}"
     if by_unit == FREQUENCY or FREQUENCY in named:
-        is_bound = any(_table("beside").get(word) == "bounds" for word in words)
+        is_bound = _table("beside")["bounds"].intersection(words)
         return ("bound", "its name says bound") if is_bound else (FREQUENCY, "its unit or name says frequency")
     symbol = _symbol(words)
     checked = {TEMPERATURE: can_be_temperature, FREQUENCY: can_be_frequency}
@@ -114,7 +114,7 @@ def _symbol(words: list[str]) -> str:
     """The quantity of a symbol, with nothing beside it but numbers, places, directions and words that say nothing."""
     air, places, modes, directions, nothing, bounds = _table("beside").values()
     rest = [word for word in words if not word.isdigit() and word not in nothing]
-    is_numbered = len(words) > len([word for word in words if not word.isdigit()])
+    is_numbered = any(word.isdigit() or word in ("first", "second", "third") for word in words)
     first = rest[0] if rest else ""
     if first in ("t", "tc") or (first[:1] == "t" and first[1:] in air | places | bounds) or air.intersection(rest):
         beside = air | places | bounds | {"c", "f", "k"} | (set() if first[:1] == "t" else {"t", "tc", "tf"})
@@ -139,6 +139,12 @@ def can_be_frequency(values: ArrayLike) -> bool:
     """Whether most values are positive, and vary by less than a third."""
     known = _known(values)
     return not len(known) or bool((known > 0).mean() > 0.8 and _spread(known[known > 0]) < np.median(known) / 3)
+
+
+def varies_as_modes(values: ArrayLike) -> bool:
+    """Whether most values are such as the natural frequencies of structures in Hz: below 200, within some percent."""
+    known = _known(values)
+    return len(known) > 2 and bool((known > 0).mean() > 0.8 and _spread(known) < min(np.median(known), 200.0) / 20)
 
 
 def _known(values: ArrayLike) -> Array:

@@ -909,6 +909,8 @@ def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequen
     signs = {sign for row in sample for sign in _stamp_text(row, places)}
     likely = [form for form in forms if signs.issuperset(re.sub(r"%.|\w", "", form))]
     texts = [_stamp_text(row, places) for row in sample]
+    if forms == WRITTEN_STAMPS and all(re.fullmatch(r"[-+]?\d{0,7}([.,]\d*)?", text) for text in texts):
+        return []  # measurements
     found = {form: _times_in(rows, places, form) for form in likely if parsed(texts, form).notna().any()}
     n_above = min((int(index.notna().argmax()) for index in found.values() if index.notna().any()), default=0)
     least = max([(len(rows) - n_above) / 2, *(index.notna().sum() for index in found.values())])

@@ -19,6 +19,7 @@ from skthermo.preprocessing._quantities import (
     can_be_temperature,
     in_usual_units,
     kind_of,
+    varies_as_modes,
 )
 from skthermo.preprocessing.loggers.logger_files import MOSTLY, FileLook, look_at, once
 
@@ -85,10 +86,10 @@ class LoggerRecords:
         convert = {name: unit for name in used if (unit := _foreign(table[name], name, columns, units, roles))}
         if convert:
             notes.append(f"converted to degrees Celsius and Hz: {', '.join(map(' from '.join, convert.items()))}")
-        of_responses = {
-            name: HZ if kind_of(name, units.get(name))[0] == FREQUENCY else units[name].name if name in units else ""
-            for name in roles["responses"]
-        }
+        of_responses = {name: _response_unit(name, units.get(name), table[name]) for name in roles["responses"]}
+        by_values = [n for n, unit in of_responses.items() if unit == HZ and kind_of(n, units.get(n))[0] != FREQUENCY]
+        if by_values:
+            notes.append(f"{', '.join(by_values)}: taken for natural frequencies in Hz, by their values")
         if unknown := [name for name, unit in of_responses.items() if not unit]:
             notes.append(
                 f"the unit of {', '.join(map(repr, unknown))} is unknown, so that a change up counts as a change down; "
@@ -138,6 +139,15 @@ def _is_open(role: str, kind: str, values: pd.Series) -> bool:
     if role == "temperatures":
         return kind == OPEN and can_be_temperature(values)
     return kind == OPEN or kind in ("force", "strain", "displacement", "inclination", "acceleration")
+
+
+def _response_unit(name: str, unit: Unit | None, values: pd.Series) -> str:
+    """The unit of a response, "" where nothing tells; Hz for a letter and a number with values of frequencies."""
+    kind, _ = kind_of(name, unit)
+    is_mode = re.fullmatch(r"[A-Za-z]{1,2}[ _-]?\d+", name) is not None and varies_as_modes(values)
+    if kind == FREQUENCY or (unit is None and is_mode):
+        return HZ
+    return unit.name if unit else ""
 
 
 def _others(looks: Sequence[FileLook], others: Mapping[str, str] | None = None) -> str:
