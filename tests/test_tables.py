@@ -185,7 +185,6 @@ def no_tables(frame):
         "a series": (frame.iloc[:, 0], "Series"),
         "one dimension": (frame.to_numpy()[:, 0], "shape"),
         "three dimensions": (frame.to_numpy()[np.newaxis], "dimensions"),
-        "half precision": (frame.astype(np.float16), "float16"),
         "a mapping": (frame.to_dict("list"), "dict"),
         "complex": (frame + 1j, "complex"),
         "no columns": (frame.iloc[:, :0], "feature"),

@@ -232,7 +232,7 @@ class LagFeatures(PastFeatures):
         reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
         return no_earlier_records(f"lags reach {reach} back, and most rows lack lags", reach)
 
-    def _calendar(self) -> pd.DateOffset | None:
+    def _calendar(self) -> pd.offsets.BaseOffset | None:
         """The step of the calendar by which records of `fit` follow each other; None where steps are times."""
         if _is_month(self.freq):
             return pd.tseries.frequencies.to_offset(self.freq)
@@ -246,7 +246,7 @@ class LagFeatures(PastFeatures):
             return pd.offsets.MonthEnd() if stamps.is_month_end.all() else pd.DateOffset(months=1)
         return None if self.time_zone_ is None else pd.DateOffset(days=n_days)
 
-    def _steps_back(self, stamps: pd.DatetimeIndex, lag: int, step: pd.DateOffset) -> NDArray[np.int64]:
+    def _steps_back(self, stamps: pd.DatetimeIndex, lag: int, step: pd.offsets.BaseOffset) -> NDArray[np.int64]:
         """Times that are so many steps of the calendar earlier, by local clocks, in UTC."""
         local = stamps if self.time_zone_ is None else stamps.tz_convert(self.time_zone_).tz_localize(None)
         earlier = local - lag * step if lag else local
@@ -292,10 +292,10 @@ class LagFeatures(PastFeatures):
 def _is_month(freq: Any) -> bool:
     """Whether a step is one of the calendar, such as "MS", and no length of time."""
     try:
-        offset = pd.tseries.frequencies.to_offset(freq) if isinstance(freq, str | pd.DateOffset) else None
+        offset = pd.tseries.frequencies.to_offset(freq) if isinstance(freq, str | pd.offsets.BaseOffset) else None
     except ValueError:
         return False
-    return isinstance(offset, pd.DateOffset) and not isinstance(offset, pd.offsets.Tick | pd.offsets.Day)
+    return offset is not None and not isinstance(offset, pd.offsets.Tick | pd.offsets.Day)
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:

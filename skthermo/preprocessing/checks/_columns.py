@@ -95,6 +95,7 @@ class Reading:
         try:
             values, names = np.array(as_floats(table)), list(getattr(table, "columns", ()))
         except Exception as error:  # objects of users may raise anything
+            self.given = None
             return f"are a {kind} ({str(error).partition(';')[0]:.150})"
         if values.ndim in (1, 2):
             self.values = values[:, np.newaxis] if values.ndim == 1 else values
