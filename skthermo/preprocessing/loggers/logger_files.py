@@ -838,7 +838,7 @@ def _epoch_of(
     begins = {form: times.min() for form in forms if len(times := _times_in(rows, places, form).dropna())}
     now = pd.Timestamp.now("UTC")
     likely = [form for form, begin in begins.items() if begin.year >= 2000 and begin < now + YEAR]
-    dates = " or ".join(f"{form!r} ({begin})" for form, begin in begins.items())
+    dates = " or ".join(f"{form!r} ({begins[form]})" for form in (likely or begins))
     first = [form for form in likely if form.startswith(UNIX)] or likely
     if len(first) != 1:
         raise ValueError(
@@ -846,8 +846,9 @@ def _epoch_of(
             "with the right one"
         )
     if len(likely) > 1 or not first[0].startswith(UNIX):
+        others = f"; they might also be {dates}" if len(likely) > 1 else ""
         return first[0], [
-            f"stamps of {file.name} are read in the format {first[0]!r}; by their size they may be {dates}"
+            f"stamps of {file.name} are read in the format {first[0]!r}, from {begins[first[0]]} on{others}"
         ]
     return first[0], []
 

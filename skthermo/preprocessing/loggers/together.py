@@ -118,8 +118,8 @@ def _roles(
         given[role] = found = [name for name, (one, _) in kinds.items() if one == kind]
         if is_pair:
             own = [name for name in kinds if (name in looks[0].records) == (role == "temperatures")]
-            if found and not set(found).intersection(own):
-                notes.append(f"the files are not in the order temperatures, responses: {role} are {', '.join(found)}")
+            if role == "temperatures" and found and not set(found).intersection(own):
+                notes.append(f"the files are exchanged, as {', '.join(found)} of the second are temperatures")
             by_file = [name for name in own if _is_open(role, kinds[name][0], values[name])]
             if by_file:
                 notes.append(f"{', '.join(by_file)}: {role} as their file says, as names and units do not")
