@@ -200,7 +200,7 @@ def test_a_hanger_that_loses_force_is_found_beside_its_measured_tension(tmp_path
     said = run("update", tmp_path / "b", tmp_path / "new.csv", "--now", "2026-02-01", "--json").json["bridges"][0]
     damage = [event for event in said["status"]["events"] if event["kind"] == "damage"]
     assert len(damage) == 1
-    assert pd.Timestamp("2026-01-10") <= pd.Timestamp(damage[0]["start"]) < pd.Timestamp("2026-01-11")
+    assert pd.Timestamp("2026-01-10") <= pd.Timestamp(damage[0]["since"]) < pd.Timestamp("2026-01-11")
 
 
 def test_outages_of_days_are_told(tmp_path):
