@@ -203,7 +203,7 @@ def test_a_hanger_that_loses_force_is_found_beside_its_measured_tension(tmp_path
     assert pd.Timestamp("2026-01-10") <= pd.Timestamp(damage[0]["since"]) < pd.Timestamp("2026-01-11")
 
 
-def test_outages_of_days_are_told(tmp_path):
+def test_outages_of_days_are_named(tmp_path):
     hours = pd.date_range("2025-03-01", periods=60 * 24, freq="h")
     air = 10 + np.random.default_rng(0).normal(0, 3, len(hours))
     table = pd.DataFrame({"T1": air, "f1": 4 - 0.01 * air}, hours).drop(hours[400:496])

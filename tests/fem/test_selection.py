@@ -119,7 +119,7 @@ class TestMatching:
 
 
 @pytest.mark.parametrize(("second", "are_as_good"), [(410.0, True), (900.0, False)])
-def test_pairings_that_are_as_good_are_told(second, are_as_good):
+def test_pairings_that_are_as_good_are_named(second, are_as_good):
     model = AffineModel({"k": np.diag([400.0, second, 5000.0])}, np.eye(3))
     measured = np.sqrt([400.0, second]) / (2 * np.pi) * [1.002, 0.998]
     with warnings.catch_warnings(record=True) as given:

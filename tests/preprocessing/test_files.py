@@ -1,4 +1,4 @@
-"""Files of many kinds are read rightly, with what is left out told, or are refused in one sentence: never wrongly."""
+"""Files of many kinds are read rightly, with what is left out named, or are refused in one sentence: never wrongly."""
 
 import io
 import warnings
@@ -283,7 +283,7 @@ DOUBTFUL = {
 
 
 def verdict(kind, series, folder):
-    """Whether a file is read rightly, in part and told, refused, or wrongly."""
+    """Whether a file is read rightly, in part and so that it is said, refused, or wrongly."""
     written = {**KINDS, **DOUBTFUL}[kind](records(SERIES[series]))
     file = folder / f"log{written.ending}"
     file.write_bytes(written.content)
@@ -299,7 +299,7 @@ def verdict(kind, series, folder):
         is_right = np.allclose(found, written.truth.sort_index(), rtol=1e-9, atol=1e-9)
         if is_right and ("clock" not in kind or "set aside" in texts):
             return "right"
-    return "told" if any(word in texts for word in ("left out", "set aside", "might also be", "not used")) else "wrong"
+    return "said" if any(word in texts for word in ("left out", "set aside", "might also be", "not used")) else "wrong"
 
 
 @pytest.mark.parametrize("series", SERIES)
@@ -310,8 +310,8 @@ def test_files_are_read_as_they_are(kind, series, tmp_path):
 
 @pytest.mark.parametrize("series", SERIES)
 @pytest.mark.parametrize("kind", DOUBTFUL)
-def test_what_is_not_certain_is_told_or_refused(kind, series, tmp_path):
-    assert verdict(kind, series, tmp_path) in ("right", "told", "refused")
+def test_what_is_not_certain_is_said_or_refused(kind, series, tmp_path):
+    assert verdict(kind, series, tmp_path) in ("right", "said", "refused")
 
 
 def test_there_are_many_files():
