@@ -307,7 +307,7 @@ def sections_of(block: Block, form: CsvFormat) -> list[Section]:
     for head, end in zip(heads, [*heads[1:], len(rows)], strict=True):
         line, names = rows[head]
         below = rows[head + 1 : end]
-        while end < len(rows) and below and below[-1][1][0] in titles:
+        while end < len(rows) and below and _is_title(below[-1][1], len(names), titles):
             below.pop()
         places = [names.index(name) for name in stamps if name in names]
         n_between = 0
@@ -326,6 +326,11 @@ def sections_of(block: Block, form: CsvFormat) -> list[Section]:
         else:
             sections.append(found)
     return sections
+
+
+def _is_title(row: list[str], width: int, titles: set[str]) -> bool:
+    """Whether a line above names is no record: it begins as at the top of the file, or with a letter."""
+    return row[0] in titles or (len(row) != width and row[0][:1].isalpha())
 
 
 def _records(section: Section, where: str) -> list[Line]:
@@ -752,12 +757,17 @@ def of_the_right_clock(records: pd.DataFrame, file: Path) -> tuple[pd.DataFrame,
             f"{wrong.max()}. They are set aside, as of a wrong clock. Correct their stamps if they count"
         )
         findings.append(RecordsWarning(text, "wrong-stamps"))
-    first, last = right.index.tz_localize(None).min(), right.index.tz_localize(None).max()
+    stamps = right.index.tz_localize(None).sort_values()
+    first, last, gaps = stamps.min(), stamps.max(), np.diff(stamps) / DAY
     never_set = [pd.Timestamp("1980-01-06"), pd.Timestamp("2000-01-01")]
-    if first.year < 1990 or last > pd.Timestamp.now() + YEAR or any(0 <= (first - one) / DAY < 1 for one in never_set):
+    is_unset = (
+        first.year < 1990 or last > pd.Timestamp.now() + YEAR or any(0 <= (first - t) / DAY < 1 for t in never_set)
+    )
+    if is_unset or (gaps > 730).any():
+        years = f", with {gaps.max() / 365.25:.1f} years between" if (gaps > 730).any() else ""
         text = (
-            f"the stamps of {file.name} are from {first} to {last}, as of a clock that was not set. They are taken as "
-            "they are. Correct them, or give their format"
+            f"the stamps of {file.name} are from {first} to {last}{years}, as of a clock that was not set. They are "
+            "taken as they are. Correct them, or give their format"
         )
         findings.append(RecordsWarning(text, "wrong-stamps"))
     return right, findings
