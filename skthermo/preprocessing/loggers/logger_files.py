@@ -316,7 +316,7 @@ def sections_of(block: Block, form: CsvFormat) -> list[Section]:
                 len(row) > max(places, default=0) and parsed_or_iso([_stamp_text(row, places)], form.stamps).notna()[0]
             )
             has_number = any(_is_number(cell, form.decimal) for cell in row)
-            if has_stamp or (has_number if sections else number >= first + n_lines):
+            if has_stamp or (has_number if sections or block.names_line else number >= first + n_lines):
                 break
             n_between += 1
         width = used_width([row for _, row in rows[head:end]], len(names))
@@ -370,21 +370,27 @@ def blocks_of_records(file: Path, form: CsvFormat) -> tuple[list[Block], list[Re
         return blocks, []
     longest = max(blocks, key=lambda block: len(block.rows))
     names = next((row for line, row in longest.rows if line >= form.names_line), [])
-    stamps, found = list(form.stamp_columns) or names[:1], []
-    for block in blocks:
-        heads = [place for place, (_, row) in enumerate(block.rows) if all(name in row for name in stamps)]
-        if block is longest:
-            found.append(block)
-        elif heads and stamps != [""]:
-            found.append(block._replace(names_line=block.rows[heads[0]][0]))
+    lines = {block.where: _line_of_names(block, form, names) for block in blocks if block is not longest}
+    found = [block._replace(names_line=lines.get(block.where)) for block in blocks if lines.get(block.where, 1)]
     read = [block.where.rpartition("sheet ")[2] for block in found]
-    others = [
-        block.where.rpartition("sheet ")[2] for block in blocks if not any(block.where == one.where for one in found)
-    ]
-    text = f"of {file.name}, the sheets {', '.join(read)} are read"
+    others = [block.where.rpartition("sheet ")[2] for block in blocks if not lines.get(block.where, 1)]
+    text = f"sheets of {file.name} that are read: {', '.join(read)}"
     if others:
-        text += f", and {', '.join(others)} are not, as they have no column {stamps[0]!r}"
+        text += f"; not {', '.join(others)}, without stamps as on the longest"
     return found, [RecordsWarning(f"{text}. Name the stamps alike on each sheet that holds records", "read-as")]
+
+
+def _line_of_names(block: Block, form: CsvFormat, names: Sequence[str]) -> int | None:
+    """The line of names of a sheet: one that names the stamps as the longest sheet does, or the one above stamps in the
+    first column; None where there is neither."""
+    stamps = list(form.stamp_columns) or names[:1]
+    if named := [line for line, row in block.rows if stamps != [""] and all(name in row for name in stamps)]:
+        return named[0]
+    is_stamp = parsed_or_iso([row[0] for _, row in block.rows], form.stamps).notna()
+    first = int(is_stamp.argmax()) if len(is_stamp) else 0
+    if form.stamp_columns or not first or 2 * is_stamp.sum() < len(is_stamp):
+        return None
+    return max(block.rows[:first], key=lambda one: sum(map(bool, one[1])))[0]
 
 
 def sheets_of(file: Path) -> tuple[dict[str, Any], str]:
@@ -726,22 +732,18 @@ def _units_and_texts(file: Path, form: CsvFormat, wanted: Collection[str]) -> tu
                 if unit and units.setdefault(name, unit) != unit:
                     text = f"{name!r} is in {unit.name} and in {units[name].name}"
                     raise ValueError(f"{file}, line {section.line}: {text}; expected one unit of a column")
+        stamps = list(form.stamp_columns) or section.names[:1]
         for _, row in section.records[:MOST_LOOKED_AT]:
             for name, cell in zip(section.names, row, strict=False):
-                if (is_number := _is_number(cell, form.decimal)) is not None:
+                if name not in stamps and (is_number := _is_number(cell, form.decimal)) is not None:
                     kinds.setdefault(name, []).append(is_number)
-    stamps = list(form.stamp_columns) or sections[0].names[:1]
-    ignored = {
-        name: "it holds text"
-        for name, found in kinds.items()
-        if name not in stamps and sum(found) < MOSTLY * len(found)
-    }
+    ignored = {name: "it holds text" for name, found in kinds.items() if sum(found) < MOSTLY * len(found)}
     shared = [section for section in sections if len(set(section.names) & set(sections[0].names)) > len(stamps)]
     if len(shared) == len(sections):
         n_records = sum(len(section.records) for section in sections)
         for name in kinds:
             n_own = sum(len(section.records) for section in sections if name in section.names)
-            if n_own < n_records and name not in {*stamps, *wanted}:
+            if n_own < n_records and name not in wanted:
                 ignored.setdefault(name, f"only {n_own} of {n_records} records have it")
     return units, ignored
 
