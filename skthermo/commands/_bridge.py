@@ -28,9 +28,9 @@ from skthermo.preprocessing.loggers.logger_files import (
     NO_TEXT_FILES,
     CsvFormat,
     in_zone,
-    of_the_right_clock,
     read_file,
 )
+from skthermo.preprocessing.loggers.stamps import of_the_right_clock
 from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)

@@ -10,7 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from skthermo.preprocessing import read_records
-from skthermo.preprocessing.loggers.logger_files import DAYS, CsvFormat, look_at, read_file
+from skthermo.preprocessing.loggers.logger_files import CsvFormat, look_at, read_file
+from skthermo.preprocessing.loggers.stamps import DAYS
 from tests.commands.folders import run
 from tests.nights import by_day
 

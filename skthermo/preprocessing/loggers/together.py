@@ -21,7 +21,8 @@ from skthermo.preprocessing._quantities import (
     kind_of,
     varies_as_modes,
 )
-from skthermo.preprocessing.loggers.logger_files import MOSTLY, FileLook, look_at, once
+from skthermo.preprocessing.loggers.logger_files import FileLook, look_at, once
+from skthermo.preprocessing.loggers.stamps import MOSTLY
 
 HZ = "Hz"
 
