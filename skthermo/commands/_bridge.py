@@ -264,7 +264,6 @@ class Bridge:
                     own = look_at(file, form.time_zone, wanted=settings.records.columns).form
                     table = read_columns(file, replace(own, missing=form.missing), settings.records, **options)
                 check_layout(table, file, settings.records, taken.layouts)
-            table = self._possible(table, file)
             table = in_zone(table, monitor.last_.tz, file).rename_axis(monitor.baseline_.index.name)
             return table if after is None else table[table.index > after]
 
@@ -283,14 +282,6 @@ class Bridge:
                 reader = partial(read, after=after)
                 found.append(NewFile(file, reader(file), pd.DataFrame(), {}) if named else taken.new_in(file, reader))
         return [file for file in found if file is not None]
-
-    def _possible(self, table: pd.DataFrame, file: Path) -> pd.DataFrame:
-        """Records without those whose stamps no clock of a logger has; these are named."""
-        is_possible = (table.index.year > 1900) & (table.index.year < 2200)
-        if not is_possible.all():
-            n_left, first = int((~is_possible).sum()), table.index[~is_possible][0]
-            self.lines.append(f"left out of {file}, as the year is impossible: {n_left}, the first of {first}")
-        return table[is_possible]
 
     def _take_in(self, monitor: Monitor, new: Sequence[NewFile]) -> tuple[pd.DataFrame, dict[Path, pd.DatetimeIndex]]:
         """Evaluations of the records of some files, and which stamps of each file were handed over.
