@@ -307,7 +307,7 @@ class Monitor(SavesFrames, Estimator):
     @property
     def evaluations_(self) -> pd.DataFrame:
         """The latest evaluation of each record."""
-        return evaluations(self.decisions_, self._events())
+        return evaluations(self._events())
 
     @property
     def days_(self) -> pd.DataFrame:
@@ -468,7 +468,7 @@ class Monitor(SavesFrames, Estimator):
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
         baseline = residuals(detector, trained, self.targets_, trained, is_baseline=True)
         slow = 0.25  # of the false alarms that are asked for
-        test = MeanTest.learned(baseline, detector, trained, slow * self.false_alarms_per_year)
+        test = MeanTest.learned(baseline, detector, trained, slow * self.false_alarms_per_year, self.since_)
         share = 1.0 if test.errors is None else 1 - slow
         levels = EventLevels.learned(index, self.false_alarms_per_year, self.persistence, share)
         self.mean_test_ = test
@@ -518,14 +518,14 @@ class Monitor(SavesFrames, Estimator):
         kinds = {"is_blind": bool, "n_left_out": np.int64} | dict.fromkeys(texts, object)
         return pd.DataFrame(values, stamps).astype({name: kinds.get(name, float) for name in values})
 
-    def _decide(self, first: pd.Timestamp) -> None:
-        """Evaluate the records from a stamp on anew, each by what was known at the beginning of its day."""
+    def _decide(self, first: pd.Timestamp) -> pd.Timestamp:
+        """Evaluate the records from a stamp on anew, or from when a sensor had failed before it; gives that stamp."""
         earlier = [one for one in self.states_ if one.day <= first]
         begin = earlier[-1] if earlier else self.corrections_.start(min(self.began_, midnight(first)))
         raw = self.records_[self.records_.index >= begin.day]
         if not len(raw):
             self.states_ = (begin,)
-            return
+            return first
         states = self.corrections_.advanced(begin, raw)
         first = midnight(min([first, *changed_times(self._faults_of(self.states_[-1]), self._faults_of(states[-1]))]))
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
@@ -543,6 +543,7 @@ class Monitor(SavesFrames, Estimator):
         weeks = self.weeks_[self.weeks_.index <= first]
         self.weeks_ = pd.concat([weeks, self.mean_test_.weeks(self.means_, self._test_times(weeks.index))])
         self._explain(first)
+        return first
 
     def _drifts_before(self, time: pd.Timestamp, like: pd.DataFrame) -> pd.DataFrame:
         """Shares of stiffness that were taken out of records before a time."""
@@ -635,9 +636,12 @@ class Monitor(SavesFrames, Estimator):
         decisions.loc[found.index, found.columns] = found
         self.decisions_ = decisions
 
-    def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
+    def _note(
+        self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any], events: Sequence[Events] | None = None
+    ) -> None:
         """Append the changes since a former state to the transitions, after the actions that made them."""
-        old, new = (events[~(events["end"] < first)] for events in (before._answered(), self._answered()))
+        tables = [one.table for one in events or (before._events(), self._events())]
+        old, new = (table[~(table["end"] < first)] for table in tables)
         found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
         for one in [*done, *sorted(found, key=lambda change: change["time"])]:
             plain = {"id": len(self.transitions_) + 1, "what": one["what"], "time": one["time"].isoformat()}
@@ -690,13 +694,15 @@ class Monitor(SavesFrames, Estimator):
         reasons = pd.concat([intake.too_late, intake.early])
         refused = self._decisions(reasons.index, reason=reasons.to_numpy())
         nobody = Events(refused, self.weeks_[:0], self.acknowledgements_, 1)
-        answers = evaluations(refused, nobody).assign(revised=False)
+        answers = evaluations(nobody).assign(revised=False)
         if len(fresh):
             known = pd.concat([self.records_, intake.fresh])
             after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
-            after._decide(fresh[0])
-            after._note(self, fresh[0])
-            news = _news(self.evaluations_, after.evaluations_, fresh)
+            first = after._decide(fresh[0])
+            was, now = self._events(), after._events()
+            after._note(self, fresh[0], events=(was, now))
+            places = (events.decisions.index.searchsorted(first) for events in (was, now))
+            news = _news(*map(evaluations, (was, now), places), fresh)
             answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
         vars(self).update(vars(after))
@@ -972,8 +978,8 @@ class Monitor(SavesFrames, Estimator):
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
         after, trained, today = self._twin(), retraining.baseline, midnight(self.last_)
-        after._take_charge(retraining.detector, trained)
         after.prior_, after.since_ = retraining.prior, retraining.since
+        after._take_charge(retraining.detector, trained)
         if retraining.kind == "new baseline":
             events = self.events_
             for _, event in events[events["end"].isna() & ~events["acknowledged"]].iterrows():
