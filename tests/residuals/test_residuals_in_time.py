@@ -24,6 +24,13 @@ def test_independent_records_are_the_variance_over_that_of_the_mean(correlation)
     assert np.median(counts) == pytest.approx(n * (1 - correlation) / (1 + correlation), rel=0.3)
 
 
+def test_columns_together_tell_how_few_records_that_remember_for_long_are_worth():
+    counts = [independent_records(autoregressive(60, 0.95, seed, 6)) for seed in range(30)]
+    assert np.median(counts) < 8  # the mean of the records scatters as that of 1.5
+    rows = autoregressive(600, 0.5, n_columns=3)
+    assert independent_records(rows * [1.0, 1e3, 1e-3]) == pytest.approx(independent_records(rows))
+
+
 def test_numbers_of_independent_records_have_bounds():
     drift = np.cumsum(np.random.default_rng(0).normal(size=500))
     assert 1 <= independent_records(drift) < 15
