@@ -15,8 +15,9 @@ def independent_records(values: Array, n_parts: int = 12) -> float:
     values : ndarray of shape (n_records,) or (n_records, n_columns)
         NaN is left out. Several columns, each in its standard deviations, tell one number together.
     n_parts : int, default=12
-        Parts of equal length; the variance of their means tells the variance of the mean of all records, and the
-        correlation of neighbouring parts how much larger it is where records remember for longer than a part.
+        Parts of equal length; the variance of their means tells the variance of the mean of all records. Of several
+        columns, the correlation of neighbouring parts tells how much larger it is where records remember for longer
+        than a part; of one column, that of a dozen parts is too vague.
 
     Returns
     -------
@@ -40,7 +41,8 @@ def independent_records(values: Array, n_parts: int = 12) -> float:
     means = np.nan_to_num(means - means_of_known(means))
     squares = (means**2).sum()
     neighbours = (n_parts * (means[1:] * means[:-1]).sum() / squares + 1) / (n_parts - 3)  # its bias removed
-    memory = (1 + np.clip(neighbours, 0, 0.9)) / (1 - np.clip(neighbours, 0, 0.9))
+    neighbours = np.clip(neighbours, 0, 0.9) if rows.shape[1] > 1 else 0.0
+    memory = (1 + neighbours) / (1 - neighbours)
     n_records = (~np.isnan(rows)).sum() / rows.shape[1]
     variance = squares / ((n_parts - 1) * rows.shape[1])
     return float(np.clip(n_parts / (variance * memory), 1, n_records))
