@@ -58,7 +58,7 @@ def loss_of(name):
 
 
 def main():
-    options = arguments(__doc__, structures=STRUCTURES, repeats=(5, "of the simulated noise"))
+    options = arguments(__doc__, structures=STRUCTURES, repeats=(2, "of the simulated noise"))
     warnings.simplefilter("ignore")
     found = pd.DataFrame([row for part in options.structures for row in rates(part, options)])
     found["kind"] = np.where(found["state"] == "healthy", "healthy", "damaged")
