@@ -1,11 +1,11 @@
-"""Shares of records in alarm that a study promises, beside those of measured records of a later year.
+"""Shares of records in alarm that a study predicts, beside those of measured records of a later year.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/study_promises.py [--structures truss footbridge girder arch soil]
+    OMP_NUM_THREADS=1 python tests/benchmarks/study_rates.py [--structures truss footbridge girder arch soil]
 
 A user fits the default chain and `CompensatedDetector`, of single records and by day, to a year of each structure of
 `forward.py`, with the user's model as directions, and `DetectabilityStudy` predicts what share of the later year's
 records is in alarm, healthy and damaged. The detector then evaluates the true records of that year. The exit code is 1
-where promised and true rates differ, in the mean over structures, by more than 1.5 points without damage or 4 with it.
+where predicted and true rates differ, in the mean over structures, by more than 1.5 points without damage or 4 with it.
 """
 
 import sys
@@ -62,10 +62,10 @@ def main():
     warnings.simplefilter("ignore")
     found = pd.DataFrame([row for part in options.structures for row in rates(part, options)])
     found["kind"] = np.where(found["state"] == "healthy", "healthy", "damaged")
-    found = found.rename(columns={"simulated": "promised, %", "reference": "true, %"})
-    found["difference"] = (found["promised, %"] - found["true, %"]).abs()
+    found = found.rename(columns={"simulated": "predicted, %", "reference": "true, %"})
+    found["difference"] = (found["predicted, %"] - found["true, %"]).abs()
     shown(
-        "Records in alarm in a later year, as a study promises, and of measured records",
+        "Records in alarm in a later year, as a study predicts, and of measured records",
         found.drop(columns="kind").set_index(["structure", "detector", "state"]),
         1,
     )

@@ -1,4 +1,4 @@
-"""What detectors promise whatever their records: units, order of columns, other weather, labels of damage."""
+"""Laws of all detectors: units, order of columns, other weather, labels of damage."""
 
 import warnings
 
@@ -118,10 +118,14 @@ def test_what_labels_call_damaged_is_not_learned(name):
     both, labels = pd.concat([healthy, later]), np.repeat([1, -1], [len(healthy), len(later)])
     found = {
         kind: (DETECTORS[name].fit(records, y).predict(later) == -1).mean()
-        for kind, records, y in (("told", both, labels), ("untold", both, np.ones(len(both))), ("alone", healthy, None))
+        for kind, records, y in (
+            ("labelled", both, labels),
+            ("without labels", both, np.ones(len(both))),
+            ("alone", healthy, None),
+        )
     }
-    assert found["told"] == pytest.approx(found["alone"], abs=0.1)
-    assert found["untold"] < 0.6 * found["told"]
+    assert found["labelled"] == pytest.approx(found["alone"], abs=0.1)
+    assert found["without labels"] < 0.6 * found["labelled"]
 
 
 @WARM
