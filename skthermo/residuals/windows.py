@@ -66,10 +66,9 @@ class WindowMeans:
         return cls(window, width, share, limits, usual, history)
 
     def __call__(self, residuals: pd.DataFrame, regime: Regimes, *, is_baseline: bool = False) -> Array:
-        """Means of records in order of time; NaN where a window holds too few values, in a baseline in its own regime.
+        """Means of records in order of time; NaN where a window holds too few values.
 
-        A later mean of few values, because the weather has just changed its regime, counts for less, by the root of
-        their share of the usual number. The records of the baseline are the history of later records.
+        The records of the baseline are the history of later records.
         """
         values, index, n_before = residuals.to_numpy(), residuals.index, 0
         if self.history is not None and not is_baseline and len(index) and index[0] > self.history[0].index[-1]:
@@ -77,14 +76,7 @@ class WindowMeans:
             values, index, n_before = np.vstack([before, values]), before.index.append(index), len(before)
             regime = np.concatenate([before_regime, regime])
         means, counts = means_by_regime(values, regime, index, self.window, self.limits)
-        usual = np.maximum(self.usual[regime], 1)
-        enough = np.maximum(self.share * usual, 1)
-        if is_baseline:
-            return np.where(counts >= enough, means, np.nan)
-        table = pd.DataFrame(values, None if isinstance(self.window, int) else index)
-        held = table.rolling(self.window, min_periods=0).count().to_numpy()
-        means = np.where(counts < enough, means * np.sqrt(counts / usual), means)
-        return np.where((counts > 0) & (held >= enough), means, np.nan)[n_before:]
+        return np.where(counts >= np.maximum(self.share * self.usual[regime], 1), means, np.nan)[n_before:]
 
 
 def means_by_regime(
