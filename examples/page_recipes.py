@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
 
 def command_line() -> argparse.ArgumentParser:
@@ -12,6 +13,19 @@ def command_line() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser()
     parser.add_argument("--figures", type=Path, default=Path("figures"), help="folder for the figures")
     return parser
+
+
+def print_table(title: str, table: object, *lines: str) -> None:
+    """Print a table or a text under its title, and lines that say what its columns are."""
+    print("", title, "-" * len(title), table, *lines, sep="\n")
+
+
+def entitle(figure: Figure, title: str) -> None:
+    """Give a figure a title; above its legend, where it has one outside its axes."""
+    if figure.legends:
+        figure.legends[0].set_title(title, {"size": "large"})
+    else:
+        figure.suptitle(title)
 
 
 def save_figures(folder: Path) -> list[Path]:

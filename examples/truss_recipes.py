@@ -25,12 +25,12 @@ PAPER_MAPE = [
     [1.41, 1.50, 1.29, 1.64, 1.57, 1.37],
 ]
 PAPER_RATES = {
-    "thermo-mechanical": [4.11, 26.03, 94.79, 100, 100, 100, 12.60, 59.73, 98.08, 100, 100, 66.30, 100, 100, 100, 100],
-    "data-informed": [4.38, 21.64, 92.33, 100, 100, 100, 7.40, 53.97, 97.26, 100, 100, 66.30, 100, 100, 100, 100],
+    "reference": [4.11, 26.03, 94.79, 100, 100, 100, 12.60, 59.73, 98.08, 100, 100, 66.30, 100, 100, 100, 100],
+    "simulated": [4.38, 21.64, 92.33, 100, 100, 100, 7.40, 53.97, 97.26, 100, 100, 66.30, 100, 100, 100, 100],
 }
 PAPER_SMALLEST = {"bottom": 30, "top": 30, "diagonal": 20}  # as its text says; by its rates, bottom is 20
 LETTERS = {"bottom": "SB", "top": "ST", "diagonal": "SD"}
-SOURCES = {"reference": "thermo-mechanical", "simulated": "data-informed"}
+SOURCES = {"reference": "measured", "simulated": "simulated"}  # "thermo-mechanical", "data-informed" of the paper
 
 
 def papers_name(scenario):
@@ -84,10 +84,11 @@ def table_3(studies):
     results = results.set_index(["scenario", "source"])
     columns = {"here": ("rate", "mean"), "lowest": ("pi_low", "min"), "highest": ("pi_high", "max")}
     table = 100 * results.groupby(level=[0, 1], sort=False).agg(**columns)
-    table.insert(0, "paper", pd.DataFrame(PAPER_RATES, results.index.unique(0)).T.unstack())
-    table = table.unstack("source").swaplevel(axis=1)[list(PAPER_RATES)].loc[results.index.unique(0)]
+    paper = pd.DataFrame(PAPER_RATES, results.index.unique(0)).rename(columns=SOURCES)
+    table.insert(0, "paper", paper.T.unstack())
+    table = table.unstack("source").swaplevel(axis=1)[list(paper)].loc[results.index.unique(0)]
     gaps = [study.results_.pivot(index="scenario", columns="source", values="rate") for study in studies]
-    table["difference", "paper"] = (table["data-informed", "paper"] - table["thermo-mechanical", "paper"]).abs()
+    table["difference", "paper"] = (table["simulated", "paper"] - table["measured", "paper"]).abs()
     table["difference", "here"] = sum(100 * (gap["simulated"] - gap["reference"]).abs() for gap in gaps) / len(gaps)
     table = table.rename(index=papers_name)
     table.loc["Average"] = table[["difference"]].mean()
@@ -101,4 +102,4 @@ def smallest(studies):
     by_level = {f"POD {level:.0%}": 100 * each.groupby(level=[0, 1]).agg(**columns) for level, each in found.items()}
     table = pd.concat(by_level, axis=1).loc[GROUPS]
     table.insert(0, ("", "paper"), table.index.get_level_values("family").map(PAPER_SMALLEST))
-    return table.round(2)
+    return table.rename(index=SOURCES, level="source").rename_axis(["group", "years"]).round(2)

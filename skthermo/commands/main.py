@@ -1,5 +1,6 @@
 """Commands of nightly jobs: monitors without a line of Python.
 
+    skthermo demo FOLDER                           write files of a synthetic bridge to try these commands on
     skthermo check T.csv F.csv                     look at records
     skthermo init T.csv F.csv --into bridge        write settings that fit them
     skthermo fit bridge/monitor.toml               fit a monitor to the baseline
@@ -47,6 +48,7 @@ from skthermo.commands._settings import HOW_TO_BEGIN
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
 EXPLAINED = (ValueError, OSError, ImportError)  # errors that need no traceback
 COMMANDS = {
+    "demo": "write files of a synthetic bridge to try the other commands on",
     "check": "look at files of records, and say what was found",
     "init": "look at files of records, and write settings that fit them",
     "fit": "fit monitors to their baselines",
@@ -72,6 +74,7 @@ OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("--zone", RECORDS, {"help": 'time zone of the logger\'s clock, such as "Europe/Brussels"'}),
     ("--stamps", RECORDS, {"metavar": "FORMAT", "help": 'such as "%%m/%%d/%%Y %%H:%%M" (default: as stamps tell)'}),
     ("--until", RECORDS, {"metavar": "TIME", "help": "last moment of the baseline (default: all records)"}),
+    ("folder", "demo", {"type": Path, "help": "made if it does not exist"}),
     ("--into", "init", {"type": Path, "required": True, "metavar": "FOLDER", "help": "made if it does not exist"}),
     ("--name", "init", {"dest": "bridge", "help": "of the bridge (default: that of the folder)"}),
     ("files", SINGLE, {"type": Path, "nargs": 1, "metavar": "file", "help": BRIDGES}),
@@ -156,7 +159,8 @@ def _run(options: argparse.Namespace, facts: dict[str, Any]) -> None:
     """Do what was asked for, and then say each warning once."""
     with collected() as findings:
         try:
-            facts["exit_code"] = (_look if options.name in RECORDS.split() else _on_bridges)(options, facts)
+            work = _demonstrate if options.name == "demo" else _look if options.name in RECORDS.split() else _on_bridges
+            facts["exit_code"] = work(options, facts)
         except Exception as error:  # Python's own exit code of an error would be that of an alarm
             _complain(error)
             facts["errors"].append(sentence(error))
@@ -321,6 +325,15 @@ def _look(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     if not options.json:
         _print("\n".join(lines))
     return HEALTHY if options.name == "init" or found.findings.table.empty else ALARM
+
+
+def _demonstrate(options: argparse.Namespace, facts: dict[str, Any]) -> int:
+    from skthermo.commands._demo import write_demo
+
+    lines = write_demo(options.folder, facts["time"])
+    if not options.json:
+        _print("\n".join(lines))
+    return HEALTHY
 
 
 def write_metrics(file: Path, bridges: Sequence[Mapping[str, Any]], now: pd.Timestamp) -> None:

@@ -160,16 +160,12 @@ class Structure:
             if not isinstance(argument, Mapping):
                 raise ValueError(f"{what} is {argument!r:.200}; expected {expected}")
         self._coordinates = read_coordinates(nodes)
-        first: dict[tuple[float, ...], Hashable] = {}
-        for node, xyz in self._coordinates.items():
-            twin = first.setdefault(tuple(xyz.tolist()), node)
-            if twin != node:
-                raise ValueError(f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}")
         self._members = dict(members)
         places = np.array(list(self._coordinates.values()))
         extent = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
         for name, element in self._members.items():
             check_element(name, element, self._coordinates, extent)
+        self._check_places()
         self._groups = {group: self._read_group(group, names) for group, names in (groups or {}).items()}
         self.dofs: list[Label] = list(self._free_dofs(supports))
         self._supports = {node: tuple(_read_directions(along, node)) for node, along in supports.items()}
@@ -404,6 +400,18 @@ class Structure:
                 )
             bindings[name] = (prop, group, tuple(where) or matrices)
         return bindings
+
+    def _check_places(self) -> None:
+        """Refuse two nodes at one place that no member connects: a joint has a spring."""
+        connected = [set(element.nodes) for element in self._members.values()]
+        first: dict[tuple[float, ...], Hashable] = {}
+        for node, xyz in self._coordinates.items():
+            twin = first.setdefault(tuple(xyz.tolist()), node)
+            if twin != node and not any({twin, node} <= nodes for nodes in connected):
+                raise ValueError(
+                    f"nodes {twin!r} and {node!r} are duplicates: both are at {tuple(xyz.tolist())}; expected one "
+                    f"node, or a joint, such as Spring({twin!r}, 'rz', k, to={node!r})"
+                )
 
     def _read_group(self, group: str, names: object) -> frozenset:
         if not isinstance(names, Collection):

@@ -56,11 +56,11 @@ def test_minimum_detectable_damage_is_the_papers(studies):
     table = EXAMPLE.smallest(studies)
     assert list(table.index.unique(0)) == GROUPS
     for level in ("POD 90%", "POD 95%"):
-        found = table[level, "here"].unstack("source")
-        assert (np.abs(found["simulated"] - found["reference"]) <= 5).all()  # half a step of the severities
+        found = table[level, "here"].unstack("years")
+        assert (np.abs(found["simulated"] - found["measured"]) <= 5).all()  # half a step of the severities
         assert (table[level, "lowest"] <= table[level, "here"]).all()
         assert (table[level, "here"] <= table[level, "highest"]).all()
-    assert table["POD 90%", "here"].unstack("source").loc[GROUPS, "reference"].tolist() == [20, 30, 20]
+    assert table["POD 90%", "here"].unstack("years")["measured"].loc[GROUPS].tolist() == [20, 30, 20]
     assert (table["", "paper"] <= table["POD 95%", "highest"]).all()
 
 

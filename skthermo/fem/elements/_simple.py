@@ -65,7 +65,7 @@ class Bar(PhysicalElement):
 
 @dataclass(frozen=True)
 class Spring(PhysicalElement):
-    """Spring between a node and the ground.
+    """Spring between a node and the ground, or between two nodes, which may be at one place, as in a joint.
 
     Parameters
     ----------
@@ -75,6 +75,8 @@ class Spring(PhysicalElement):
         "x", "y" or "z", or, against rotation about an axis, "rx", "ry" or "rz".
     k : float
         Stiffness in N/m, or N m/rad against rotation.
+    to : hashable, optional
+        The other node; by default the ground.
 
     Examples
     --------
@@ -86,21 +88,27 @@ class Spring(PhysicalElement):
     node: Hashable
     direction: str
     k: float
+    to: Hashable | None = None
 
     _properties = ("k",)
 
     @property
-    def nodes(self) -> tuple[Hashable]:
-        """Its node."""
-        return (self.node,)
+    def nodes(self) -> tuple[Hashable, ...]:
+        """Its node, or both."""
+        return (self.node,) if self.to is None else (self.node, self.to)
 
     def dofs(self, dimension: int) -> list[Dof]:
         """Its one direction."""
-        return [(self.node, self.direction)]
+        return [(node, self.direction) for node in self.nodes]
+
+    def ends(self, coordinates: Array) -> Array:
+        """Where its first node is: a spring has no length."""
+        return coordinates[:1]
 
     def stiffness(self, coordinates: Array) -> ByProperties:
         """Its stiffness in N/m, or in N m/rad for a rotation."""
-        return {("k",): np.array([[self.k]])}
+        stretch = np.array([1.0, -1.0])[: len(self.nodes)]
+        return {("k",): self.k * np.outer(stretch, stretch)}
 
     def mass(self, coordinates: Array) -> ByProperties:
         """A spring has no mass."""
