@@ -377,13 +377,11 @@ GROUPS = {
         "monitor-later": monitor_update_later,
         "two-files": page_of_two_files,
     },
-    "Many records": {
-        "mahalanobis": mahalanobis,
-        "forest": forest,
+    "Many records": {"mahalanobis": mahalanobis, "forest": forest, "chain-records": hourly_chain},
+    "Years of hourly records": {
         "detector-year": hourly_detector,
         "mapper-year": hourly_mapper,
         "chain-year": hourly_chain_year,
-        "chain-records": hourly_chain,
     },
     "Chains and studies": {
         "truss-chain": truss_chain,
