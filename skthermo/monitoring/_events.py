@@ -222,7 +222,8 @@ class Events:
         ends, parts = np.append(np.searchsorted(self.times, at), len(self.times)), Parts(weeks, weeks)
         of_record = np.searchsorted(at, self.times, side="right") - 1
         for start, end in spans:
-            first, stop = ends[start], ends[end]
+            anew = self.times.searchsorted(self.starts[self.starts > at[start]]).min(initial=len(self.times))
+            first, stop = ends[start], min(ends[end], anew)
             if first < stop:
                 peak = start + int(np.nanargmax(level[start:end]))
                 modes, own = weeks["modes"].iloc[peak], parts(start, end)

@@ -987,7 +987,7 @@ class Monitor(SavesFrames, Estimator):
                     event["kind"], event["peak_time"], True, f"ended by the new baseline since {retraining.since}"
                 )
             after.restarts_ = (*self.restarts_, today.as_unit("ns").value)
-            after.means_ = self.means_[:0]  # of the structure as it was
+            after.means_, after.weeks_ = self.means_[:0], self.weeks_[self.weeks_.index < today]
             raw = pd.concat([self.baseline_, self.records_])[self.reference_]
             T, F = trained.drop(columns=self.targets_), trained[self.targets_]
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now
