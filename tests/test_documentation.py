@@ -107,6 +107,12 @@ def test_pages_import_nothing_private():
     assert not {page: imports for page, imports in private.items() if imports}
 
 
+def test_the_users_pages_have_at_most_30000_words():
+    others = {"measured", "reference", "contributing", "_templates"}
+    pages = [page for page in PAGES if page != README and not others & set(page.relative_to(ROOT / "docs").parts)]
+    assert sum(len(page.read_text().split()) for page in pages) <= 30_000
+
+
 def test_the_guide_shows_code():
     assert sum(len(python_blocks(page)) for page in PAGES) >= 5
 
