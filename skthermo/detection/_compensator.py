@@ -69,6 +69,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         The fold of each row of the baseline, -1 where no fold tests it.
     relative_ : ndarray of bool of shape (n_targets,)
         Which targets are positive, with a standard deviation below a third of their mean: their residuals are relative.
+    residuals_ : ndarray of shape (n_samples, n_targets)
+        Residuals of the baseline, out of fold.
     scale_ : ndarray of shape (n_targets,)
         Robust standard deviations of the residuals of the baseline.
     usual_deviation_ : ndarray of shape (n_targets,)
@@ -353,6 +355,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.extrapolation_ = self._learn_extrapolation(estimator, inputs, F)
         residuals = self._shrunk(residuals, inputs, self._with_fills(T, inputs, predicted))
         self.normal_ = Gaussian.fitted(residuals)
+        self.residuals_ = residuals
         unknown = np.isnan(predicted[0]).all(axis=1) & (self.folds_ >= 0)
         findings += [*filled, *doubts, *unpredicted_findings(unknown, as_floats(inputs))]
         findings += unseen_weather(inputs, self.folds_, "Their residuals are too large, and may hide damage")

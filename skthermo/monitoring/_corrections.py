@@ -13,7 +13,7 @@ import pandas as pd
 from skthermo._core.frames import MISSING_CODES, midnights
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._drift import DriftFollower
-from skthermo.monitoring._sensors import SensorWatch, values_text
+from skthermo.monitoring._sensors import Fault, SensorWatch, values_text
 from skthermo.preprocessing.checks import Plausible
 
 
@@ -64,53 +64,70 @@ class Corrections:
         """Records without what no sensor measures."""
         return raw.mask(self.plausible.implausible(raw.to_numpy()))
 
-    def corrected(
-        self, begin: DayState, raw: pd.DataFrame, acknowledged: Sequence[int] = ()
-    ) -> tuple[pd.DataFrame, pd.DataFrame, tuple[DayState, ...]]:
-        """Raw records from a day on as the detector sees them, each day by what was known at its beginning.
-
-        Also what became of their values, a row for each record (``n_held`` responses that were set aside although the
-        structure may have moved them, ``held`` names them; ``n_left_out`` values; ``note``; and the shares of stiffness
-        by group, as in "drift top", that are taken out of the frequencies), and the states at the beginning of each
-        day. ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a sensor.
-        """
+    def advanced(self, begin: DayState, raw: pd.DataFrame) -> tuple[DayState, ...]:
+        """States at the beginning of each day of raw records from a day on, by the days before."""
         days = midnights(raw.index)
         bounds = [*np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[0] - 1)), len(raw)]
         if self.sensors is None and self.drift is None:
-            bounds = [0, len(raw)]
-        state, states, parts = begin, [], []
-        for first, stop in pairwise(bounds):
-            states.append(replace(state, day=days[first]))
-            *part, state = self._after(states[-1], raw.iloc[first:stop], acknowledged)
-            parts.append(part)
-        records, notes = (pd.concat(list(some)) for some in zip(*parts, strict=True))
-        return records, notes, tuple(states)
+            return (replace(begin, day=days[0]), replace(begin, day=days[-1]))[-1:]
+        states = [replace(begin, day=days[0])]
+        for (first, stop), next_day in zip(pairwise(bounds[:-1]), days[bounds[1:-1]], strict=True):
+            states.append(replace(self._after(states[-1], raw.iloc[first:stop]), day=next_day))
+        return tuple(states)
 
-    def _after(
-        self, state: DayState, raw: pd.DataFrame, acknowledged: Sequence[int]
-    ) -> tuple[pd.DataFrame, pd.DataFrame, DayState]:
-        """Records of one day, what became of their values, and the state after it."""
+    def _after(self, state: DayState, raw: pd.DataFrame) -> DayState:
+        """The state after the records of one day."""
+        wrong = self.plausible.implausible(raw.to_numpy())
+        T, F = self._split(raw.mask(wrong))
+        sensors, drift = state.sensors, state.drift
+        if self.drift is not None:
+            seen_T, seen_F = T.drop(columns=self.reference), F
+            if self.sensors is not None:
+                seen_T, seen_F, _ = self.sensors.masked(sensors.faults, T, F, once_found=True)
+            drift = self.drift.advance(drift, seen_T, seen_F.where(seen_F > 0))
+        if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
+            is_missing = wrong & (raw.isin(MISSING_CODES) | np.isinf(raw))
+            sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
+        return DayState(state.day, sensors, drift)
+
+    def drifts(self, states: Sequence[DayState], stamps: pd.DatetimeIndex) -> pd.DataFrame:
+        """Shares of stiffness by group, as in "drift top", that are taken out of records from the first state on."""
+        if self.drift is None:
+            return pd.DataFrame(index=stamps)
+        shares = [self.drift.taken_out(state.drift).add_prefix("drift ") for state in states]
+        table = pd.DataFrame(shares, pd.DatetimeIndex([state.day for state in states]).as_unit(stamps.unit))
+        return table.reindex(midnights(stamps), method="ffill").set_axis(stamps)
+
+    def corrected(
+        self,
+        faults: Sequence[Fault],
+        raw: pd.DataFrame,
+        drifts: pd.DataFrame,
+        acknowledged: Sequence[int] = (),
+        *,
+        once_found: bool = False,
+    ) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Raw records as the detector sees them, without values of sensors since these are at fault, and drift.
+
+        Also what became of their values, a row for each record (``n_held`` responses that were set aside although the
+        structure may have moved them, ``held`` names them; ``n_left_out`` values; columns ``at_fault``; ``note``; and
+        ``drifts``). ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a
+        sensor. With ``once_found``, values of sensors at fault stay until that was found.
+        """
         wrong = self.plausible.implausible(raw.to_numpy())
         T, F = self._split(raw.mask(wrong))
         notes = values_text(raw, wrong, self.units, "taken as missing")
-        sensors, drift, taken_out = state.sensors, state.drift, {}
         if self.sensors is None:
             seen_T, seen_F = T.drop(columns=self.reference), F
-            about = pd.DataFrame({"n_held": 0.0, "held": "", "n_left_out": 0, "note": ""}, raw.index)
-        else:  # it is to see what is implausible, but not what stands for a missing value
-            seen_T, seen_F, about = self.sensors.masked(sensors, T, F, acknowledged)
-            is_missing = wrong & (raw.isin(MISSING_CODES) | np.isinf(raw))
-            sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
-        responses = seen_F
+            about = pd.DataFrame({"n_held": 0.0, "held": "", "n_left_out": 0, "at_fault": "", "note": ""}, raw.index)
+        else:
+            seen_T, seen_F, about = self.sensors.masked(faults, T, F, acknowledged, once_found=once_found)
         if self.drift is not None:
-            responses = self.drift.corrected(drift, seen_F)
-            taken_out = self.drift.taken_out(drift).add_prefix("drift ").to_dict()
-            drift = self.drift.advance(drift, seen_T, seen_F.where(seen_F > 0))
+            seen_F = seen_F * np.exp(-self.drift.shifts(drifts, list(seen_F)))
         about["n_left_out"] += wrong.sum(axis=1)
         about["note"] = ["; ".join(filter(None, parts)) for parts in zip(notes, about["note"], strict=True)]
-        records = seen_T.join(responses)[[name for name in raw.columns if name not in self.reference]]
-        notes = about.assign(**taken_out).astype({"held": object, "note": object})
-        return records, notes, DayState(state.day, sensors, drift)
+        records = seen_T.join(seen_F)[[name for name in raw.columns if name not in self.reference]]
+        return records, about.join(drifts).astype({"held": object, "note": object, "at_fault": object})
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
         return records.drop(columns=self.targets), records[self.targets]

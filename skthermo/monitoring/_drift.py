@@ -291,10 +291,11 @@ class DriftFollower:
         trends = self._trends(learned)
         return learned if trends is None else replace(learned, change=tuple(trends.expected().tolist()))
 
-    def corrected(self, state: DriftState, F: pd.DataFrame) -> pd.DataFrame:
-        """Measured frequencies of the day after a state without the drift that is taken out."""
-        shift = dict(zip(self.modes, self.slopes @ np.array(state.change), strict=True))
-        return F * np.exp([-shift.get(mode, 0.0) for mode in F])
+    def shifts(self, drifts: pd.DataFrame, names: Sequence[Any]) -> Array:
+        """Shifts of ln f of some modes by the changes of stiffness that are taken out of records, "drift GROUP"."""
+        groups = [name.removeprefix("drift ") for name in drifts]
+        slopes = pd.DataFrame(self.slopes, self.modes, self.groups).reindex(names).fillna(0.0)[groups]
+        return np.log1p(drifts.to_numpy()) @ slopes.to_numpy().T
 
     def taken_out(self, state: DriftState) -> pd.Series:
         """Relative change of each group's stiffness that is taken out of the frequencies."""

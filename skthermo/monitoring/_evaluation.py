@@ -12,6 +12,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import BaseSearchCV
+from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, DirectionalDetector, TemperatureCompensator
 from skthermo.exceptions import ResultWarning
@@ -40,24 +41,52 @@ def parts_of(detector: Any) -> list[Any]:
     return [] if detector is None or detector == "passthrough" else [detector]
 
 
-def departures(detector: Any, records: pd.DataFrame, targets: list[Any], trained: pd.DataFrame) -> Array:
-    """Residuals of records in standard deviations, or responses where the detector has no compensator."""
+def residuals(
+    detector: Any, records: pd.DataFrame, targets: list[Any], trained: pd.DataFrame, *, is_baseline: bool = False
+) -> pd.DataFrame:
+    """What the weather does not explain of each record, without windows; departures from the mean of the baseline where
+    the detector has no compensator. Those of the baseline itself are out of fold."""
     *steps, last = parts_of(detector)
-    places = [n for n, step in enumerate(steps) if isinstance(step, TemperatureCompensator)]
     with collected(drop_others=True):
         if isinstance(last, CompensatedDetector):
-            compensator, scale, rest = last.compensator_, last.scale_, last.residuals(_through(steps, records))
-        elif places:
-            compensator, before = steps[places[0]], steps[: places[0]]
-            scale, rest = compensator.scale_, compensator.transform(_through(before, records))
+            before, compensator = steps, last.compensator_
         else:
-            deviation = trained[targets].std(ddof=0).replace(0.0, 1.0)
-            return ((records[targets] - trained[targets].mean()) / deviation).to_numpy()
-    sizes = as_floats(rest) / np.where(scale > 0, scale, 1.0)
+            places = [n for n, step in enumerate(steps) if isinstance(step, TemperatureCompensator)]
+            if not places:
+                return records[targets] - trained[targets].mean()
+            before, compensator = steps[: places[0]], steps[places[0]]
+        rest = compensator.residuals_ if is_baseline else compensator.transform(_through(before, records))
+    return in_order(compensator, as_floats(rest), targets).set_index(records.index)
+
+
+def in_order(compensator: TemperatureCompensator, values: Array, targets: list[Any]) -> pd.DataFrame:
+    """Values of the targets of a compensator in the order of some targets."""
     names = list(compensator.get_feature_names_out())
     if not set(names) <= set(targets):  # a step before has made arrays of the records
-        return sizes[:, np.argsort(compensator.targets_)]
-    return pd.DataFrame(sizes, columns=names).reindex(columns=targets).to_numpy()
+        return pd.DataFrame(values[:, np.argsort(compensator.targets_)], columns=targets)
+    return pd.DataFrame(values, columns=names).reindex(columns=targets)
+
+
+def scales_of(detector: Any, targets: list[Any], trained: pd.DataFrame) -> Array:
+    """Standard deviations of what a detector sees of each target while nothing changes."""
+    *steps, last = parts_of(detector)
+    places = [step for step in steps if isinstance(step, TemperatureCompensator)]
+    if not places and not isinstance(last, CompensatedDetector):
+        return trained[targets].std(ddof=0).replace(0.0, 1.0).to_numpy()
+    scale = last.scale_ if isinstance(last, CompensatedDetector) else places[0].scale_
+    compensator = last.compensator_ if isinstance(last, CompensatedDetector) else places[0]
+    return in_order(compensator, np.where(scale > 0, scale, 1.0)[np.newaxis], targets).to_numpy()[0]
+
+
+def departures(detector: Any, records: pd.DataFrame, targets: list[Any], trained: pd.DataFrame) -> Array:
+    """Residuals of records in standard deviations, of windows where the detector has such."""
+    *steps, last = parts_of(detector)
+    if isinstance(last, CompensatedDetector):
+        with collected(drop_others=True):
+            rest = in_order(last.compensator_, as_floats(last.residuals(_through(steps, records))), targets)
+    else:
+        rest = residuals(detector, records, targets, trained)
+    return rest.to_numpy() / scales_of(detector, targets, trained)
 
 
 def _through(steps: list[Any], records: pd.DataFrame) -> Any:
@@ -106,26 +135,42 @@ def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
     with collected(drop_others=True):
         table = _through(steps, records)
         losses, shares = last.severities(table).set_axis(records.index), last.explained(table)
-    sensitivities = sensitivities_of(directional)
-    names = sensitivities.index
-    alike = pd.DataFrame(np.eye(len(names)), names, names)
-    for one, other in directional.indistinguishable_:
-        if {one, other} <= {*names}:
-            alike.loc[one, other] = 1.0
-    together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
-    joined = {name: " or ".join(names[together == together[name]]) for name in names}
+    sensitivities, joined = sensitivities_of(directional), joined_names(directional)
     losses, effects = (one.T.groupby(joined).sum().T for one in (losses, (losses * sensitivities).round(2)))
     is_explained = (effects > 0) & (np.round(shares, 4)[:, np.newaxis] >= 0.5)
     found = {"loss ": losses.round(6), "effect ": effects}
     return pd.concat([one.where(is_explained).add_prefix(prefix) for prefix, one in found.items()], axis=1)
 
 
-def causes(records: pd.DataFrame, targets: list[Any], temperatures: list[Any], index: Array) -> list[str]:
-    """Why records have no damage index, or whose index they have; "" for the others."""
-    without = {"mode": records[targets].isna().all(axis=1).to_numpy()}
-    without["temperature"] = records[temperatures].isna().all(axis=1).to_numpy() if temperatures else without["mode"]
+def joined_names(directional: DirectionalDetector) -> dict[str, str]:
+    """Names of damage groups, those that cannot be distinguished as one, such as "top or bottom"."""
+    names = sensitivities_of(directional).index
+    alike = pd.DataFrame(np.eye(len(names)), names, names)
+    for one, other in directional.indistinguishable_:
+        if {one, other} <= {*names}:
+            alike.loc[one, other] = 1.0
+    together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
+    return {name: " or ".join(names[together == together[name]]) for name in names}
+
+
+def causes(records: pd.DataFrame, place: int, targets: list[Any], temperatures: list[Any], index: Array) -> list[str]:
+    """Why records from a position on have no damage index, or whose index they have; "" for the others.
+
+    Means of earlier temperatures and windows are not full enough after an outage, which is named.
+    """
+    new = records.iloc[place:]
+    without = {"mode": new[targets].isna().all(axis=1).to_numpy()}
+    without["temperature"] = new[temperatures].isna().all(axis=1).to_numpy() if temperatures else without["mode"]
     what = np.select(list(without.values()), [f"no {name} has a value" for name in without], "")
-    unknown = np.where(what == "", "too few values in its window, its lags or among its modes", what)
+    times = records.index[records.notna().any(axis=1)]
+    steps = np.diff(times.asi8, prepend=times.asi8[:1])
+    unknown = np.where(what == "", "too few values in its window, its lags or among its modes", what).astype(object)
+    for outage in np.flatnonzero(steps > max(6 * np.median(steps), pd.Timedelta("6h").as_unit(times.unit).value)):
+        length = times[outage] - times[outage - 1]
+        text = (
+            f"its window or means of earlier temperatures hold too little after the outage of {duration_text(length)}"
+        )
+        unknown[(new.index >= times[outage]) & (what == "")] = f"{text} up to {times[outage]:%Y-%m-%d %H:%M}"
     others = np.where(what == "", "", np.char.add(what, ": others of its window are evaluated"))
     return np.where(np.isnan(index), unknown, others).tolist()
 

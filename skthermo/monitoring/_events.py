@@ -18,8 +18,10 @@ from skthermo._core.frames import DAY, YEAR
 from skthermo._core.text import counted_number, duration_text, percent, plain
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning
 
-DAMAGE, MEASUREMENT, WATCH = "damage", "measurement or structure", "watch"
-"""Kinds of events; the second is that of responses set aside as implausible or stuck, the last of a raised index."""
+DAMAGE, DRIFT, WATCH, FAULT = "damage", "drift", "watch", "fault"
+"""Kinds of events, the gravest first: an alarm, a mean of 30 days that has moved, a raised index; sensors at fault."""
+KINDS = (DAMAGE, DRIFT, WATCH, FAULT)
+STATES = ("alarm", "drift", "watch", "known damage")
 
 
 def levels(index: Array, persistence: int) -> Array:
@@ -87,105 +89,269 @@ def leading(sizes: pd.Series | dict[str, float]) -> str:
 
 
 def event_changes(before: pd.DataFrame, after: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """Events that have opened, closed, or been withdrawn, as late records may show that there was none."""
+    """Events that have opened, closed, opened again, or become of another kind, and those that are withdrawn, as late
+    records or a fault may show that there was none."""
     left = before.copy()
     for number, event in after.iterrows():
-        overlaps = (left["kind"] == event["kind"]) & ~(left["end"] <= event["start"]) & ~(left["start"] >= event["end"])
-        known = (left["start"][overlaps] - event["start"]).abs().idxmin() if overlaps.any() else 0
-        was_open = known and pd.isna(left.loc[known, "end"])
+        overlaps = ~(left["end"] <= event["sign"]) & ~(left["sign"] >= event["end"])
+        near = left[overlaps].assign(other=left["kind"] != event["kind"], away=(left["sign"] - event["sign"]).abs())
+        known = near.sort_values(["other", "away"]).index[0] if len(near) else 0
+        old = left.loc[known] if known else None
         left = left.drop(index=known) if known else left
-        is_open = pd.isna(event["end"])
-        about = {"kind": event["kind"], "event": int(number)}
-        if not known or (is_open and not was_open):
-            groups = f"; explained by a loss of stiffness of {event['groups']}" if event["groups"] else ""
-            yield {"what": "opened", "time": event["start"], "detail": event["modes"] + groups} | about
-        if not is_open and (not known or was_open):
+        is_open, about = pd.isna(event["end"]), {"kind": event["kind"], "event": int(number)}
+        groups = f"; explained by a loss of stiffness of {event['groups']}" if event["groups"] else ""
+        if old is None or (is_open and not pd.isna(old["end"])):
+            what = "opened" if old is None else "reopened"
+            yield {"what": what, "time": event["start"], "detail": event["modes"] + groups} | about
+        elif old["kind"] != event["kind"]:
+            detail = f"{event['kind']}, was {old['kind']}: {event['modes']}{groups}"
+            yield {"what": "became", "time": event["start"], "detail": detail} | about
+        if not is_open and (old is None or pd.isna(old["end"])):
             yield {"what": "closed", "time": event["end"], "detail": f"peak {event['peak']:.4g}"} | about
     for number, event in left.iterrows():
         about = {"kind": event["kind"], "event": int(number)}
-        yield {"what": "withdrawn", "time": event["start"], "detail": "by records that came late"} | about
+        yield {"what": "withdrawn", "time": event["start"], "detail": "by later knowledge of its records"} | about
+
+
+def alike(one: Array, other: Array, cosine: float = 0.7) -> bool:
+    """Whether two departures have about the same direction."""
+    length = np.linalg.norm(one) * np.linalg.norm(other)
+    return bool(length > 0 and one @ other >= cosine * length)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Records in a row, ``first`` up to ``stop``, in which a level is open, and what departs in them.
+
+    ``level`` is that of each record, NaN where there is none, and ``direction`` the mean departure of the responses.
+    ``effects`` and ``losses`` of damage groups are sums over ``number`` records, or weeks.
+    """
+
+    kind: str
+    first: int
+    stop: int
+    level: Array
+    direction: Array
+    modes: str
+    effects: pd.Series
+    losses: pd.Series
+    number: int
+
+    @property
+    def peak(self) -> int:
+        """Position of the highest level."""
+        return self.first + int(np.nanargmax(self.level))
 
 
 class Events:
-    """All events of a table of decisions, in order of their start, and which of them each record is in.
+    """All events of a table of decisions, in order of their first sign: one for each cause.
 
-    ``table`` has a row for each event, counted from 1; ``numbers`` gives for each kind the event of every record, 0 for
-    none.
+    A watch, a drift and an alarm are one event where they overlap or follow each other ``within`` some weeks, in the
+    same direction; its kind is the gravest of them. What the owner has called harmless is over: a later alarm is
+    another event. No event goes on beyond a new baseline. Values of sensors that have failed have events of their own.
+
+    ``table`` has a row for each event, counted from 1; ``sign`` is its first sign. ``runs`` are those of each event.
     """
 
-    def __init__(self, decisions: pd.DataFrame, persistence: int, starts: ArrayLike = ()):
-        times, index = decisions.index.asi8, decisions["index"].to_numpy()
-        limits = {
-            DAMAGE: decisions[["threshold", "release"]],
-            WATCH: decisions[["watch", "watch_release"]].set_axis(["threshold", "release"], axis=1),
-            MEASUREMENT: pd.DataFrame({"threshold": 0.5, "release": 0.5}, decisions.index),
-        }
-        # where a response was set aside the others cannot close an event
-        is_held, held = decisions["n_held"].to_numpy() > 0, decisions["n_held"].to_numpy()
-        above = np.nextafter(decisions["release"].to_numpy(), np.inf)
-        shown = np.where(is_held & ~np.isnan(index), np.maximum(index, above), index)
-        effects = decisions.filter(regex="^effect ")
-        rows, spans = [], []
-        for kind, limit in limits.items():
-            if limit["threshold"].isna().all() or (kind == MEASUREMENT and not is_held.any()):
-                continue
-            of_kind = (held, 3) if kind == MEASUREMENT else (shown, persistence)
-            level, found = followed(of_kind[0], times, limit, of_kind[1], starts)
-            modes = decisions["held" if kind == MEASUREMENT else "modes"]
-            for first, stop in found:
-                peak = first + int(np.nanargmax(level[first:stop]))
-                n_alarms = int((~np.isnan(level[first:stop])).sum())
-                means = effects[first:stop].sum() / n_alarms
-                groups = "" if kind == MEASUREMENT else leading(means[means > 2].rename(lambda name: name[7:]))
-                size = decisions[f"loss {groups.split(', ')[0]}"][first:stop].sum() / n_alarms if groups else np.nan
-                end = decisions.index[stop] if stop < len(times) else pd.NaT
-                stamps = decisions.index[first], end, level[peak], decisions.index[peak]
-                rows.append((kind, *stamps, modes.iloc[peak], groups, size, n_alarms))
-                spans.append((first, stop))
-        order = sorted(range(len(rows)), key=lambda n: (spans[n][0], rows[n][0]))
-        self.numbers = {kind: np.zeros(len(times), dtype=np.int64) for kind in limits}
-        for number, n in enumerate(order, 1):
-            self.numbers[rows[n][0]][slice(*spans[n])] = number
-        stamp = decisions.index.dtype
+    def __init__(
+        self,
+        decisions: pd.DataFrame,
+        weeks: pd.DataFrame,
+        said: pd.DataFrame,
+        persistence: int,
+        starts: ArrayLike = (),
+        within: pd.Timedelta = 28 * DAY,
+    ):
+        self.decisions, self.times, self.said = decisions, decisions.index.as_unit("ns").asi8, said
+        self.starts, self.within = np.asarray(starts, dtype=np.int64), within
+        causes: list[list[Run]] = []
+        found = [*self._raised(persistence), *self._drifts(weeks), *self._faults(persistence)]
+        for run in sorted(found, key=lambda run: (run.first, KINDS.index(run.kind))):
+            cause = next((one for one in reversed(causes) if self._is_same(one, run)), None)
+            if cause is None:
+                causes.append([run])
+            else:
+                cause.append(run)
+        self.runs = dict(enumerate(causes, 1))
+        rows, stamp = [self._row(runs) for runs in causes], decisions.index.dtype
         dtypes = {"kind": object, "start": stamp, "end": stamp, "peak": float, "peak_time": stamp}
-        dtypes |= {"modes": object, "groups": object, "size": float, "n_alarms": np.int64}
-        columns = zip(*(rows[n] for n in order), strict=True) if rows else [()] * len(dtypes)
+        dtypes |= {"modes": object, "groups": object, "size": float, "n_alarms": np.int64, "n_times": np.int64}
+        dtypes["sign"] = stamp
+        columns = zip(*rows, strict=True) if rows else [()] * len(dtypes)
         series = zip(dtypes, map(list, columns), dtypes.values(), strict=True)
         table = pd.DataFrame({name: pd.Series(values, dtype=dtype) for name, values, dtype in series})
         self.table = table.set_axis(pd.RangeIndex(1, len(rows) + 1, name="event"))
 
+    def _raised(self, persistence: int) -> Iterator[Run]:
+        """Runs of alarms and watches."""
+        decisions = self.decisions
+        index, is_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy() > 0
+        above = np.nextafter(decisions["release"].to_numpy(), np.inf)
+        shown = np.where(is_held & ~np.isnan(index), np.maximum(index, above), index)  # others cannot close an event
+        for kind, names in {DAMAGE: ["threshold", "release"], WATCH: ["watch", "watch_release"]}.items():
+            limits = decisions[names].set_axis(["threshold", "release"], axis=1)
+            if limits["threshold"].isna().all():
+                continue
+            level, spans = followed(shown, self.times, limits, persistence, self.starts)
+            for first, stop in spans:
+                peak = decisions["modes"].iloc[first + int(np.nanargmax(level[first:stop]))]
+                yield self._run(kind, first, stop, level[first:stop], peak, decisions[first:stop])
+
+    def _drifts(self, weeks: pd.DataFrame) -> Iterator[Run]:
+        """Runs of weeks in which the mean of the last days has moved."""
+        at = weeks.index.as_unit("ns").asi8
+        limits = pd.DataFrame({"threshold": 1.0, "release": 0.7}, weeks.index)
+        level, spans = followed(weeks["level"].to_numpy(), at, limits, 1, self.starts)
+        ends = np.append(np.searchsorted(self.times, at), len(self.times))
+        of_record = np.searchsorted(at, self.times, side="right") - 1
+        for start, end in spans:
+            first, stop, own = ends[start], ends[end], weeks[start:end]
+            if first < stop:
+                peak = start + int(np.nanargmax(level[start:end]))
+                yield self._run(DRIFT, first, stop, level[of_record[first:stop]], weeks["modes"].iloc[peak], own)
+
+    def _faults(self, persistence: int) -> Iterator[Run]:
+        """Runs of responses that were set aside, and of alarms that rested on values of sensors at fault."""
+        decisions, held = self.decisions, self.decisions["n_held"].to_numpy()
+        if held.any():
+            limits = pd.DataFrame({"threshold": 0.5, "release": 0.5}, decisions.index)
+            level, spans = followed(held, self.times, limits, 3, self.starts)
+            for first, stop in spans:
+                names = decisions["held"].iloc[first + int(np.nanargmax(level[first:stop]))]
+                yield self._run(FAULT, first, stop, level[first:stop], names, decisions[:0])
+        then, index = decisions["index_then"].to_numpy(), decisions["index"].to_numpy()
+        differs = ~((then == index) | (np.isnan(then) & np.isnan(index)))
+        if not differs.any():
+            return
+        limits = decisions[["threshold", "release"]]
+        _, real = followed(index, self.times, limits, persistence, self.starts)
+        level, spans = followed(then, self.times, limits, persistence, self.starts)
+        for first, stop in spans:
+            names = decisions["at_fault"][first:stop][differs[first:stop]]
+            if (names != "").any() and not any(one < stop and first < end for one, end in real):
+                yield self._run(FAULT, first, stop, level[first:stop], names[names != ""].iloc[0], decisions[:0])
+
+    def _run(self, kind: str, first: int, stop: int, level: Array, modes: str, own: pd.DataFrame) -> Run:
+        """A run with what departs in its own rows of decisions or weeks."""
+        departures, effects, losses = (own.filter(regex=f"^{what} ") for what in ("departure", "effect", "loss"))
+        direction = np.nan_to_num(departures.to_numpy(dtype=float)).sum(axis=0)
+        number = len(own) if kind == DRIFT else int((~np.isnan(level)).sum())
+        return Run(kind, first, stop, level, direction, modes, effects.sum(), losses.sum(), number)
+
+    def _is_same(self, cause: list[Run], run: Run) -> bool:
+        """Whether a run has the cause of earlier ones."""
+        begin, last = self.times[run.first], max(one.stop for one in cause)
+        end = self.times[last] if last < len(self.times) else np.inf
+        if (run.kind == FAULT) != (cause[0].kind == FAULT) or begin - end > self.within.value:
+            return False
+        if ((self.starts > self.times[cause[0].first]) & (self.starts <= begin)).any():
+            return False
+        if run.kind == FAULT:
+            return run.modes == cause[0].modes
+        if any(one.kind != run.kind and DRIFT not in (one.kind, run.kind) and run.first < one.stop for one in cause):
+            return True  # an alarm within a watch
+        is_over = self.said["harmless"] & (self.said["time"] >= self.times[cause[0].first])
+        if (is_over & (self.said["time"] < end) & (self.said["at"] < begin)).any():
+            return False
+        return alike(sum(one.direction / max(np.linalg.norm(one.direction), 1e-300) for one in cause), run.direction)
+
+    def _row(self, runs: list[Run]) -> tuple[Any, ...]:
+        """What the table says of an event."""
+        stamps, kind = self.decisions.index, min((run.kind for run in runs), key=KINDS.index)
+        own, stop = [run for run in runs if run.kind == kind], max(run.stop for run in runs)
+        highest = max(own, key=lambda run: np.nanmax(run.level))
+        number = sum(run.number for run in own)
+        effects, losses = (sum(getattr(run, name) for run in own) / number for name in ("effects", "losses"))
+        groups = leading(effects[effects > 2].rename(lambda name: name[7:]))
+        size = losses[f"loss {groups.split(', ')[0]}"] if groups else np.nan
+        end, peak = stamps[stop] if stop < len(stamps) else pd.NaT, float(np.nanmax(highest.level))
+        n_alarms = int(sum((~np.isnan(run.level)).sum() for run in own))
+        ends = stamps[own[0].first], end, peak, stamps[highest.peak]
+        return kind, *ends, highest.modes, groups, size, n_alarms, len(own), stamps[runs[0].first]
+
+    def is_raised(self) -> NDArray[np.bool_]:
+        """Which records are in an alarm or a watch."""
+        found = np.zeros(len(self.times), dtype=bool)
+        for run in (run for runs in self.runs.values() for run in runs if run.kind in (DAMAGE, WATCH)):
+            found[run.first : run.stop] = True
+        return found
+
+    def standing(self) -> tuple[NDArray[np.object_], NDArray[np.int64]]:
+        """How the structure stands at each record by its events, whether it is evaluated or not, and the event.
+
+        What the owner has answered of an event holds for later records up to one and a half times the level that it had
+        reached. After damage that is known, nothing is healthy until a new baseline.
+        """
+        states, numbers = np.full(len(self.times), "healthy", dtype=object), np.zeros(len(self.times), dtype=np.int64)
+        ranks = np.full(len(self.times), len(STATES))
+        answers = with_acknowledgements(self.table, self.said)
+        for number, runs in self.runs.items():
+            event, ordered = answers.loc[number], sorted(runs, key=lambda run: -KINDS.index(run.kind))
+            if event["kind"] == FAULT:
+                continue
+            for run in ordered:
+                rows = np.arange(run.first, run.stop)
+                is_calm = np.zeros(len(rows), dtype=bool)
+                if event["acknowledged"]:
+                    of_kind = [one for one in runs if one.kind == run.kind]
+                    before = [one.level[self.times[one.first : one.stop] <= event["at"]] for one in of_kind]
+                    most = 1.5 * np.fmax.reduce(np.concatenate(before), initial=-np.inf)
+                    is_calm = (self.times[rows] > event["at"]) & ~(run.level > (most if most > 0 else np.inf))
+                rank = STATES.index({DAMAGE: "alarm", DRIFT: "drift", WATCH: "watch"}[run.kind])
+                higher = ~is_calm & (rank <= ranks[rows])
+                ranks[rows[higher]], numbers[rows[higher]] = rank, number
+            if event["acknowledged"] and not event["harmless"] and event["kind"] in (DAMAGE, DRIFT):
+                later = self.starts[self.starts > self.times[runs[0].first]]
+                known = (self.times > event["at"]) & (self.times < (later.min() if len(later) else np.inf))
+                ranks[known] = np.minimum(ranks[known], STATES.index("known damage"))
+        shown = ranks < len(STATES)
+        states[shown] = np.array(STATES, dtype=object)[ranks[shown]]
+        return states, numbers
+
+    def set_aside(self, number: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether each record is in an event of responses that were set aside which nobody has explained, or in any.
+
+        The numbers of records without another event become those of faults.
+        """
+        is_unexplained, is_set_aside = np.zeros((2, len(self.times)), dtype=bool)
+        answers = with_acknowledgements(self.table, self.said)
+        for place, run in ((place, run) for place, runs in self.runs.items() for run in runs if run.kind == FAULT):
+            rows = np.arange(run.first, run.stop)
+            number[rows[number[rows] == 0]] = place
+            if (self.decisions["n_held"].to_numpy()[rows] > 0).any():
+                is_set_aside[rows] = True
+                is_over = bool(answers.loc[place, "harmless"]) & (self.times[rows] > answers.loc[place, "at"])
+                is_unexplained[rows] |= ~is_over
+        return is_unexplained, is_set_aside
+
 
 def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFrame:
-    """Events with the owner's last answer to each, found by its kind and time."""
+    """Events with the owner's last answer to each, found by its kind and time, and ``at`` which record it was given."""
     answers = []
     for event in events.itertuples():
         end = np.inf if pd.isna(event.end) else event.end.value
         own = said[(said["kind"] == event.kind) & (said["time"] >= event.start.value) & (said["time"] < end)]
-        answers.append((True, *own[["harmless", "note"]].iloc[-1]) if len(own) else (False, False, ""))
-    table = pd.DataFrame(answers, events.index, ["acknowledged", "harmless", "note"])
-    return events.join(table.astype({"acknowledged": bool, "harmless": bool, "note": object}))
+        answers.append((True, *own[["harmless", "note", "at"]].iloc[-1]) if len(own) else (False, False, "", 0))
+    table = pd.DataFrame(answers, events.index, ["acknowledged", "harmless", "note", "at"])
+    return events.join(table.astype({"acknowledged": bool, "harmless": bool, "note": object, "at": np.int64}))
 
 
-def evaluations(decisions: pd.DataFrame, events: Events, said: pd.DataFrame) -> pd.DataFrame:
+def evaluations(decisions: pd.DataFrame, events: Events) -> pd.DataFrame:
     """State, event and what drives it of each record."""
     index, n_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy()
-    damage, measurement, watch = (events.numbers[kind] for kind in (DAMAGE, MEASUREMENT, WATCH))
-    is_unexplained = measurement > 0
-    for event in with_acknowledgements(events.table, said).query("harmless").itertuples():
-        own = said[(said["kind"] == event.kind) & (said["time"] >= event.start.value)]
-        is_unexplained &= ~((measurement == event.Index) & (decisions.index.asi8 > own["at"].iloc[0]))
-    is_held = (n_held > 0) | decisions["is_blind"].to_numpy() | is_unexplained
-    has_index = ~np.isnan(index)
-    is_alarm = (has_index & (damage > 0)) | (is_held & (measurement > 0))
-    is_watch = has_index & ~is_alarm & (watch > 0)
-    quiet = np.where(has_index & ~is_held, "healthy", "not evaluated")
-    state = np.where(is_alarm, "alarm", np.where(is_watch, "watch", quiet))
-    number = np.where(damage > 0, damage, np.where(measurement > 0, measurement, watch))
-    is_shown, modes = is_alarm | is_watch, decisions["modes"].to_numpy()
+    standing, number = events.standing()
+    is_unexplained, is_set_aside = events.set_aside(number)
+    is_held, has_index = (n_held > 0) | decisions["is_blind"].to_numpy() | is_unexplained, ~np.isnan(index)
+    is_raised = has_index & np.isin(standing, ["alarm", "drift", "watch"])
+    state = np.where((has_index & ~is_held) | is_raised, standing, "not evaluated")
+    state = np.where(is_held & is_set_aside, "alarm", state)
+    is_shown, modes = np.isin(state, ["alarm", "drift", "watch"]), decisions["modes"].to_numpy()
     modes = np.where((modes == "") & (n_held > 0), decisions["held"].to_numpy(), modes)
     groups, effects = np.full(len(index), "", dtype=object), decisions.filter(regex="^effect ")
     for row in np.flatnonzero(is_shown) if len(effects.columns) else ():
         groups[row] = leading(effects.iloc[row].dropna().rename(lambda name: name[7:]))
+    is_drift = state == "drift"
+    modes[is_drift], groups[is_drift] = events.table.loc[number[is_drift], ["modes", "groups"]].to_numpy().T
     table = {
         "state": state,
         "index": index,
@@ -278,8 +444,8 @@ class EventLevels:
     estimate: FalseAlarmEstimate
 
     @classmethod
-    def learned(cls, index: pd.Series, per_year: float, persistence: int) -> EventLevels:
-        """The threshold that a healthy structure exceeds in so many events a year.
+    def learned(cls, index: pd.Series, per_year: float, persistence: int, share: float = 1.0) -> EventLevels:
+        """The threshold that a healthy structure exceeds in a share of so many events a year; others have the rest.
 
         Three of the baseline's peaks are enough. Events close within the level that it stays within for 95 % of time.
         """
@@ -306,7 +472,7 @@ class EventLevels:
         steps = np.diff(stamps)
         n_years = float(np.minimum(steps, max(DAY.value, np.median(steps))).sum() / YEAR.value)
         asked = per_year * n_years
-        threshold = level_exceeded(peaks.to_numpy(), asked)
+        threshold = level_exceeded(peaks.to_numpy(), share * asked)
         k = max(asked, 1.0)  # peaks above the threshold, by which its rate is known
         fewest, most = nbinom.ppf([0.05, 0.95], k, k / (k + per_year)).astype(int)
         months = sorted({*range(1, 13)} - {*known.index.month})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from datetime import timedelta
 from numbers import Integral, Real
 from typing import Any
@@ -23,7 +23,16 @@ from skthermo._core.estimators import (
     seed_parts,
     seeded,
 )
-from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, midnight, midnights, usual_step
+from skthermo._core.frames import (
+    DAY,
+    YEAR,
+    check_duration,
+    check_stamp,
+    days_later,
+    midnight,
+    midnights,
+    usual_step,
+)
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
@@ -36,12 +45,11 @@ from skthermo.monitoring._evaluation import (
     index_of,
     losses_of,
     refuse_other_batches,
+    residuals,
     rounded,
 )
 from skthermo.monitoring._events import (
-    DAMAGE,
-    MEASUREMENT,
-    WATCH,
+    FAULT,
     EventLevels,
     Events,
     SmallestChanges,
@@ -52,6 +60,7 @@ from skthermo.monitoring._events import (
     with_acknowledgements,
 )
 from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
+from skthermo.monitoring._means import MeanTest
 from skthermo.monitoring._records import (
     OF_TRAINING,
     Intake,
@@ -283,12 +292,12 @@ class Monitor(SavesFrames, Estimator):
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1, with what the owner has said of them."""
-        return with_acknowledgements(self._events().table, self.acknowledgements_)
+        return self._answered().drop(columns=["sign", "at"])
 
     @property
     def evaluations_(self) -> pd.DataFrame:
         """The latest evaluation of each record."""
-        return evaluations(self.decisions_, self._events(), self.acknowledgements_)
+        return evaluations(self.decisions_, self._events())
 
     @property
     def days_(self) -> pd.DataFrame:
@@ -426,6 +435,7 @@ class Monitor(SavesFrames, Estimator):
         self.records_ = self.ahead_ = nothing
         self.corrected_ = nothing.drop(columns=self.reference_)
         self.decisions_ = self._decisions(nothing.index)
+        self.means_, self.weeks_ = nothing[self.targets_], self.mean_test_.weeks(nothing[self.targets_], ())
         kinds = {"kind": object, "time": np.int64, "at": np.int64, "harmless": bool, "note": object}
         self.acknowledgements_ = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
         self.transitions_, self.restarts_ = (), ()
@@ -446,7 +456,12 @@ class Monitor(SavesFrames, Estimator):
         if self.lookback is not None:
             self.lookback_ = Lookback(0, check_duration(self.lookback, "lookback"))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        levels = EventLevels.learned(index, self.false_alarms_per_year, self.persistence)
+        baseline = residuals(detector, trained, self.targets_, trained, is_baseline=True)
+        slow = 0.25  # of the false alarms that are asked for
+        test = MeanTest.learned(baseline, detector, trained, slow * self.false_alarms_per_year)
+        share = 1.0 if test.errors is None else 1 - slow
+        levels = EventLevels.learned(index, self.false_alarms_per_year, self.persistence, share)
+        self.mean_test_ = test
         self.threshold_, self.clear_threshold_ = levels.threshold, levels.release
         self.false_alarm_estimate_, self.baseline_peaks_ = levels.estimate, levels.peaks
         self.watch_threshold_ = None
@@ -471,15 +486,25 @@ class Monitor(SavesFrames, Estimator):
         return twin
 
     def _events(self) -> Events:
-        return Events(self.decisions_, self.persistence, self.restarts_)
+        return Events(self.decisions_, self.weeks_, self.acknowledgements_, self.persistence, self.restarts_)
+
+    def _answered(self) -> pd.DataFrame:
+        """Events with what the owner has said of them, and their first signs."""
+        return with_acknowledgements(self._events().table, self.acknowledgements_)
 
     def _decisions(self, stamps: pd.DatetimeIndex, **columns: Any) -> pd.DataFrame:
         """A row for each record: its index, the levels of events, and what becomes of it."""
         watch = np.nan if self.watch_threshold_ is None else self.watch_threshold_
         levels = {"threshold": self.threshold_, "release": self.clear_threshold_, "watch": watch}
         levels["watch_release"] = min(watch, self.clear_threshold_)
-        texts = dict.fromkeys(("modes", "held", "reason"), "")
-        values = {"index": np.nan} | levels | {"n_held": 0.0, "is_blind": False, "n_left_out": 0} | texts | columns
+        texts = dict.fromkeys(("modes", "held", "at_fault", "reason"), "")
+        values = (
+            {"index": np.nan, "index_then": np.nan}
+            | levels
+            | {"n_held": 0.0, "is_blind": False, "n_left_out": 0}
+            | texts
+            | columns
+        )
         kinds = {"is_blind": bool, "n_left_out": np.int64} | dict.fromkeys(texts, object)
         return pd.DataFrame(values, stamps).astype({name: kinds.get(name, float) for name in values})
 
@@ -493,19 +518,34 @@ class Monitor(SavesFrames, Estimator):
             return
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
             self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
-        said = self.acknowledgements_[self.acknowledgements_["kind"] == MEASUREMENT].drop_duplicates(
-            "time", keep="last"
-        )
-        seen, notes, states = self.corrections_.corrected(begin, raw, said["at"][said["harmless"]].tolist())
-        self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < begin.day], seen])
+        states = self.corrections_.advanced(begin, raw)
+        first = midnight(min([first, *changed_times(self._faults_of(self.states_[-1]), self._faults_of(states[-1]))]))
+        drifts = self.corrections_.drifts(states, raw.index)
+        known = self.decisions_.loc[self.decisions_.index < begin.day, list(drifts)]
+        drifts = pd.concat([known, drifts[drifts.index >= begin.day]])
         states = [*(one for one in earlier if one.day < begin.day), *states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
-        new = self._decided(first, notes[notes.index >= first])
+        raw = self.records_[self.records_.index >= first]
+        seen, notes = self._corrected(raw, drifts)
+        self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < first], seen])
+        new = self._decided(first, notes, drifts)
         self.decisions_ = pd.concat([self.decisions_[self.decisions_.index < first], new])
+        self.weeks_ = pd.concat(
+            [self.weeks_[self.weeks_.index <= first], self.mean_test_.weeks(self.means_, self._test_times(first))]
+        )
         self._explain(first)
 
-    def _decided(self, first: pd.Timestamp, notes: pd.DataFrame) -> pd.DataFrame:
+    def _faults_of(self, state: Any) -> Sequence[Any]:
+        return () if state.sensors is None else state.sensors.faults
+
+    def _corrected(self, raw: pd.DataFrame, drifts: pd.DataFrame, **options: bool) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Records as the detector sees them by all that is known now, and what became of their values."""
+        said = self.acknowledgements_[self.acknowledgements_["kind"] == FAULT].drop_duplicates("time", keep="last")
+        at, faults = said["at"][said["harmless"]].tolist(), self._faults_of(self.states_[-1])
+        return self.corrections_.corrected(faults, raw, drifts.loc[raw.index], at, **options)
+
+    def _decided(self, first: pd.Timestamp, notes: pd.DataFrame, drifts: pd.DataFrame) -> pd.DataFrame:
         """Decisions on the records from a stamp on, but for what explains an event."""
         n_before = self.corrected_.index.searchsorted(first)
         records, place = self._with_memory(n_before)
@@ -523,11 +563,35 @@ class Monitor(SavesFrames, Estimator):
             "extrapolated: temperatures outside those of the baseline": is_outside,
             f"even a fall of all responses by {100 * fall:.2g} % would stay undetected": is_blind,
         }
-        said = [causes(new, self.targets_, temperatures, index), notes["note"]]
+        said = [causes(records, place, self.targets_, temperatures, index), notes["note"]]
         said += [np.where(rows, text, "") for text, rows in remarks.items()]
         reason = ["; ".join(filter(None, parts)) for parts in zip(*said, strict=True)]
-        columns = {"index": index, "is_blind": np.asarray(is_blind), "reason": reason}
+        then = self._index_then(records, place, index, drifts)
+        columns = {"index": index, "index_then": then, "is_blind": np.asarray(is_blind), "reason": reason}
+        if self.mean_test_.errors is not None:
+            rest = residuals(self.detector_, records[self.features_], self.targets_, self.trained_).iloc[place:]
+            rest = rest[~is_outside]
+            if self.corrections_.drift is not None:  # what is taken out of the frequencies counts
+                rest = rest + self.corrections_.drift.shifts(drifts.loc[rest.index], self.targets_)
+            means = rest.groupby(midnights(rest.index)).mean()
+            self.means_ = pd.concat([self.means_[self.means_.index < first], means])
         return self._decisions(new.index, **columns, **notes.drop(columns="note"))
+
+    def _index_then(self, records: pd.DataFrame, place: int, index: Array, drifts: pd.DataFrame) -> Array:
+        """Damage indices as they were before sensors at fault had been found."""
+        raw = self.records_[self.records_.index >= records.index[0]]
+        drifts = pd.concat([self.decisions_.loc[self.decisions_.index < drifts.index[0], list(drifts)], drifts])
+        then = self._corrected(raw, drifts, once_found=True)[0]
+        if then.equals(records.loc[raw.index]):
+            return index
+        return rounded(self._index(pd.concat([records[records.index < raw.index[0]], then]))[place:])
+
+    def _test_times(self, first: pd.Timestamp) -> list[pd.Timestamp]:
+        """When means of the last days are tested after a record: each week of service."""
+        begin = midnight(self.baseline_.index[-1])
+        number = (first - begin) // (7 * DAY), (self.last_ - begin) // (7 * DAY) + 1
+        times = [days_later(begin, 7 * n) for n in range(max(number[0], 1), number[1] + 1)]
+        return [time for time in times if first < time <= self.last_]
 
     def _with_memory(self, n_before: int) -> tuple[pd.DataFrame, int]:
         """Records as the detector sees them, from those on that it looks back to, and the position of the first."""
@@ -540,18 +604,19 @@ class Monitor(SavesFrames, Estimator):
 
     def _explain(self, first: pd.Timestamp) -> None:
         """Name what drives the open events of the records from a stamp on."""
-        numbers = self._events().numbers
-        is_open = ((numbers[DAMAGE] > 0) | (numbers[WATCH] > 0)) & self.decisions_["index"].notna().to_numpy()
-        rows = np.flatnonzero(is_open & (self.decisions_.index >= first))
+        is_raised = self._events().is_raised() & self.decisions_["index"].notna().to_numpy()
+        rows = np.flatnonzero(is_raised & (self.decisions_.index >= first))
         if not len(rows):
             return
         records, place = self._with_memory(int(rows[0]))
         places = place + rows - rows[0]
         records = records.iloc[: places[-1] + 1]
-        sizes = np.abs(departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places])
+        sizes = departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places]
         sizes = pd.DataFrame(np.round(np.nan_to_num(sizes), 2), columns=list(map(str, self.targets_)))
         found = group_effects(self.detector_, records[self.features_]).iloc[places]
-        found = found.assign(modes=[leading(row) for _, row in sizes.iterrows()]).astype({"modes": object})
+        modes = [leading(row) for _, row in sizes.abs().iterrows()]
+        found = found.join(sizes.add_prefix("departure ").set_axis(found.index)).assign(modes=modes)
+        found = found.astype({"modes": object})
         decisions = self.decisions_.reindex(
             columns=[*self.decisions_, *found.columns.difference(self.decisions_.columns)]
         )
@@ -560,7 +625,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
         """Append the changes since a former state to the transitions, after the actions that made them."""
-        old, new = (events[~(events["end"] < first)] for events in (before.events_, self.events_))
+        old, new = (events[~(events["end"] < first)] for events in (before._answered(), self._answered()))
         found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
         for one in [*done, *sorted(found, key=lambda change: change["time"])]:
             plain = {"id": len(self.transitions_) + 1, "what": one["what"], "time": one["time"].isoformat()}
@@ -611,14 +676,14 @@ class Monitor(SavesFrames, Estimator):
         after.ahead_ = intake.ahead
         reasons = pd.concat([intake.too_late, intake.early])
         refused = self._decisions(reasons.index, reason=reasons.to_numpy())
-        answers = evaluations(refused, Events(refused, 1), self.acknowledgements_).assign(revised=False)
+        nobody = Events(refused, self.weeks_[:0], self.acknowledgements_, 1)
+        answers = evaluations(refused, nobody).assign(revised=False)
         if len(fresh):
             known = pd.concat([self.records_, intake.fresh])
             after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
             after._decide(fresh[0])
             after._note(self, fresh[0])
-            before = self.evaluations_ if fresh[0] < self.last_ else answers[:0]
-            news = _news(before, after.evaluations_, fresh)
+            news = _news(self.evaluations_, after.evaluations_, fresh)
             answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
         vars(self).update(vars(after))
@@ -945,8 +1010,7 @@ class Monitor(SavesFrames, Estimator):
 
 def _news(before: pd.DataFrame, after: pd.DataFrame, fresh: pd.DatetimeIndex) -> pd.DataFrame:
     """Evaluations of new records, and of known ones whose evaluation has changed."""
-    answers = after[after.index >= fresh[0]]
-    is_new = answers.index.isin(fresh)
+    answers, is_new = after, after.index.isin(fresh)
     old = before.reindex(index=answers.index, columns=answers.columns)
     is_same = ((answers == old) | (answers.isna() & old.isna())).all(axis=1).to_numpy()
     return answers.assign(revised=~is_new & ~is_same)[is_new | ~is_same]
@@ -963,6 +1027,12 @@ def _not_evaluated(answers: pd.DataFrame) -> Iterable[UnevaluatedRowsWarning]:
             f"{'; '.join(f'{n} because {cause}' for cause, n in counts.items())}",
             "not-evaluated",
         )
+
+
+def changed_times(before: Sequence[Any], after: Sequence[Any]) -> Iterator[pd.Timestamp]:
+    """From when on what is known of faults of sensors has changed."""
+    for fault in {*before} ^ {*after}:
+        yield fault.since if fault.until is None or fault not in {*after} else min(fault.since, fault.until)
 
 
 def fault_changes(before: pd.DataFrame, after: pd.DataFrame, newest: pd.Timestamp) -> Iterable[dict[str, Any]]:

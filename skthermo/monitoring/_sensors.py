@@ -18,6 +18,8 @@ from skthermo.preprocessing.checks import Plausible, equal_runs
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.gaussian import Gaussian
 
+LEFT_OUT = ("dead", "stuck", "implausible", "offset", "drift")
+
 
 @dataclass(frozen=True)
 class Fault(SavesFrames):
@@ -31,6 +33,12 @@ class Fault(SavesFrames):
     until: pd.Timestamp | None = None
     size: float = 0.0
     other: Hashable = None
+
+    def covers(self, stamps: pd.DatetimeIndex, once_found: bool = False) -> NDArray[np.bool_]:
+        """Which records it concerns, or concerned once it was found."""
+        begin = days_later(midnight(self.detected), 1) if once_found else self.since
+        rows = np.asarray(stamps >= begin)
+        return rows if self.until is None else rows & np.asarray(stamps < self.until)
 
 
 @dataclass(frozen=True)
@@ -47,17 +55,25 @@ class WatchState(SavesFrames):
 
     def left_out(self) -> dict[Hashable, Fault]:
         """By column that is left out, the fault for which it is."""
-        return self.lasting("dead", "stuck", "implausible", "offset", "drift")
+        return self.lasting(*LEFT_OUT)
 
     def in_place(self, records: pd.DataFrame) -> pd.DataFrame:
         """Records with exchanged values back in their columns."""
-        swapped = self.lasting("swapped")
-        order = [swapped[name].other if name in swapped else name for name in records]
-        return records[order].set_axis(records.columns, axis=1) if swapped else records
+        return in_place(records, self.faults)
 
     def updated(self, changes: Mapping[Fault, Fault], found: Sequence[Fault]) -> WatchState:
         """With faults in place of others, and more."""
         return replace(self, faults=(*(changes.get(fault, fault) for fault in self.faults), *found))
+
+
+def in_place(records: pd.DataFrame, faults: Sequence[Fault], once_found: bool = False) -> pd.DataFrame:
+    """Records with exchanged values back in their columns."""
+    placed = records.copy()
+    for fault in faults:
+        if fault.kind == "swapped":
+            rows = fault.covers(records.index, once_found)
+            placed.loc[rows, fault.column] = records.loc[rows, fault.other]
+    return placed
 
 
 def season_of(days: pd.DatetimeIndex) -> Array:
@@ -192,24 +208,34 @@ class Responses:
         return never | ((size > 1) & is_alone[:, np.newaxis])
 
     def exchanged(
-        self, rest: Array, expected: Array, days: pd.DatetimeIndex, certain: float = 20.0
+        self, rest: Array, expected: Array, stamps: pd.DatetimeIndex, certain: float = 20.0
     ) -> list[tuple[list[int], pd.Timestamp]]:
-        """Pairs whose values of the last days are exchanged, and the first of these days.
+        """Pairs whose values of the last days are exchanged, and the first record that is.
 
         Both come much nearer to their places by it: one has risen and the other one fallen, by about their distance. No
         damage does that. A day adds at most 50 to the logarithm of the odds.
         """
-        found, daily = [], pd.DataFrame(np.hstack([rest, expected])).groupby(days).median()[::-1]
+        found, both = [], np.hstack([rest, expected])
+        daily = pd.DataFrame(both).groupby(midnights(stamps)).median()[::-1]
         rests, places = np.split(daily.to_numpy(), 2, axis=1)
         for pair in self.pairs:
-            here, (first, second), deviations = rests[:, pair], places[:, pair].T, self.deviations
-            known = ~np.isnan(here).any(axis=1)
-            there = here[:, ::-1] + np.column_stack([second - first, first - second])
-            here, there = ((one[known] / deviations[pair]) ** 2 for one in (here, there))
+
+            def misfits(rests: Array, places: Array, pair: list[int] = pair) -> Array:
+                """Squared departures of the pair where they are, and exchanged, (2, n_rows, 2)."""
+                apart = places[:, pair] - places[:, pair[::-1]]
+                there = rests[:, pair[::-1]] - apart
+                return (np.stack([rests[:, pair], there]) / self.deviations[pair]) ** 2
+
+            known = ~np.isnan(rests[:, pair]).any(axis=1)
+            here, there = misfits(rests[known], places[known])
             nearer = np.logical_and.accumulate((there < here / 4).all(axis=1))
             odds = np.minimum((here - there).sum(axis=1) / 2, 50.0)[nearer].cumsum()
             if (odds > certain).any():
-                found.append((pair, daily.index[known][np.argmax(odds > certain)]))
+                first = daily.index[known][np.count_nonzero(nearer) - 1]
+                own = np.flatnonzero(stamps >= days_later(first, -1))
+                here, there = misfits(rest[own], expected[own])
+                gains = np.nan_to_num((here - there).sum(axis=1))[::-1].cumsum()[::-1]
+                found.append((pair, stamps[own[np.argmax(gains)]]))
         return found
 
 
@@ -273,39 +299,55 @@ class SensorWatch:
         return table.assign(**{name: as_index(some, zone) for name, some in times.items()})
 
     def masked(
-        self, state: WatchState, T: pd.DataFrame, F: pd.DataFrame, acknowledged: Sequence[int] = ()
+        self,
+        faults: Sequence[Fault],
+        T: pd.DataFrame,
+        F: pd.DataFrame,
+        acknowledged: Sequence[int] = (),
+        *,
+        once_found: bool = False,
     ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-        """Records without what sensors at fault show: NaN there, and exchanged responses back in place.
+        """Records without what sensors showed since they were at fault: NaN there, and exchanged responses in place.
 
-        Also, of each record, ``n_held`` responses that were set aside although the structure may have moved them, and
-        their names ``held``; ``n_left_out`` values, and a ``note`` on them. What has been ``acknowledged`` as a fault
-        of a sensor, at times in nanoseconds, is not held afterwards.
+        Or since they were found to be. Also, of each record, ``n_held`` responses that were set aside although the
+        structure may have moved them, and their names ``held``; ``n_left_out`` values, columns ``at_fault``, and a
+        ``note`` on them. What has been ``acknowledged`` as a fault of a sensor, at times in nanoseconds, is not held
+        afterwards. No structure repeats a response to its last digit, so that one that is stuck is not held.
         """
-        given, out = state.in_place(T.join(F)), state.left_out()
+        given, stamps = in_place(T.join(F), faults, once_found), T.index
         far = self._evaluated(given)[0]
-        removed = (far | given.columns.isin(list(out))) & given.notna()
-        kept, held = given.mask(removed), far[self.modes].copy()
-        for name, fault in out.items():
+        held, out = far[self.modes].copy(), pd.DataFrame(False, stamps, given.columns)
+        notes, at_fault = [[] for _ in stamps], [[] for _ in stamps]
+        for fault in faults:
+            rows, name = fault.covers(stamps, once_found), fault.column
+            text = f"{name} is left out ({fault.kind} since {fault.since:%Y-%m-%d})"
+            if fault.kind == "swapped":
+                is_first = self.modes.index(name) < self.modes.index(fault.other)
+                text = f"{name} and {fault.other} are exchanged and were put back in place" if is_first else ""
+            else:
+                out.loc[rows, name] = True
             if name in self.modes and fault.kind in ("stuck", "implausible"):
                 said = [time for time in acknowledged if time >= fault.since.value]
-                held[name] = given.index.as_unit("ns").asi8 <= min(said) if said else True
+                is_open = stamps.as_unit("ns").asi8 <= min(said) if said else True
+                held.loc[rows, name] = (fault.kind == "implausible") & np.broadcast_to(is_open, len(stamps))[rows]
+            for place in np.flatnonzero(rows):
+                notes[place].append(text)
+                at_fault[place].append(str(name))
+        removed = (far | out) & given.notna()
+        kept = given.mask(removed)
         if self.reference:
             rows = kept[self.sensors].reindex(columns=kept.columns).to_numpy()
             kept[self.sensors] = self.expected.together.completed(rows)[0][:, : len(self.sensors)]
-        lasting = [f"{name} is left out ({one.kind} since {one.since:%Y-%m-%d})" for name, one in out.items()]
-        for name, one in state.lasting("swapped").items():
-            if self.modes.index(name) < self.modes.index(one.other):
-                lasting.append(f"{name} and {one.other} are exchanged and were put back in place")
-        far = far & ~far.columns.isin(list(out))
-        values = values_text(given, far.to_numpy(), self.units, "implausible, left out")
+        values = values_text(given, (far & ~out).to_numpy(), self.units, "implausible, left out")
         about = {
             "n_held": held.sum(axis=1).astype(float),
             "held": [", ".join(map(str, held.columns[row])) for row in held.to_numpy()],
             "n_left_out": removed.sum(axis=1),
-            "note": ["; ".join(filter(None, [text, *lasting])) for text in values],
+            "at_fault": list(map(", ".join, at_fault)),
+            "note": ["; ".join(filter(None, [text, *own])) for text, own in zip(values, notes, strict=True)],
         }
         inputs = [name for name in self.sensors if name not in self.reference]
-        return kept[inputs], kept[self.modes], pd.DataFrame(about, given.index)
+        return kept[inputs], kept[self.modes], pd.DataFrame(about, stamps)
 
     def advance(self, state: WatchState, T_day: pd.DataFrame, F_day: pd.DataFrame) -> WatchState:
         """The state after one complete day with these records, if any."""
@@ -332,13 +374,13 @@ class SensorWatch:
         begin = max([days_later(today, -4), *(one.detected for one in state.faults if one.kind == "swapped")])
         recent, lasting = state.in_place(state.records.loc[begin:]), state.lasting("swapped")
         changes, found = {}, []
-        for places, day in self.expected.exchanged(*self._evaluated(recent)[1:], midnights(recent.index)):
+        for places, since in self.expected.exchanged(*self._evaluated(recent)[1:], recent.index):
             pair = [self.modes[place] for place in places]
             known = [lasting[name] for name in pair if name in lasting]
-            changes |= {fault: replace(fault, until=day) for fault in known}
+            changes |= {fault: replace(fault, until=since) for fault in known}
             for name, other in () if known else (pair, pair[::-1]):
                 detail = f"its values are in the column of {other!r}; put back in place"
-                found.append(Fault(name, "swapped", day, today, detail, other=other))
+                found.append(Fault(name, "swapped", since, today, detail, other=other))
         return state.updated(changes, found)
 
     def _with_runs(self, state: WatchState, today: pd.Timestamp) -> WatchState:
@@ -352,7 +394,7 @@ class SensorWatch:
             if kind == (fault.kind if is_run else ""):
                 continue
             if is_run or (kind and fault is not None):
-                changes[fault] = replace(fault, until=today)
+                changes[fault] = replace(fault, until=end_of_run(series, far[name], today))
             detail = {
                 "dead": "has had no value for longer than gaps of the baseline",
                 "stuck": f"repeats {size}; left out",
@@ -435,6 +477,15 @@ def run_of(series: Array, is_far: Array, most_missing: int, most_equal: int) -> 
     return ("stuck", known[-equal], series[last]) if equal >= most_equal else ("", 0, 0.0)
 
 
+def end_of_run(series: pd.Series, is_far: pd.Series, today: pd.Timestamp) -> pd.Timestamp:
+    """The first record of a day whose value is neither implausible nor the one of the day before."""
+    before = series[series.index < today].dropna()
+    good = (series.index >= today) & series.notna() & ~is_far
+    if len(before):
+        good &= series != before.iloc[-1]
+    return series.index[good][0] if good.any() else today
+
+
 def change_of(rest: pd.Series) -> dict[str, Any]:
     """Offset or drift of a thermometer at fault: its first day, its size on the last one, and what to say of it.
 
@@ -451,4 +502,5 @@ def change_of(rest: pd.Series) -> dict[str, Any]:
     if is_drift[best]:
         kind, shown = "drift", f"{size / (at[-1] - at[first] + 1) * YEAR.days / 12:+.2f} degrees a month"
     detail = f"{shown} beside the other thermometers; left out"
-    return {"kind": kind, "since": rest.index[first], "size": size, "detail": detail}
+    since = rest.index[max(first - 1, 0)]  # it may have begun on the day before
+    return {"kind": kind, "since": since, "size": size, "detail": detail}

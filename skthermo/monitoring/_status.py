@@ -12,7 +12,7 @@ import pandas as pd
 
 from skthermo._core.frames import DAY, as_moment, check_duration, usual_step
 from skthermo._core.text import counted, duration_text, plain, probability_text
-from skthermo.monitoring._events import DAMAGE, MEASUREMENT, WATCH
+from skthermo.monitoring._events import DAMAGE, FAULT, WATCH
 
 
 @dataclass(frozen=True)
@@ -218,8 +218,8 @@ class MonitorStatus:
 
 def state_of(events: pd.DataFrame, evaluations: pd.DataFrame) -> str:
     """How the structure is by its open events, else by the newest record."""
-    kinds = set(events["kind"][events["end"].isna() & ~(events["harmless"] & (events["kind"] == MEASUREMENT))])
-    if kinds & {DAMAGE, MEASUREMENT}:
+    kinds = set(events["kind"][events["end"].isna() & ~(events["harmless"] & (events["kind"] == FAULT))])
+    if kinds & {DAMAGE, FAULT}:
         return "alarm"
     newest = evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
     return "watch" if WATCH in kinds else "not evaluated" if newest == "alarm" else newest

@@ -98,6 +98,7 @@ class FakeMonitor:
         self.units_ = {"T1": "°C", "f1": "Hz", "f2": "Hz"}
         self.baseline_ = pd.DataFrame(0.0, stamps - pd.Timedelta("730D"), ["T1", "f1", "f2"])
         self.trained_, self.since_ = self.baseline_, None
+        self.corrected_ = self.baseline_[:0]
         self.counts_ = {"n_records": len(stamps), "n_not_evaluated": int((~known).sum()), "n_repeated": 2}
         self.false_alarm_estimate_ = SimpleNamespace(
             expected=false_alarms_per_year,

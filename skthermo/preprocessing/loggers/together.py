@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
+import numpy as np
 import pandas as pd
 
 from skthermo._core.text import counted
@@ -164,16 +165,17 @@ def joined(tables: Iterable[pd.DataFrame], columns: Sequence[str]) -> tuple[pd.D
 
 
 def once(table: pd.DataFrame) -> pd.DataFrame:
-    """Records that come twice with the same values are one; with other values they are an error."""
+    """Records that come twice with the same values, up to the last bits, are one; others are an error."""
     again = table.index.duplicated()
     if not again.any():
         return table
-    table = table[~table.reset_index().duplicated().to_numpy()]
-    again = table.index.duplicated()
+    first = table[~again]
+    known = first.loc[table.index[again]].to_numpy()
+    again[again] = ~np.isclose(table[again].to_numpy(), known, rtol=1e-9, atol=0.0, equal_nan=True).all(axis=1)
     if again.any():
         raise ValueError(
             f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
             f"{table.index[again][0]}; expected each once. If the clocks go back then, give the time zone ([csv] "
             "time_zone of settings)"
         )
-    return table
+    return first

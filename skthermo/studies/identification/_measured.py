@@ -17,8 +17,7 @@ from skthermo._core.text import counted, listed
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
 from skthermo.fem.damage import LossKind
 from skthermo.preprocessing.checks import set_aside
-from skthermo.residuals.gaussian import Gaussian
-from skthermo.residuals.numbers import independent_records
+from skthermo.residuals.mean_errors import MeanErrors
 from skthermo.studies.identification._causes import Cause, changed
 
 Response = Callable[[Sequence[Cause], Sequence[float]], Array]
@@ -51,32 +50,23 @@ def measured_shift(fem: Any, T: ArrayLike, F: ArrayLike, noise: Any) -> Frequenc
     expected = fem.recorder_.residuals.expected(fem.weather(T).inputs)  # what the chain leaves in such weather
     shifts = np.log(frequencies / (as_floats(fem.predict(T)) * (1 + expected)))
     healthy = np.log1p(fem.recorder_.residuals.values)  # out of fold, in order of time
-    healthy = np.where(np.abs(healthy - median(healthy)) > 6 * robust_deviation(healthy), np.nan, healthy)
-    healthy[:, (~np.isnan(healthy)).sum(axis=0) < 20] = np.nan
-    left_out = _left_out(fem, T, frequencies, shifts, np.nanstd(healthy, axis=0))
+    errors = MeanErrors.learned(healthy)
+    left_out = _left_out(fem, T, frequencies, shifts, errors.deviations)
     rows = ~np.any(list(left_out.values()), axis=0)
-    shifts = np.where(rows[:, np.newaxis] & ~np.isnan(healthy).all(axis=0), shifts, np.nan)
+    shifts = np.where(rows[:, np.newaxis] & errors.known, shifts, np.nan)
     mean = means_of_known(shifts)
     _check_ratios(np.exp(mean), fem.mode_names_)
 
-    n_records, n_healthy = ((~np.isnan(values)).sum(axis=0) for values in (shifts, healthy))
-    per_one = 1.0 if deviations is not None else np.array([_records_for_one(column) for column in healthy.T])
-    n_independent, n_trained = (np.maximum(number / per_one, 1.0) for number in (n_records, n_healthy))
-    known = n_records > 0
-    freedom, n_known = float(n_trained[known].mean() - 1), known.sum()
     if deviations is not None:
-        single = np.diag(deviations[known] ** 2)
-    else:  # Hotelling: the covariance of the modes is estimated, too
-        remaining = max(freedom - n_known + 1, 3.0)
-        single = Gaussian.fitted(healthy[:, known]).covariance * max(freedom, 3.0) / remaining
-        freedom = remaining
-    roots = np.sqrt(1 / n_independent + 1 / n_trained)[known]
-    covariance = np.full((len(known), len(known)), np.nan)
-    covariance[np.ix_(known, known)] = single * np.outer(roots, roots)
+        errors = errors.stated(deviations)
+    n_records = (~np.isnan(shifts)).sum(axis=0)
+    known = n_records > 0
+    n_independent = np.maximum(n_records / errors.for_one, 1.0)
+    covariance, freedom = errors.of_mean(n_records)
     counts = {"given": len(rows), "compared": int(rows.sum())}
     counts |= {reason: int(some.sum()) for reason, some in left_out.items() if some.any()}
     counts |= {"independent": n_independent[known].min(), "trained": len(healthy)}
-    counts |= {"independent of trained": n_trained[known].min()}
+    counts |= {"independent of trained": errors.n_trained[known].min()}
     return FrequencyShift(
         mean,
         covariance,
@@ -99,16 +89,6 @@ def _stated(noise: Any, n_modes: int, *, what: str, **options: Any) -> Array | N
     if (deviations == 0).any():
         raise ValueError(f"{what} is {noise!r}; expected standard deviations above 0, which errors are derived from")
     return deviations
-
-
-def _records_for_one(residuals: Array) -> float:
-    """How many records of a mode in a row are worth one independent one.
-
-    From the variance of the means of a dozen parts or, if that gives more, from the correlation of neighbours.
-    """
-    number = (~np.isnan(residuals)).sum()
-    neighbours = np.clip(np.nan_to_num(pd.Series(residuals).autocorr()), 0, 0.98) if number > 2 else 0.0
-    return max(number / independent_records(residuals), (1 + neighbours) / (1 - neighbours))
 
 
 def _left_out(fem: Any, T: Any, frequencies: Array, shifts: Array, deviations: Array) -> dict[str, Array]:
