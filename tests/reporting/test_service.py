@@ -18,7 +18,7 @@ from skthermo.datasets import make_truss_campaign, truss_structure
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
-from tests.reporting.monitors import FakeMonitor, event_row, smallest_changes, status_of
+from tests.reporting.monitors import FakeMonitor, event_row, smallest_changes
 from tests.reporting.pages import HOSTILE, QUOTED, Page, page_text, section_of
 
 plt = pytest.importorskip("matplotlib.pyplot")
@@ -215,14 +215,14 @@ def test_a_watch_is_neither_an_alarm_nor_healthy_and_needs_no_explanation():
 def test_a_slow_change_and_a_known_damage_have_states_of_their_own():
     slow = event_row("2025-06-10", None, kind="drift", modes="f2")
     monitor = FakeMonitor(events=[slow])
-    monitor.status = lambda now=None: replace(status_of(monitor).at(now), state="drift")
+    monitor.status = lambda now=None: replace(Monitor.status(monitor, now), state="drift")
     page = Page(page_text(monitor, title="River", settings="river", now=monitor.last_))
     assert state_of(page) == "drift"
     assert f"River: a slow change since 10{SPACE}June{SPACE}2025" in page.text
     assert 'skthermo acknowledge river 1 --damage --note "what was found"' in page.text
     known = event_row("2025-06-10", "2025-06-12", acknowledged=True, note="scour")
     monitor = FakeMonitor(events=[known])
-    monitor.status = lambda now=None: replace(status_of(monitor).at(now), state="known damage")
+    monitor.status = lambda now=None: replace(Monitor.status(monitor, now), state="known damage")
     page = today_of(monitor)
     assert (state_of(page), headline(page)) == (
         "known-damage",
