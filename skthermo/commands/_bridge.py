@@ -6,6 +6,7 @@ import argparse
 import json
 import logging
 import os
+import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -226,11 +227,19 @@ class Bridge:
             self.identify_open(monitor)
             is_usual = self._describe_update(monitor, evaluated, before)
             self.append_transitions(monitor)
-            if is_usual and not (self.transitions or self.errors or read or self.options.verbose):
-                self.lines = [f"{self.said}; {self._came(evaluated)}, nothing has changed"]
+            if not self.options.verbose:
+                self.lines = [line for line in self.lines if self._is_news(line)]
+                if is_usual and not (self.transitions or self.errors or read):
+                    self.lines = [f"{self.said}; {self._came(evaluated)}, nothing has changed"]
             taken.state = self.state
             taken.write()
         self.write_page(monitor)
+
+    def _is_news(self, line: str) -> bool:
+        """Whether a line of a summary is not as after the call before: of events, those that are open or changed."""
+        event = re.match(r"event (\d+):", line)
+        changed = {str(one["event"]) for one in self.transitions}
+        return not line.startswith(AS_BEFORE) and (not event or "still open" in line or event[1] in changed)
 
     def _came(self, evaluated: pd.DataFrame) -> str:
         """How many records came, and how many of these could not be evaluated."""
@@ -352,8 +361,6 @@ class Bridge:
         if not (doubt or states["healthy"] or states["watch"]):
             doubt = "no new record could be evaluated"
         self.describe(monitor, doubt, bool((evaluated["state"] == "alarm").any()))
-        if not self.options.verbose:
-            self.lines = [line for line in self.lines if not line.startswith(AS_BEFORE)]
         is_usual = len(new) == len(evaluated) and not (n_ahead or any(counts[name] for name in COUNTS))
         return is_usual and self.state == Taken.read(self.taken_file).state
 

@@ -521,7 +521,7 @@ class Monitor(SavesFrames, Estimator):
         states = self.corrections_.advanced(begin, raw)
         first = midnight(min([first, *changed_times(self._faults_of(self.states_[-1]), self._faults_of(states[-1]))]))
         drifts = self.corrections_.drifts(states, raw.index)
-        known = self.decisions_.loc[self.decisions_.index < begin.day, list(drifts)]
+        known = self.decisions_[self.decisions_.index < begin.day].reindex(columns=list(drifts))
         drifts = pd.concat([known, drifts[drifts.index >= begin.day]])
         states = [*(one for one in earlier if one.day < begin.day), *states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
@@ -580,7 +580,8 @@ class Monitor(SavesFrames, Estimator):
     def _index_then(self, records: pd.DataFrame, place: int, index: Array, drifts: pd.DataFrame) -> Array:
         """Damage indices as they were before sensors at fault had been found."""
         raw = self.records_[self.records_.index >= records.index[0]]
-        drifts = pd.concat([self.decisions_.loc[self.decisions_.index < drifts.index[0], list(drifts)], drifts])
+        known = self.decisions_[self.decisions_.index < drifts.index[0]]
+        drifts = pd.concat([known.reindex(columns=list(drifts)), drifts])
         then = self._corrected(raw, drifts, once_found=True)[0]
         if then.equals(records.loc[raw.index]):
             return index

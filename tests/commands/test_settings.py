@@ -89,6 +89,8 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
         ("[compensator]\n", '[compensator]\nestimator = "Ridge"\n', "estimator"),
         ("[[features]]", "[features]", "[[features]]"),
         ("[regression]", "[[regression]]", "[regression], once"),
+        ('# page = "status.html"', 'page = "../status.html"', "in the folder of the settings"),
+        ('# transitions = "transitions.jsonl"', 'transitions = "/tmp/t.jsonl"', "in the folder of the settings"),
     ],
 )  # fmt: skip
 def test_mistakes_are_named_with_their_line(fit, proposed, old, new, expected):

@@ -73,7 +73,7 @@ def test_a_page_in_another_language_has_the_same_parts_and_facts(monitor, tmp_pa
     assert "state alarm" in [tag.get("class") for tag in page.all("div")]
     assert {"1", "2", "deck", HOSTILE} <= set(page.heads)
     assert {"f1", QUOTED, "3"} <= set(page.cells)
-    assert page.text.count(HOSTILE) == 3  # title, note and reason
+    assert page.text.count(HOSTILE) == 4  # title, headline, note and reason
     assert len(page.tables()) == 3  # the last month, the last year, and drift
     assert any(("10" in text and "2025" in text) for text in page.paragraphs[:3])
 
@@ -120,6 +120,9 @@ def test_a_folder_is_for_pages_of_a_fleet_too(write, tmp_path):
         ('\n{% extends "other.html.j2" %}', 2, "other.html.j2"),
         ("\n{{ standing.state|significant }}", 2, "isfinite"),
         ("{{ 1 + standing.state }}", 1, "unsupported operand"),
+        ("\n{{ monitor.__class__.__mro__ }}", 2, "unsafe"),
+        ("{{ standing.days.to_csv('/tmp/days.csv') }}", 1, "unsafe"),
+        ("{{ monitor.acknowledge(1, harmless=true) }}", 1, "unsafe"),
     ],
 )
 def test_errors_name_the_file_and_the_line(write, tmp_path, text, line, message):
