@@ -109,8 +109,11 @@ def test_the_reference_lists_every_public_name(room):
     page = (API / f"{room}.rst").read_text()
     tables = re.findall(r"autosummary::\n(?:   :.*\n)+\n((?:   \w+\n)+)", page)
     assert f"currentmodule:: skthermo.{room}\n" in page
-    names = sorted(importlib.import_module(f"skthermo.{room}").__all__)
-    assert sorted(" ".join(tables).split()) == names
+    names, listed = importlib.import_module(f"skthermo.{room}").__all__, " ".join(tables).split()
+    missing, gone = sorted({*names} - {*listed}), sorted({*listed} - {*names})
+    assert not missing, f"docs/reference/api/{room}.rst: add {missing} to one of its tables"
+    assert not gone, f"docs/reference/api/{room}.rst: remove {gone}"
+    assert len(listed) == len(names), f"docs/reference/api/{room}.rst: a name stands there twice"
 
 
 def test_reference_and_guide_have_every_package():
