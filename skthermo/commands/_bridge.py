@@ -348,7 +348,7 @@ class Bridge:
         shown = ", ".join(f"{number} {state}" for state, number in states.items() if number or state in always)
         others = ", ".join(f"{counts[name]} {text}" for name, text in COUNTS.items())
         self.lines.append(f"new: {len(new)}{f' ({shown})' if len(evaluated) else ''}; {others}")
-        notes = {"evaluated anew, as records came late": len(evaluated) - len(new)}
+        notes = {"evaluated anew, as records came late or a sensor had failed": len(evaluated) - len(new)}
         notes |= {"set aside, stamped too far ahead": n_ahead}
         notes |= {f"not evaluated, {reason}": number for reason, number in reasons.items()}
         notes |= {f"evaluated, with a remark, {remark}": number for remark, number in remarks.items()}

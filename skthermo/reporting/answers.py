@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from skthermo._core.text import SPACE, bare, day_text, listed, share_text, significant
+from skthermo._core.text import bare, day_text, listed, share_text, significant
 from skthermo._core.warnings import collected
 
 LONGEST = pd.Timedelta("30D")  # records of the state as it is now
@@ -22,14 +22,16 @@ def _newest(table: pd.DataFrame, since: Any) -> pd.DataFrame:
 def shifts_of(monitor: Any, since: Any) -> pd.Series:
     """How far each response is from that of the healthy structure in the same weather, on average since a time.
 
-    Of the last 30 days at most; relative, or in the unit of a response that may be zero; empty for a detector that
-    has no residuals.
+    Of the last 30 days at most, those that stand out most from their scatter first; relative, or in the unit of a
+    response that may be zero; empty for a detector that has no residuals.
     """
     if not len(monitor.corrected_) or not hasattr(monitor.detector_, "residuals"):
         return pd.Series(dtype=float)
     records = monitor.corrected_[monitor.features_]
     with collected(drop_others=True):  # each record has its reason
-        return _newest(monitor.detector_.residuals(records[records.index >= _start(records, since)]), since).mean()
+        rest = _newest(monitor.detector_.residuals(records[records.index >= _start(records, since)]), since)
+    mean, scatter = rest.mean(), rest.std().replace(0.0, np.finfo(float).tiny)
+    return mean[(mean / scatter).abs().sort_values(ascending=False, kind="stable").index]
 
 
 def _start(records: pd.DataFrame, since: Any) -> pd.Timestamp:
@@ -52,14 +54,14 @@ def identified_in(monitor: Any, since: Any) -> Any:
 
 
 def change_text(shifts: Mapping[str, float], names: list[str], units: Mapping[str, str], is_relative: bool) -> str:
-    """How far some responses have moved, such as "f1 is 2.1 % lower, f2 0.4 % higher"; "" where it is not known."""
+    """How far some responses have moved, such as "f1 is 2.1 %, f2 1.4 % lower"; "" where it is not known."""
+    known = {name: shifts[name] for name in names if np.isfinite(shifts.get(name, np.nan))}
+    ways = ["lower" if shift < 0 else "higher" for shift in known.values()]
     parts = []
-    for name in names:
-        shift = shifts.get(name, np.nan)
-        unit = units.get(name, "")
-        if np.isfinite(shift):
-            size = share_text(abs(shift)) if is_relative else f"{significant(abs(shift))}{SPACE}{unit}".strip()
-            parts.append(f"{bare(name)} {'' if parts else 'is '}{size} {'lower' if shift < 0 else 'higher'}")
+    for place, (name, shift) in enumerate(known.items()):
+        size = share_text(abs(shift)) if is_relative else f"{significant(abs(shift))} {units.get(name, '')}".strip()
+        is_last = place == len(ways) - 1 or ways[place + 1] != ways[place]
+        parts.append(f"{bare(name)}{'' if place else ' is'} {size}{f' {ways[place]}' if is_last else ''}")
     return listed(parts)
 
 
@@ -74,11 +76,11 @@ def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = No
         yield f"{begun}: values{of} cannot be those of the structure as it was. A sensor or the structure has changed."
         return
     shifts = shifts_of(monitor, since)
-    moved = change_text(shifts, event["modes"], monitor.units_, monitor.smallest_changes_.is_relative)
+    moved = change_text(shifts, list(shifts.index[:3]), monitor.units_, monitor.smallest_changes_.is_relative)
     named = f"; most changed: {listed(event['modes'])}" if event["modes"] else ""
     yield f"{begun}: {moved} than in the healthy structure in the same weather." if moved else f"{begun}{named}."
     if identified is not None:
-        yield from identified.answer()[:2]
+        yield identified.answer()[0]
     elif event["groups"]:
         size = event.get("size", np.nan)
         loss = f"A loss of stiffness{f' of about {share_text(size)}' if np.isfinite(size) else ''}"
