@@ -36,7 +36,7 @@ def test_each_record_is_evaluated_by_records_of_other_blocks(covariance, n_rows,
     for fold in range(n_folds):
         others = MahalanobisDetector(covariance=covariance, threshold="chi2").fit(rows[folds != fold])
         index[folds == fold] = others.damage_index(rows[folds == fold])
-    detector = MahalanobisDetector(covariance=covariance).fit(rows)
+    detector = MahalanobisDetector(0.02, covariance=covariance).fit(rows)
     np.testing.assert_allclose(detector.baseline_index_, index, rtol=1e-9)
     rank = int(np.ceil((n_rows + 1) * 0.98))
     assert detector.threshold_ == pytest.approx(np.sort(index)[rank - 1])
@@ -48,7 +48,7 @@ def test_a_block_is_longer_than_records_remember():
         found = []
         for seed in range(10):
             baseline, new = np.split(autoregressive(1365, correlation, seed), [365])
-            found.append((MahalanobisDetector().fit(baseline).predict(new) == -1).mean())
+            found.append((MahalanobisDetector(0.02).fit(baseline).predict(new) == -1).mean())
         rates[correlation] = np.mean(found)
     assert rates[0.0] == pytest.approx(0.02, abs=0.01)
     assert rates[0.9] < 0.04
@@ -99,7 +99,7 @@ def test_false_alarms_on_new_records_are_near_what_is_asked_where_the_baseline_i
         random = np.random.default_rng(seed)
         baseline, later = random.normal(size=(80, 5)), random.normal(size=(400, 5))
         for name, found in rates.items():
-            fitted = detector(threshold=name).fit(0.01 * baseline)
+            fitted = detector(contamination=0.02, threshold=name).fit(0.01 * baseline)
             found.append((fitted.damage_index(0.01 * later) > fitted.threshold_).mean())
     error = np.std(rates["conformal"]) / np.sqrt(60)
     assert np.mean(rates["conformal"]) < 0.02 + 3 * error
