@@ -23,7 +23,7 @@ ROOMS = [name for name in PACKAGES if importlib.import_module(f"skthermo.{name}"
 README, HOME = ROOT / "README.md", ROOT / "docs" / "index.rst"
 LONG = {  # pages whose code takes seconds
     "accuracy_kw51.rst", "choices.rst", "detection.rst", "estimation.rst", "identify.rst", "many_bridges.rst",
-    "method.rst", "models.rst", "preparing_records.rst", "quickstart.rst", "rank_detectors.rst",
+    "method.rst", "models.rst", "preparing_records.rst", "quickstart.rst",
     "records_theory.rst", "report.rst", "studies.rst", "three_steps.rst", "validation.rst",
 }  # fmt: skip
 

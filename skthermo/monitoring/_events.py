@@ -296,13 +296,13 @@ class Events:
                     of_kind = [one for one in runs if one.kind == run.kind]
                     before = [one.level[self.times[one.first : one.stop] <= event["at"]] for one in of_kind]
                     most = 1.5 * np.fmax.reduce(np.concatenate(before), initial=-np.inf)
-                    is_calm = (self.times[rows] > event["at"]) & ~(run.level > (most if most > 0 else np.inf))
+                    is_calm = (self.times[rows] >= event["at"]) & ~(run.level > (most if most > 0 else np.inf))
                 rank = STATES.index({DAMAGE: "alarm", DRIFT: "drift", WATCH: "watch"}[run.kind])
                 higher = ~is_calm & (rank <= ranks[rows])
                 ranks[rows[higher]], numbers[rows[higher]] = rank, number
             if event["acknowledged"] and not event["harmless"] and event["kind"] in (DAMAGE, DRIFT):
                 later = self.starts[self.starts > self.times[runs[0].first]]
-                known = (self.times > event["at"]) & (self.times < (later.min() if len(later) else np.inf))
+                known = (self.times >= event["at"]) & (self.times < (later.min() if len(later) else np.inf))
                 ranks[known] = np.minimum(ranks[known], STATES.index("known damage"))
         shown = ranks < len(STATES)
         states[shown] = np.array(STATES, dtype=object)[ranks[shown]]
@@ -320,7 +320,7 @@ class Events:
             number[rows[number[rows] == 0]] = place
             if (self.decisions["n_held"].to_numpy()[rows] > 0).any():
                 is_set_aside[rows] = True
-                is_over = bool(answers.loc[place, "harmless"]) & (self.times[rows] > answers.loc[place, "at"])
+                is_over = bool(answers.loc[place, "harmless"]) & (self.times[rows] >= answers.loc[place, "at"])
                 is_unexplained[rows] |= ~is_over
         return is_unexplained, is_set_aside
 

@@ -69,7 +69,7 @@ class KnownBridge:
         if self.status is None:
             return MonitorStatus("not evaluated", self.error or "there is no monitor").at(now)
         status = self.status.at(now, max_age=max_age)
-        state = "alarm" if status.state == "alarm" else "not evaluated"
+        state = status.state if status.state in ("alarm", "drift") else "not evaluated"
         return replace(status, state=state, reason=self.error) if self.errors else status
 
     @property
@@ -374,13 +374,13 @@ class Fleet:
     Columns of ``table``: ``is_fitted``; ``error``, "" where there is none; ``n_records`` of the fit;
     ``gaps``, the share of their values that are missing; ``mape``, mean absolute error of the training frequencies in
     percent, in-sample; ``n_warnings``, and a column ``warnings KIND`` for each kind; ``state`` of the monitor
-    ("healthy", "watch", "alarm", "not evaluated", "" without one); ``last`` record since the fit; ``days_silent``, days
+    (as in `MonitorStatus`, "" without one); ``last`` record since the fit; ``days_silent``, days
     from it to the newest record of all bridges; ``n_evaluated`` records, and the share ``not_evaluated``;
     ``alarm_rate``, the share of evaluated records in an event; ``n_events`` of damage, and those that are open,
     ``n_open``; ``drift``, the largest change of stiffness beyond its error, of ``drift_group``; ``seconds`` of the fit;
     ``megabytes`` of its file, NaN in memory.
 
-    A bridge whose new records could not be evaluated is "not evaluated", or "alarm" while an event is open.
+    A bridge whose new records could not be evaluated is "not evaluated", or in its alarm or drift.
 
     Examples
     --------
@@ -679,7 +679,9 @@ class Fleet:
             "Fitted without a monitor, state not known": table["is_fitted"] & ~is_watched,
             "Without a record since the fit, state not known": is_watched & ~is_begun,
             "In alarm": table["state"] == "alarm",
+            "Moved in the mean of 30 days, without an alarm (drift)": table["state"] == "drift",
             "Raised damage index without an alarm (watch)": table["state"] == "watch",
+            "With damage that is known": table["state"] == "known damage",
             "Not evaluated, state not known": is_begun & (table["state"] == "not evaluated"),
             "Without a record for more than 7 days before the newest of all": table["days_silent"] > 7,
             "With an error since the fit": table["is_fitted"] & (table["error"] != ""),

@@ -95,7 +95,8 @@ class Monitor(SavesFrames, Estimator):
     fem : DataInformedFEM, optional
         A fitted chain. With it, slow drift is followed in its parameters; without it, none is.
     false_alarms_per_year : float, default=1.0
-        Damage events that a healthy structure has in a year, on average.
+        Alarms of a healthy structure in a year, on average: three quarters of them by damage indices, one quarter by
+        the mean of the last 30 days (all by damage indices where the baseline is shorter than half a year).
     watch_per_year : float, optional
         A second, lower level: events of kind "watch" that a healthy structure has in a year, more than damage events.
         While one is open, and no damage event is, the state is "watch". By default there is no such level.
@@ -146,13 +147,15 @@ class Monitor(SavesFrames, Estimator):
     lookback_ : object
         How far before a record the detector looks.
     events_ : DataFrame
-        A row for each event, counted from 1: ``kind`` ("damage", "watch", or "measurement or structure":
-        responses that were set aside as implausible or stuck), ``start``, ``end`` (first record after it, NaT while it
-        is open), ``size`` (loss of stiffness of the first of ``groups``, on average over its records in alarm; NaN
-        without), ``peak`` (highest index that ``persistence`` of the last records reached; of the last kind, the
-        largest number of responses set aside), ``peak_time``, ``modes`` (at the peak) and ``groups`` (of all records in
-        alarm together), as in `update`, ``n_alarms`` (records while it was open), ``acknowledged``, ``harmless`` and
-        ``note``.
+        A row for each cause, counted from 1 by its first sign: ``kind`` ("damage", "drift": the mean of 30 days has
+        moved, "watch", or "fault": responses that were set aside as implausible, and alarms that rested on a sensor
+        that had failed), ``start`` (first record in alarm), ``end`` (first record after it, NaT while it is open),
+        ``peak`` (highest index that ``persistence`` of the last records reached; of a drift, the statistic over its
+        limit; of a fault, that index or the number of responses set aside), ``peak_time``, ``modes`` (at the peak, or
+        the columns at fault) and ``groups`` (of all records in alarm together), as in `update`, ``size`` (loss of
+        stiffness of the first of ``groups``, on average; NaN without), ``n_alarms`` (records in alarm), ``n_times``
+        (times in alarm), ``acknowledged``, ``harmless`` and ``note``. What comes back in the same direction within four
+        weeks, or becomes graver, is the same event.
     days_ : DataFrame
         A row for each day with records: ``n_records``, ``n_evaluated``, ``n_alarms``, ``n_left_out`` (values),
         ``index_median``, ``index_max`` and, where drift is followed, a column ``drift GROUP`` for each group.
@@ -188,7 +191,13 @@ class Monitor(SavesFrames, Estimator):
         Versions of skthermo and scikit-learn by which it was fitted.
     decisions_ : DataFrame
         What was decided of each record since the baseline, from which ``events_``, ``evaluations_`` and ``days_`` are
-        computed: ``index``, levels of the detector in charge then, and what was left out, held or explained.
+        computed: ``index``, also as it was before sensors at fault were found, levels of the detector in charge then,
+        and what was left out, held or explained.
+    means_, weeks_ : DataFrame
+        Mean residuals of each day, and the test of the mean of 30 days at the end of each week: ``level`` (the
+        statistic over its limit), ``p_value``, ``modes``, and departures of modes and groups.
+    mean_test_ : object
+        Errors of means, by which the test knows what is chance.
     acknowledgements_ : DataFrame
         What the owner has said: ``kind`` of the event, a ``time`` in it and the newest record ``at`` which it was said
         (both in nanoseconds), ``harmless`` and ``note``.
@@ -516,13 +525,12 @@ class Monitor(SavesFrames, Estimator):
         if not len(raw):
             self.states_ = (begin,)
             return
-        if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
-            self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
         states = self.corrections_.advanced(begin, raw)
         first = midnight(min([first, *changed_times(self._faults_of(self.states_[-1]), self._faults_of(states[-1]))]))
+        if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
+            self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
         drifts = self.corrections_.drifts(states, raw.index)
-        known = self.decisions_[self.decisions_.index < begin.day].reindex(columns=list(drifts))
-        drifts = pd.concat([known, drifts[drifts.index >= begin.day]])
+        drifts = pd.concat([self._drifts_before(begin.day, drifts), drifts])
         states = [*(one for one in earlier if one.day < begin.day), *states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
@@ -535,6 +543,10 @@ class Monitor(SavesFrames, Estimator):
             [self.weeks_[self.weeks_.index <= first], self.mean_test_.weeks(self.means_, self._test_times(first))]
         )
         self._explain(first)
+
+    def _drifts_before(self, time: pd.Timestamp, like: pd.DataFrame) -> pd.DataFrame:
+        """Shares of stiffness that were taken out of records before a time."""
+        return self.decisions_[self.decisions_.index < time].reindex(columns=list(like))
 
     def _faults_of(self, state: Any) -> Sequence[Any]:
         return () if state.sensors is None else state.sensors.faults
@@ -580,8 +592,7 @@ class Monitor(SavesFrames, Estimator):
     def _index_then(self, records: pd.DataFrame, place: int, index: Array, drifts: pd.DataFrame) -> Array:
         """Damage indices as they were before sensors at fault had been found."""
         raw = self.records_[self.records_.index >= records.index[0]]
-        known = self.decisions_[self.decisions_.index < drifts.index[0]]
-        drifts = pd.concat([known.reindex(columns=list(drifts)), drifts])
+        drifts = pd.concat([self._drifts_before(drifts.index[0], drifts), drifts])
         then = self._corrected(raw, drifts, once_found=True)[0]
         if then.equals(records.loc[raw.index]):
             return index
@@ -647,8 +658,9 @@ class Monitor(SavesFrames, Estimator):
         Returns
         -------
         DataFrame
-            On the stamps of new records, and of known ones that are evaluated anew because others came late: ``state``
-            ("healthy", "watch", "alarm" or "not evaluated"), ``index`` (damage index), ``threshold``, ``modes`` (names
+            On the stamps of new records, and of known ones that are evaluated anew because others came late or a sensor
+            was found to have failed: ``state`` ("healthy", "watch", "drift", "known damage", "alarm" or "not
+            evaluated"), ``index`` (damage index), ``threshold``, ``modes`` (names
             of the modes that drive an alarm, the worst first), ``groups`` (of a directional detector with damage
             groups: those whose losses explain most of an alarm, "" where none do; "a or b" cannot be distinguished),
             ``reason`` (why a record is not evaluated, or what else is worth saying), ``event`` (its number in
@@ -727,10 +739,11 @@ class Monitor(SavesFrames, Estimator):
         -------
         list of dict
             Plain values of each later entry, the oldest first. ``id``: its number, from 1, which it keeps. ``what``:
-            "opened", "closed" or "withdrawn" (late records have shown that there was no event), "acknowledged", "fault"
-            or "put back" (a sensor), "refit", "rebaseline" or "discarded". ``time``: when it happened, by the stamps of
-            the records. ``newest``: the newest record when it was reported. ``event``: the number of the event, 0 for
-            none. ``kind``: that of the event or fault. ``column``: the sensor, else "". ``detail``: text.
+            "opened", "closed", "reopened", "became" (of another kind, such as a watch that becomes damage) or
+            "withdrawn" (late records, or a sensor that has failed, have shown that there was no event), "acknowledged",
+            "fault" or "put back" (a sensor), "refit", "rebaseline" or "discarded". ``time``: when it happened, by the
+            stamps of the records. ``newest``: the newest record when it was reported. ``event``: the number of the
+            event, 0 for none. ``kind``: that of the event or fault. ``column``: the sensor, else "". ``detail``: text.
 
         Raises
         ------
@@ -781,8 +794,9 @@ class Monitor(SavesFrames, Estimator):
             Its number in ``events_``.
         harmless : bool
             Whether the structure is as before: records of a harmless event may train a new detector. Of an event of
-            kind "measurement or structure", that sensors are at fault: from the next record on, the other responses
-            are evaluated without them.
+            kind "fault", that sensors are at fault: from the next record on, the other responses are evaluated without
+            them. Of damage or drift that is not harmless, the state is "known damage" until `rebaseline`. Either answer
+            holds up to one and a half times the index that was reached before.
         note : str, default=""
             What was found.
 

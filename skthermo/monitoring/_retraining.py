@@ -16,7 +16,7 @@ from skthermo._core.text import capital, counted, listed, probability_text
 from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, TemperatureCompensator
 from skthermo.monitoring._drift import DailyRegression, daily_means, weather_columns
-from skthermo.monitoring._events import WATCH
+from skthermo.monitoring._events import DRIFT, WATCH
 from skthermo.monitoring._records import compensators_of
 
 
@@ -176,12 +176,18 @@ def may_train(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Records outside events that nobody called harmless, without values of faulty sensors; the others, with reasons.
 
-    A change may have begun within the ``margin`` before the first alarm of an event.
+    A change may have begun within the ``margin`` before the first alarm of an event, or in the 30 days whose mean has
+    moved.
     Modes that were exchanged for a time stand in their place already with ``is_in_place``.
     """
     said = {True: "acknowledged", False: "not acknowledged"}
     spans = [
-        (one.start - margin, one.end, "all", f"event {one.Index} ({one.kind}), " + said[one.acknowledged])
+        (
+            one.start - margin - 30 * DAY * (one.kind == DRIFT),
+            one.end,
+            "all",
+            f"event {one.Index} ({one.kind}), " + said[one.acknowledged],
+        )
         for one in events[~events["harmless"] & (events["kind"] != WATCH)].itertuples()
     ]
     spans += [

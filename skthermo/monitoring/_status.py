@@ -12,7 +12,6 @@ import pandas as pd
 
 from skthermo._core.frames import DAY, as_moment, check_duration, usual_step
 from skthermo._core.text import counted, duration_text, plain, probability_text
-from skthermo.monitoring._events import DAMAGE, FAULT, WATCH
 
 
 @dataclass(frozen=True)
@@ -104,9 +103,11 @@ class MonitorStatus:
 
     Parameters
     ----------
-    state : {"healthy", "watch", "alarm", "not evaluated"}
-        "alarm" while an event of damage, or of "measurement or structure", is open, else "watch" while an event of that
-        kind is. Nothing is healthy if the newest record is too old, of a time to come, or was not evaluated.
+    state : {"healthy", "watch", "drift", "known damage", "alarm", "not evaluated"}
+        "alarm" while the index is in an event of damage, or a response is set aside in an event of kind "fault"; else
+        "drift" while the mean of the last 30 days has moved, or "watch" while the index is raised; "known damage" after
+        damage that the owner has confirmed. Nothing is healthy if the newest record is too old, of a time to come, or
+        was not evaluated.
     reason : str
         Why it is not evaluated, or what else is worth saying of the newest record; "" if nothing is.
     now : Timestamp or None
@@ -120,8 +121,8 @@ class MonitorStatus:
         Levels of events: ``threshold``, ``clear_threshold``, ``watch_threshold``, ``false_alarms_per_year``,
         ``watch_per_year`` and ``smallest_change``.
     events : tuple of dict
-        Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, ``peak``, ``modes``,
-        ``groups`` and ``acknowledged``.
+        Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, and ``peak``, ``modes``,
+        ``groups``, ``size``, ``n_times``, ``acknowledged`` and ``harmless`` of its row.
     faults : tuple of dict
         Sensors that have failed and still do: ``column``, ``kind``, ``since`` and ``detail``.
     transition : int
@@ -170,8 +171,8 @@ class MonitorStatus:
         Returns
         -------
         MonitorStatus
-            An alarm stays one; any other state becomes "not evaluated" where the newest record is too old, or of a time
-            to come.
+            An alarm or a drift stays one; any other state becomes "not evaluated" where the newest record is too old,
+            or of a time to come.
 
         Raises
         ------
@@ -195,7 +196,8 @@ class MonitorStatus:
             doubt = f"the newest record, of {last}, is {age} old; expected one of the last {longest}"
         else:
             return status
-        return replace(status, state="alarm" if self.state == "alarm" else "not evaluated", reason=doubt)
+        stays = self.state in ("alarm", "drift")
+        return replace(status, state=self.state if stays else "not evaluated", reason=doubt)
 
     def __str__(self) -> str:
         lines = [f"state: {self.state}" + (f" ({self.reason})" if self.reason else "")]
@@ -216,13 +218,17 @@ class MonitorStatus:
         return {name: plain(value) for name, value in flat.items() if name not in ("records", "levels")}
 
 
-def state_of(events: pd.DataFrame, evaluations: pd.DataFrame) -> str:
+def state_of(monitor: Any, evaluations: pd.DataFrame) -> str:
     """How the structure is by its open events, else by the newest record."""
-    kinds = set(events["kind"][events["end"].isna() & ~(events["harmless"] & (events["kind"] == FAULT))])
-    if kinds & {DAMAGE, FAULT}:
-        return "alarm"
-    newest = evaluations["state"].iloc[-1] if len(evaluations) else "not evaluated"
-    return "watch" if WATCH in kinds else "not evaluated" if newest == "alarm" else newest
+    if not len(evaluations):
+        return "not evaluated"
+    events = monitor._events()
+    standing, number = events.standing()
+    is_set_aside = events.set_aside(number)[0][-1]
+    if standing[-1] in ("alarm", "drift") or is_set_aside:
+        return "drift" if standing[-1] == "drift" and not is_set_aside else "alarm"
+    newest = evaluations["state"].iloc[-1]
+    return "watch" if standing[-1] == "watch" else "not evaluated" if newest == "alarm" else newest
 
 
 def status_of(monitor: Any) -> MonitorStatus:
@@ -232,11 +238,11 @@ def status_of(monitor: Any) -> MonitorStatus:
     opened = events[events["end"].isna()].rename_axis("event").reset_index().rename(columns={"start": "since"})
     for name in ("modes", "groups"):
         opened[name] = pd.Series([[one for one in text.split(", ") if one] for text in opened[name]], dtype=object)
-    shown = ["event", "kind", "since", "peak", "modes", "groups", "acknowledged"]
+    shown = ["event", "kind", "since", "peak", "modes", "groups", "size", "n_times", "acknowledged", "harmless"]
     failed = faults[faults["until"].isna()].astype({"column": str})
     levels = ("threshold_", "clear_threshold_", "watch_threshold_", "false_alarms_per_year", "watch_per_year")
     return MonitorStatus(
-        state=state_of(events, evaluations),
+        state=state_of(monitor, evaluations),
         reason=str(evaluations["reason"].iloc[-1]) if len(evaluations) else "",
         records=RecordTimes(
             baseline_end=baseline[-1],
@@ -269,7 +275,8 @@ def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
         until = "still open" if pd.isna(event["end"]) else f"to {event['end']}"
         harmless = "harmless" if event["harmless"] else "not harmless"
         said = f"acknowledged as {harmless}" if event["acknowledged"] else "not acknowledged"
-        parts = [f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
+        times = f"{event['n_times']} times" if event["n_times"] > 1 else ""
+        parts = [times, f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {', '.join(filter(None, parts))}{note}"
     yield f"events: {len(events)}, {events['end'].isna().sum()} of them open" if len(events) else "events: none"

@@ -19,6 +19,14 @@ def _newest(table: pd.DataFrame, since: Any) -> pd.DataFrame:
     return table[table.index >= max(pd.Timestamp(since), table.index[-1] - LONGEST)]
 
 
+def _measured(monitor: Any) -> pd.DataFrame:
+    """Records as they were measured, without the correction for slow drift, but for values that were left out."""
+    seen = monitor.corrected_[monitor.features_]
+    records = seen.copy()
+    records[monitor.targets_] = monitor.records_.loc[seen.index, monitor.targets_]
+    return records.where(seen.notna())
+
+
 def shifts_of(monitor: Any, since: Any) -> pd.Series:
     """How far each response is from that of the healthy structure in the same weather, on average since a time.
 
@@ -27,30 +35,21 @@ def shifts_of(monitor: Any, since: Any) -> pd.Series:
     """
     if not len(monitor.corrected_) or not hasattr(monitor.detector_, "residuals"):
         return pd.Series(dtype=float)
-    records = monitor.corrected_[monitor.features_]
+    records = _measured(monitor)
+    seen_from = max(pd.Timestamp(since), records.index[-1] - LONGEST) - 2 * LONGEST  # windows reach into these records
     with collected(drop_others=True):  # each record has its reason
-        rest = _newest(monitor.detector_.residuals(records[records.index >= _start(records, since)]), since)
+        rest = _newest(monitor.detector_.residuals(records[records.index >= seen_from]), since)
     mean, scatter = rest.mean(), rest.std().replace(0.0, np.finfo(float).tiny)
     return mean[(mean / scatter).abs().sort_values(ascending=False, kind="stable").index]
 
 
-def _start(records: pd.DataFrame, since: Any) -> pd.Timestamp:
-    """From when on windows and means of earlier temperatures see all that matters of the newest records."""
-    return max(pd.Timestamp(since), records.index[-1] - LONGEST) - 2 * LONGEST
-
-
 def identified_in(monitor: Any, since: Any) -> Any:
-    """What explains the newest records since a time by the monitor's model, of the last 30 days at most.
-
-    Measured responses count, without the correction for slow drift, but for those that were left out.
-    """
+    """What explains the newest records since a time by the monitor's model, of the last 30 days at most."""
     from skthermo.studies import identify_damage  # jobs without an alarm need no studies
 
-    seen, targets = _newest(monitor.corrected_, since), monitor.targets_
-    measured = monitor.records_.loc[seen.index, targets].where(seen[targets].notna())
-    inputs = [name for name in monitor.features_ if name not in targets]
+    records, targets = _newest(_measured(monitor), since), monitor.targets_
     with collected(drop_others=True):
-        return identify_damage(monitor.fem, seen[inputs], measured, random_state=0)
+        return identify_damage(monitor.fem, records.drop(columns=targets), records[targets], random_state=0)
 
 
 def change_text(shifts: Mapping[str, float], names: list[str], units: Mapping[str, str], is_relative: bool) -> str:

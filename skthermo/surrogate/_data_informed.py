@@ -197,7 +197,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
 
     A mapper whose ``predict`` takes ``return_std``, such as ``TemperatureMapper(BayesianRidge())`` or a `FleetMapper`,
     makes standard deviations and intervals as wide as it is uncertain; errors of different parameters count as
-    independent. See :doc:`/guide/records_theory`, :doc:`/guide/estimation` and :doc:`/guide/uncertainty`.
+    independent. See :doc:`/guide/records_theory` and :doc:`/guide/estimation`.
 
     Examples
     --------
@@ -480,8 +480,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Notes
         -----
         Split-conformal intervals [LGR18]_ from ``recorder_.residuals``, in multiples of their spread in similar weather
-        (:doc:`/guide/uncertainty`). If new records are exchangeable with the training records, an interval holds a mode
-        with about the probability asked; the share of a short period varies more, because records are serially
+        (:ref:`intervals-of-predictions`). If new records are exchangeable with the training records, an interval holds
+        a mode with about the probability asked; the share of a short period varies more, because records are serially
         correlated. Beyond the training range, and where a temperature was filled, it is wider.
 
         Examples

@@ -29,7 +29,7 @@ PAGE = "drop_ins.rst"
 def trees():
     pytest.importorskip("xgboost")
     pytest.importorskip("lightgbm")
-    return run_recipe(PAGE, "recipe-records", "recipe-trees")
+    return run_recipe(PAGE, "recipe-records", "recipe-boosted-trees")
 
 
 @pytest.mark.parametrize("name", ["boosted", "light"])
@@ -68,7 +68,7 @@ def test_chains_of_trees_predict_and_leave_gaps(trees, name):
 
 def test_mapie(folder):
     pytest.importorskip("mapie")
-    recipe = run_recipe(PAGE, "recipe-records", "recipe-mapie")
+    recipe = run_recipe(PAGE, "recipe-records", "recipe-mapie-intervals")
     held_out = np.abs(recipe["F"] - recipe["fem"].predict(recipe["T"]))["f1"][240:]
     half_width = np.sort(held_out)[math.ceil(0.9 * (len(held_out) + 1)) - 1]
     frequency, interval = recipe["frequency"], recipe["interval"][:, :, 0]
@@ -87,7 +87,7 @@ def test_stacking():
 
 def test_pyod():
     pytest.importorskip("pyod")
-    recipe = run_recipe(PAGE, "recipe-records", "recipe-pyod")
+    recipe = run_recipe(PAGE, "recipe-records", "recipe-pyod-detectors")
     ours = IsolationForest(random_state=0), LocalOutlierFactor(n_neighbors=20, novelty=True)
     for detector, same in zip((recipe["forest"], recipe["factor"]), ours, strict=True):
         expected = OutlierDetector(same).fit(recipe["F"])
@@ -102,7 +102,7 @@ def test_pyod():
 def test_optuna(folder):
     optuna = pytest.importorskip("optuna")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    recipe = run_recipe(PAGE, "recipe-records", "recipe-optuna")
+    recipe = run_recipe(PAGE, "recipe-records", "recipe-optuna-search")
     values = [trial.value for trial in recipe["study"].trials]
     assert len(values) == 3
     assert recipe["best"].inverse.noise == recipe["study"].best_params["noise"]

@@ -31,7 +31,7 @@ def torch():
 @pytest.fixture(scope="module")
 def with_skorch(torch):
     pytest.importorskip("skorch")
-    return run_recipe(PAGE, "recipe-records", "recipe-skorch", "recipe-skorch-chain")
+    return run_recipe(PAGE, "recipe-records", "recipe-torch-networks", "recipe-torch-chain")
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def with_keras():
         pytest.importorskip("torch").set_num_threads(1)
         os.environ["KERAS_BACKEND"] = "torch"
     pytest.importorskip("scikeras")
-    names = run_recipe(PAGE, "recipe-scikeras")
+    names = run_recipe(PAGE, "recipe-keras-networks")
     names["keras"].utils.set_random_seed(0)
     return names
 

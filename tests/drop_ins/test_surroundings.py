@@ -16,7 +16,7 @@ def test_mlflow(folder):
     mlflow = pytest.importorskip("mlflow")
     for needed in ("sqlalchemy", "alembic"):
         pytest.importorskip(needed)
-    recipe = run_recipe(PAGE, "recipe-records", "recipe-mlflow")
+    recipe = run_recipe(PAGE, "recipe-records", "recipe-mlflow-run")
     later, fem = recipe["later"], recipe["fem"]
     run = mlflow.get_run(recipe["run"].info.run_id)
     assert run.data.params["inverse__noise"] == "auto"
@@ -36,7 +36,7 @@ def assert_same_bits(recipe):
 @pytest.mark.nightly
 def test_dask():
     pytest.importorskip("distributed")
-    assert_same_bits(run_recipe(PAGE, "recipe-records", "recipe-dask"))
+    assert_same_bits(run_recipe(PAGE, "recipe-records", "recipe-dask-samples"))
 
 
 def test_ray(folder, monkeypatch):
@@ -44,14 +44,14 @@ def test_ray(folder, monkeypatch):
     monkeypatch.setenv("RAY_AUTH_MODE", "disabled")
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
     try:
-        assert_same_bits(run_recipe(PAGE, "recipe-records", "recipe-ray"))
+        assert_same_bits(run_recipe(PAGE, "recipe-records", "recipe-ray-samples"))
     finally:
         ray.shutdown()
 
 
 def test_polars():
     polars = pytest.importorskip("polars")
-    recipe = run_recipe(PAGE, "recipe-records", "recipe-polars")
+    recipe = run_recipe(PAGE, "recipe-records", "recipe-polars-frames")
     T, F, fem = recipe["T"], recipe["F"], recipe["fem"]
     assert recipe["predicted"].columns == list(F.columns)
     assert recipe["lagged"].columns[:4] == ["T1_lag0", "T1_lag1", "T1_lag2", "T2_lag0"]
@@ -73,7 +73,7 @@ def test_polars():
 def test_skops(folder, reduce):
     pytest.importorskip("skops")
     recipe = run_recipe(PAGE, "recipe-records")
-    recipe = run_recipe(PAGE, "recipe-skops", **recipe | {"fem": recipe["fem"].set_params(reduce=reduce)})
+    recipe = run_recipe(PAGE, "recipe-skops-files", **recipe | {"fem": recipe["fem"].set_params(reduce=reduce)})
     assert all(name.startswith(("skthermo.", "sklearn.")) for name in recipe["types"])
     fem, saved, weather = recipe["fem"], recipe["saved"], recipe["later"].temperatures
     pd.testing.assert_frame_equal(recipe["predicted"], fem.predict(weather))

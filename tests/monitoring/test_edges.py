@@ -21,7 +21,7 @@ from tests.nights import by_day
 
 PER_DAY, N_BASELINE = 4, 4 * 365
 SETTLED = 3 * PER_DAY  # records after which also a window of two days has to see a change
-KINDS = {"damage", "measurement or structure"}
+KINDS = {"damage", "fault"}
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(few-records|doubtful-values|not-evaluated)")
 
@@ -149,7 +149,7 @@ def test_a_change_that_comes_and_goes_is_one_event_and_never_healthy(pattern):
     records["f3"] *= np.resize(pattern, len(records))
     answers = monitor.update(records)
     assert set(answers["state"].iloc[5:]) <= {"alarm", "not evaluated"}
-    assert (monitor.events_["kind"] == "measurement or structure").sum() == 1
+    assert (monitor.events_["kind"] == "fault").sum() == 1
 
 
 def test_an_alarm_stays_when_the_damage_grows_beyond_what_is_plausible():
@@ -171,7 +171,7 @@ def test_what_is_set_aside_is_healthy_only_once_it_is_acknowledged_or_comes_back
     assert answers["reason"].str.contains("f3").all()
     assert monitor.status(monitor.last_).state == "alarm"
     event = monitor.events_.loc[1]
-    assert (event["kind"], event["modes"], event["peak"]) == ("measurement or structure", "f3", 1.0)
+    assert (event["kind"], event["modes"], event["peak"]) == ("fault", "f3", 1.0)
     other = pickle.loads(pickle.dumps(monitor))
     monitor.acknowledge(1, harmless=True, note="loose cable")
     assert monitor.status(monitor.last_).state != "alarm"
@@ -237,7 +237,7 @@ def test_responses_may_have_any_sign_and_unit():
     assert set(moved.update(new.assign(d=new["d"] - 10.0))["state"][SETTLED:]) == {"alarm"}
     assert moved.faults_.empty
     stuck = pickle.loads(pickle.dumps(monitor))
-    assert "healthy" not in set(stuck.update(new.assign(d=0.0))["state"][2 * SETTLED :])
+    assert stuck.update(new.assign(d=0.0))["reason"].str.contains("d is left out").all()
     assert "repeats 0 mm" in stuck.faults_["detail"].iloc[0]
     monitor.update(new[:1].assign(d=500.0))
     assert "d is 500 mm: implausible" in monitor.evaluations_["reason"].iloc[0]

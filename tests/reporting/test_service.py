@@ -237,7 +237,8 @@ def test_how_far_modes_fell_is_said_in_percent_without_units_of_columns():
     monitor = FakeMonitor(events=[event_row("2025-06-10", None, modes="f1 [Hz], f2")])
     rest = pd.DataFrame({"f1 [Hz]": -0.021, "f2": 0.004}, stamps)
     rest[:"2025-06-09"] = 0.0
-    monitor.corrected_, monitor.features_ = rest, list(rest)
+    monitor.corrected_ = monitor.records_ = rest
+    monitor.features_ = monitor.targets_ = list(rest)
     monitor.detector_ = SimpleNamespace(residuals=lambda records: rest.loc[records.index])
     text = f"f1 is 2.1{SPACE}% lower and f2 0.40{SPACE}% higher than in the healthy structure in the same weather."
     assert text in today_of(monitor).text

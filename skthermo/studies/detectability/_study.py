@@ -598,7 +598,7 @@ class DetectabilityStudy(BaseEstimator):
         Notes
         -----
         Differences are paired, as all detectors evaluate the same records. Their bounds include noise alone
-        (:ref:`how-detectors-are-ranked`). Limits of a ranking: :doc:`/guide/rank_detectors`.
+        (:ref:`how-detectors-are-ranked`). Limits of a ranking: :ref:`which-detector`.
 
         Examples
         --------
