@@ -14,7 +14,6 @@ import pandas as pd
 import pytest
 
 import skthermo.reporting
-from skthermo._core.files import write_when_complete
 from skthermo.commands.main import main
 from skthermo.monitoring import load_monitor
 from tests.commands.folders import edit, run, write_day
@@ -146,12 +145,12 @@ def test_a_damaged_line_of_transitions_is_named_by_its_number(bridge, after, rec
     assert done.code == ALARM
 
 
-def test_what_a_killed_run_has_left_of_a_page_is_removed(tmp_path):
-    left = [tmp_path / f".page.html.{name}.unfinished" for name in ("old", "new")]
+def test_what_a_killed_run_has_left_of_the_metrics_is_removed(bridge, records):
+    left = [bridge / f".metrics.prom.{name}.unfinished" for name in ("old", "new")]
     for file in left:
         file.touch()
     os.utime(left[0], (0, 0))
-    write_when_complete(tmp_path / "page.html", "text")
+    run("update", bridge, "--now", str(records.index[LAST - 1]))
     assert [file.exists() for file in left] == [False, True]  # another process may be at work on a new one
 
 
