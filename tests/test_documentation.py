@@ -123,6 +123,18 @@ def test_reference_and_guide_have_every_package():
     assert sorted(inside) == sorted(ROOMS)
 
 
+def test_files_that_contributors_are_sent_to_are_there():
+    pages = [ROOT / "CONTRIBUTING.md", *(ROOT / "docs" / "contributing").glob("*.rst")]
+    path = re.compile(r"(?<![\w/.])((?:skthermo|tests|docs|examples|tools)/[\w/.]*\w)")
+    named = {page.name: path.findall(page.read_text()) for page in pages}
+    assert len(named["extending.rst"]) > 50
+    missing = {
+        name: [file for file in files if not re.search("NAME|PAGE|PART|_build", file) and not (ROOT / file).exists()]
+        for name, files in named.items()
+    }
+    assert not any(missing.values()), missing
+
+
 def test_sources_are_listed_and_cited():
     citing = [*(ROOT / "skthermo").rglob("*.py"), *PAGES]
     cited = {label for path in citing for label in re.findall(r"\[([A-Z]\w*\d\d)\]_", path.read_text())}
