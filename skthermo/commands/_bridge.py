@@ -8,7 +8,7 @@ import logging
 import os
 import re
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -26,7 +26,8 @@ from skthermo.commands._settings import RecordSettings, Settings, read_settings
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, look_at, read_file, text_of
-from skthermo.preprocessing.loggers.together import in_celsius, joined, once
+from skthermo.preprocessing.loggers.stamps import of_the_right_clock
+from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {
@@ -213,7 +214,7 @@ class Bridge:
         """Evaluate what is new, and save the monitor."""
         with self.alone():
             monitor, taken = self.load(), Taken.read(self.taken_file)
-            before, new = monitor.counts_, self._new_files(monitor, taken)
+            before, n_known, new = monitor.counts_, len(monitor.transitions()), self._new_files(monitor, taken)
             read = list(self.lines)  # that a file is empty, or holds no records
             with collected() as findings:
                 evaluated, handed = self._take_in(monitor, new)
@@ -228,18 +229,13 @@ class Bridge:
             is_usual = self._describe_update(monitor, evaluated, before)
             self.append_transitions(monitor)
             if not self.options.verbose:
-                self.lines = [line for line in self.lines if self._is_news(line)]
-                if is_usual and not (self.transitions or self.errors or read):
+                changed = {str(one["event"]) for one in monitor.transitions(n_known)}
+                self.lines = [line for line in self.lines if _is_news(line, changed)]
+                if is_usual and not (changed or self.errors or read):
                     self.lines = [f"{self.said}; {self._came(evaluated)}, nothing has changed"]
             taken.state = self.state
             taken.write()
         self.write_page(monitor)
-
-    def _is_news(self, line: str) -> bool:
-        """Whether a line of a summary is not as after the call before: of events, those that are open or changed."""
-        event = re.match(r"event (\d+):", line)
-        changed = {str(one["event"]) for one in self.transitions}
-        return not line.startswith(AS_BEFORE) and (not event or "still open" in line or event[1] in changed)
 
     def _came(self, evaluated: pd.DataFrame) -> str:
         """How many records came, and how many of these could not be evaluated."""
@@ -268,7 +264,6 @@ class Bridge:
                     own = look_at(file, form.time_zone, wanted=settings.records.columns).form
                     table = read_columns(file, replace(own, missing=form.missing), settings.records, **options)
                 check_layout(table, file, settings.records, taken.layouts)
-            table = self._possible(table, file)
             table = in_zone(table, monitor.last_.tz, file).rename_axis(monitor.baseline_.index.name)
             return table if after is None else table[table.index > after]
 
@@ -287,14 +282,6 @@ class Bridge:
                 reader = partial(read, after=after)
                 found.append(NewFile(file, reader(file), pd.DataFrame(), {}) if named else taken.new_in(file, reader))
         return [file for file in found if file is not None]
-
-    def _possible(self, table: pd.DataFrame, file: Path) -> pd.DataFrame:
-        """Records without those whose stamps no clock of a logger has; these are named."""
-        is_possible = (table.index.year > 1900) & (table.index.year < 2200)
-        if not is_possible.all():
-            n_left, first = int((~is_possible).sum()), table.index[~is_possible][0]
-            self.lines.append(f"left out of {file}, as the year is impossible: {n_left}, the first of {first}")
-        return table[is_possible]
 
     def _take_in(self, monitor: Monitor, new: Sequence[NewFile]) -> tuple[pd.DataFrame, dict[Path, pd.DatetimeIndex]]:
         """Evaluations of the records of some files, and which stamps of each file were handed over.
@@ -460,6 +447,12 @@ class Bridge:
             self.append_transitions(monitor)
 
 
+def _is_news(line: str, changed: Collection[str]) -> bool:
+    """Whether a line of a summary is not as after the call before: of events, those that are open or have changed."""
+    event = re.match(r"event (\d+):", line)
+    return not line.startswith(AS_BEFORE) and (not event or "still open" in line or event[1] in changed)
+
+
 def sentence(error: Exception) -> str:
     """What is wrong, in words: an error of the operating system names its file."""
     if isinstance(error, FileNotFoundError) and error.filename:
@@ -601,7 +594,7 @@ def files_in(folder: Path) -> list[Path]:
 def read_columns(
     file: Path, form: CsvFormat, records: RecordSettings, *, leave_unfinished: bool = False
 ) -> pd.DataFrame:
-    """Records of a file in the columns that the settings name, temperatures in degrees Celsius."""
+    """Records of a file in the columns that the settings name, in degrees Celsius and Hz."""
     table = read_file(file, form, ignore=records.ignore, leave_unfinished=leave_unfinished)
     unknown = [name for name in table if name not in records.columns]
     if unknown:
@@ -609,7 +602,7 @@ def read_columns(
             f"{file} has the columns {unknown}, which [records] does not name; expected {records.columns}, and other "
             "columns under ignore"
         )
-    return in_celsius(table, records.convert)
+    return in_usual_units(table, records.convert)
 
 
 def check_layout(table: pd.DataFrame, file: Path, records: RecordSettings, layouts: Sequence[Sequence[str]]) -> None:
@@ -626,6 +619,9 @@ def read_baseline(
 ) -> tuple[pd.DataFrame, list[list[str]]]:
     """Records of the baseline's files, in order of time, and the columns of each file."""
     tables = [read_columns(file, form, records) for file in files]
+    of_clocks = [of_the_right_clock(table, file) for table, file in zip(tables, files, strict=True)]
+    tables = [table for table, _ in of_clocks]
+    warn_each(finding for _, findings in of_clocks for finding in findings)
     lacking = [name for name in records.columns if not any(name in table for table in tables)]
     if lacking:
         raise ValueError(f"no file of the baseline has the columns {lacking}; expected {records.columns}")

@@ -165,11 +165,9 @@ def causes(records: pd.DataFrame, place: int, targets: list[Any], temperatures: 
     times = records.index[records.notna().any(axis=1)]
     steps = np.diff(times.asi8, prepend=times.asi8[:1])
     unknown = np.where(what == "", "too few values in its window, its lags or among its modes", what).astype(object)
-    for outage in np.flatnonzero(steps > max(6 * np.median(steps), pd.Timedelta("6h").as_unit(times.unit).value)):
+    for outage in np.flatnonzero(steps > 3 * np.median(steps)):
         length = times[outage] - times[outage - 1]
-        text = (
-            f"its window or means of earlier temperatures hold too little after the outage of {duration_text(length)}"
-        )
+        text = f"too few records for its window or means since the outage of {duration_text(length)}"
         unknown[(new.index >= times[outage]) & (what == "")] = f"{text} up to {times[outage]:%Y-%m-%d %H:%M}"
     others = np.where(what == "", "", np.char.add(what, ": others of its window are evaluated"))
     return np.where(np.isnan(index), unknown, others).tolist()

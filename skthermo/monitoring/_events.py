@@ -20,7 +20,7 @@ from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning
 
 DAMAGE, DRIFT, WATCH, FAULT = "damage", "drift", "watch", "fault"
 """Kinds of events, the gravest first: an alarm, a mean of 30 days that has moved, a raised index; sensors at fault."""
-KINDS = (DAMAGE, DRIFT, WATCH, FAULT)
+RANKED_KINDS = (DAMAGE, DRIFT, WATCH, FAULT)
 STATES = ("alarm", "drift", "watch", "known damage")
 
 
@@ -82,10 +82,10 @@ def followed(
     return level, found
 
 
-def leading(sizes: pd.Series | dict[str, float]) -> str:
+def leading(sizes: Mapping[Any, float]) -> str:
     """Names of the largest sizes in standard deviations, the largest first: at most three, those after it above 2."""
-    ordered = pd.Series(sizes, dtype=float).sort_values(ascending=False, kind="stable")[:3]
-    return ", ".join(map(str, ordered.index[(np.arange(len(ordered)) == 0) | (ordered > 2)]))
+    ordered = sorted(((name, size) for name, size in sizes.items() if size == size), key=lambda one: -one[1])[:3]
+    return ", ".join(str(name) for place, (name, size) in enumerate(ordered) if place == 0 or size > 2)
 
 
 def event_changes(before: pd.DataFrame, after: pd.DataFrame) -> Iterator[dict[str, Any]]:
@@ -133,14 +133,30 @@ class Run:
     level: Array
     direction: Array
     modes: str
-    effects: pd.Series
-    losses: pd.Series
+    effects: Array
+    losses: Array
     number: int
 
     @property
     def peak(self) -> int:
         """Position of the highest level."""
         return self.first + int(np.nanargmax(self.level))
+
+
+class Parts:
+    """Departures of modes, effects and losses of damage groups in some rows of a table, summed.
+
+    Names and order are those of another table, of weeks; 0 where the table has none.
+    """
+
+    def __init__(self, table: pd.DataFrame, weeks: pd.DataFrame):
+        names = {what: [one for one in weeks if one.startswith(f"{what} ")] for what in ("departure", "effect", "loss")}
+        self.groups = [name.removeprefix("effect ") for name in names["effect"]]
+        rows = table.reindex(columns=[one for some in names.values() for one in some]).to_numpy(dtype=float)
+        self._values = np.split(np.nan_to_num(rows), np.cumsum([len(some) for some in names.values()])[:2], axis=1)
+
+    def __call__(self, first: int, stop: int) -> list[Array]:
+        return [values[first:stop].sum(axis=0) for values in self._values]
 
 
 class Events:
@@ -164,9 +180,10 @@ class Events:
     ):
         self.decisions, self.times, self.said = decisions, decisions.index.as_unit("ns").asi8, said
         self.starts, self.within = np.asarray(starts, dtype=np.int64), within
+        self.parts = Parts(decisions, weeks)
         causes: list[list[Run]] = []
         found = [*self._raised(persistence), *self._drifts(weeks), *self._faults(persistence)]
-        for run in sorted(found, key=lambda run: (run.first, KINDS.index(run.kind))):
+        for run in sorted(found, key=lambda run: (run.first, RANKED_KINDS.index(run.kind))):
             cause = next((one for one in reversed(causes) if self._is_same(one, run)), None)
             if cause is None:
                 causes.append([run])
@@ -195,20 +212,21 @@ class Events:
             level, spans = followed(shown, self.times, limits, persistence, self.starts)
             for first, stop in spans:
                 peak = decisions["modes"].iloc[first + int(np.nanargmax(level[first:stop]))]
-                yield self._run(kind, first, stop, level[first:stop], peak, decisions[first:stop])
+                yield self._run(kind, first, stop, level[first:stop], peak, *self.parts(first, stop))
 
     def _drifts(self, weeks: pd.DataFrame) -> Iterator[Run]:
         """Runs of weeks in which the mean of the last days has moved."""
         at = weeks.index.as_unit("ns").asi8
         limits = pd.DataFrame({"threshold": 1.0, "release": 0.7}, weeks.index)
         level, spans = followed(weeks["level"].to_numpy(), at, limits, 1, self.starts)
-        ends = np.append(np.searchsorted(self.times, at), len(self.times))
+        ends, parts = np.append(np.searchsorted(self.times, at), len(self.times)), Parts(weeks, weeks)
         of_record = np.searchsorted(at, self.times, side="right") - 1
         for start, end in spans:
-            first, stop, own = ends[start], ends[end], weeks[start:end]
+            first, stop = ends[start], ends[end]
             if first < stop:
                 peak = start + int(np.nanargmax(level[start:end]))
-                yield self._run(DRIFT, first, stop, level[of_record[first:stop]], weeks["modes"].iloc[peak], own)
+                modes, own = weeks["modes"].iloc[peak], parts(start, end)
+                yield self._run(DRIFT, first, stop, level[of_record[first:stop]], modes, *own, number=end - start)
 
     def _faults(self, persistence: int) -> Iterator[Run]:
         """Runs of responses that were set aside, and of alarms that rested on values of sensors at fault."""
@@ -218,7 +236,7 @@ class Events:
             level, spans = followed(held, self.times, limits, 3, self.starts)
             for first, stop in spans:
                 names = decisions["held"].iloc[first + int(np.nanargmax(level[first:stop]))]
-                yield self._run(FAULT, first, stop, level[first:stop], names, decisions[:0])
+                yield self._run(FAULT, first, stop, level[first:stop], names, *self.parts(0, 0))
         then, index = decisions["index_then"].to_numpy(), decisions["index"].to_numpy()
         differs = ~((then == index) | (np.isnan(then) & np.isnan(index)))
         if not differs.any():
@@ -229,14 +247,22 @@ class Events:
         for first, stop in spans:
             names = decisions["at_fault"][first:stop][differs[first:stop]]
             if (names != "").any() and not any(one < stop and first < end for one, end in real):
-                yield self._run(FAULT, first, stop, level[first:stop], names[names != ""].iloc[0], decisions[:0])
+                yield self._run(FAULT, first, stop, level[first:stop], names[names != ""].iloc[0], *self.parts(0, 0))
 
-    def _run(self, kind: str, first: int, stop: int, level: Array, modes: str, own: pd.DataFrame) -> Run:
-        """A run with what departs in its own rows of decisions or weeks."""
-        departures, effects, losses = (own.filter(regex=f"^{what} ") for what in ("departure", "effect", "loss"))
-        direction = np.nan_to_num(departures.to_numpy(dtype=float)).sum(axis=0)
-        number = len(own) if kind == DRIFT else int((~np.isnan(level)).sum())
-        return Run(kind, first, stop, level, direction, modes, effects.sum(), losses.sum(), number)
+    def _run(
+        self,
+        kind: str,
+        first: int,
+        stop: int,
+        level: Array,
+        modes: str,
+        direction: Array,
+        effects: Array,
+        losses: Array,
+        number: int = 0,
+    ) -> Run:
+        number = number or int((~np.isnan(level)).sum())
+        return Run(kind, first, stop, level, direction, modes, effects, losses, number)
 
     def _is_same(self, cause: list[Run], run: Run) -> bool:
         """Whether a run has the cause of earlier ones."""
@@ -250,20 +276,21 @@ class Events:
             return run.modes == cause[0].modes
         if any(one.kind != run.kind and DRIFT not in (one.kind, run.kind) and run.first < one.stop for one in cause):
             return True  # an alarm within a watch
-        is_over = self.said["harmless"] & (self.said["time"] >= self.times[cause[0].first])
-        if (is_over & (self.said["time"] < end) & (self.said["at"] < begin)).any():
-            return False
+        for one in self.said[self.said["harmless"]].itertuples() if len(self.said) else ():
+            if self.times[cause[0].first] <= one.time < end and one.at < begin:
+                return False
         return alike(sum(one.direction / max(np.linalg.norm(one.direction), 1e-300) for one in cause), run.direction)
 
     def _row(self, runs: list[Run]) -> tuple[Any, ...]:
         """What the table says of an event."""
-        stamps, kind = self.decisions.index, min((run.kind for run in runs), key=KINDS.index)
+        stamps, kind = self.decisions.index, min((run.kind for run in runs), key=RANKED_KINDS.index)
         own, stop = [run for run in runs if run.kind == kind], max(run.stop for run in runs)
         highest = max(own, key=lambda run: np.nanmax(run.level))
         number = sum(run.number for run in own)
         effects, losses = (sum(getattr(run, name) for run in own) / number for name in ("effects", "losses"))
-        groups = leading(effects[effects > 2].rename(lambda name: name[7:]))
-        size = losses[f"loss {groups.split(', ')[0]}"] if groups else np.nan
+        means = dict(zip(self.parts.groups, effects, strict=False))
+        groups = leading({name: mean for name, mean in means.items() if mean > 2}) if means else ""
+        size = losses[self.parts.groups.index(groups.split(", ")[0])] if groups else np.nan
         end, peak = stamps[stop] if stop < len(stamps) else pd.NaT, float(np.nanmax(highest.level))
         n_alarms = int(sum((~np.isnan(run.level)).sum() for run in own))
         ends = stamps[own[0].first], end, peak, stamps[highest.peak]
@@ -286,7 +313,7 @@ class Events:
         ranks = np.full(len(self.times), len(STATES))
         answers = with_acknowledgements(self.table, self.said)
         for number, runs in self.runs.items():
-            event, ordered = answers.loc[number], sorted(runs, key=lambda run: -KINDS.index(run.kind))
+            event, ordered = answers.loc[number], sorted(runs, key=lambda run: -RANKED_KINDS.index(run.kind))
             if event["kind"] == FAULT:
                 continue
             for run in ordered:
@@ -327,8 +354,8 @@ class Events:
 
 def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFrame:
     """Events with the owner's last answer to each, found by its kind and time, and ``at`` which record it was given."""
-    answers = []
-    for event in events.itertuples():
+    answers = [(False, False, "", 0)] * (len(events) if said.empty else 0)
+    for event in events.itertuples() if len(said) else ():
         end = np.inf if pd.isna(event.end) else event.end.value
         own = said[(said["kind"] == event.kind) & (said["time"] >= event.start.value) & (said["time"] < end)]
         answers.append((True, *own[["harmless", "note", "at"]].iloc[-1]) if len(own) else (False, False, "", 0))
@@ -336,11 +363,13 @@ def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFr
     return events.join(table.astype({"acknowledged": bool, "harmless": bool, "note": object, "at": np.int64}))
 
 
-def evaluations(decisions: pd.DataFrame, events: Events) -> pd.DataFrame:
-    """State, event and what drives it of each record."""
-    index, n_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy()
+def evaluations(events: Events, first: int = 0) -> pd.DataFrame:
+    """State, event and what drives it of each record from a position on."""
     standing, number = events.standing()
-    is_unexplained, is_set_aside = events.set_aside(number)
+    unexplained = events.set_aside(number)
+    standing, number, is_unexplained, is_set_aside = (one[first:] for one in (standing, number, *unexplained))
+    decisions = events.decisions[first:]
+    index, n_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy()
     is_held, has_index = (n_held > 0) | decisions["is_blind"].to_numpy() | is_unexplained, ~np.isnan(index)
     is_raised = has_index & np.isin(standing, ["alarm", "drift", "watch"])
     state = np.where((has_index & ~is_held) | is_raised, standing, "not evaluated")

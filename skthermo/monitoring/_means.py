@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,9 +40,17 @@ class MeanTest(SavesFrames):
 
     @classmethod
     def learned(
-        cls, residuals: pd.DataFrame, detector: Any, trained: pd.DataFrame, per_year: float, crossings: float = 16.0
+        cls,
+        residuals: pd.DataFrame,
+        detector: Any,
+        trained: pd.DataFrame,
+        per_year: float,
+        since: pd.Timestamp | None = None,
+        crossings: float = 16.0,
     ) -> MeanTest:
         """From residuals of a baseline, out of fold, for so many false alarms a year.
+
+        The days ``since`` an intervention alone tell the level after it.
 
         A level that a mean exceeds with probability p is exceeded in about 16 p events a year, as means of neighbouring
         weeks share most of their days: measured with independent and with correlated residuals of three and six modes.
@@ -55,6 +63,9 @@ class MeanTest(SavesFrames):
             directions = directional.directions_.loc[list(sensitivities_of(directional).index)]
         is_long = means.notna().any(axis=1).sum() >= 12 * cls.n_days / 2  # each of a dozen parts tells of half a mean
         errors = MeanErrors.learned(means.to_numpy()) if is_long else None
+        if errors is not None and since is not None:
+            n_own = np.maximum(means[means.index >= since].count().to_numpy() / errors.for_one, 1.0)
+            errors = replace(errors, n_trained=np.minimum(errors.n_trained, n_own))
         return cls(errors, per_year / crossings, names, scales_of(detector, names, trained), directions, joined)
 
     def weeks(self, means: pd.DataFrame, times: Sequence[pd.Timestamp]) -> pd.DataFrame:
@@ -94,11 +105,12 @@ class MeanTest(SavesFrames):
         white = np.linalg.solve(root, mean)
         squared, n_free = float(white @ white), int(some.sum())
         limit = n_free * stats.f.isf(self.chance, n_free, freedom)
-        departures, sizes = np.zeros(len(some)), np.abs(mean) / np.sqrt(np.diag(covariance))
-        departures[some] = mean / self.scales[some]
+        departures, sizes = np.zeros(len(some)), np.round(np.abs(mean) / np.sqrt(np.diag(covariance)), 2)
+        departures[some] = np.round(mean / self.scales[some], 4)
         modes = leading(dict(zip(np.array(self.names, dtype=object)[some], sizes, strict=True)))
         values = [*departures, *self._explained(root, white, some)]
-        return float(np.sqrt(squared / limit)), chance_of(squared, n_free, freedom), modes, values
+        level, p_value = np.sqrt(squared / limit), chance_of(squared, n_free, freedom)
+        return float(np.round(level, 6)), float(np.round(p_value, 6)), modes, values
 
     def _explained(self, root: Array, white: Array, some: NDArray[np.bool_]) -> list[float]:
         """Effects of the groups in standard errors of the mean, then their losses; none where they explain less than

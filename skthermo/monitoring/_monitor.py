@@ -68,6 +68,7 @@ from skthermo.monitoring._records import (
     read_records,
     usable_baseline,
     without_what_cannot_be,
+    without_wrong_clocks,
 )
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
@@ -306,7 +307,7 @@ class Monitor(SavesFrames, Estimator):
     @property
     def evaluations_(self) -> pd.DataFrame:
         """The latest evaluation of each record."""
-        return evaluations(self.decisions_, self._events())
+        return evaluations(self._events())
 
     @property
     def days_(self) -> pd.DataFrame:
@@ -410,7 +411,7 @@ class Monitor(SavesFrames, Estimator):
                 f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
                 "expected more watches than alarms a year, such as 12 and 1"
             )
-        given = read_records(X)
+        given, of_clocks = without_wrong_clocks(X, read_records(X))
         if not len(given):
             raise ValueError(
                 "the baseline has no records; expected those of the healthy structure, of a year if possible"
@@ -430,7 +431,7 @@ class Monitor(SavesFrames, Estimator):
             trained = baseline if not columns.reference else baseline[columns.inputs]
             self.features_ = columns.seen(detector)
             detector.fit(trained[self.features_])
-        findings += self._take_charge(detector, trained)
+        findings += [*of_clocks, *self._take_charge(detector, trained)]
         refuse_other_batches(detector, self.features_, trained, self.lookback_)
         findings += blind_findings(detector, self.features_, trained, self.targets_, self.lookback_, self.threshold_)
         self._begin_service(self.fem)
@@ -467,7 +468,7 @@ class Monitor(SavesFrames, Estimator):
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
         baseline = residuals(detector, trained, self.targets_, trained, is_baseline=True)
         slow = 0.25  # of the false alarms that are asked for
-        test = MeanTest.learned(baseline, detector, trained, slow * self.false_alarms_per_year)
+        test = MeanTest.learned(baseline, detector, trained, slow * self.false_alarms_per_year, self.since_)
         share = 1.0 if test.errors is None else 1 - slow
         levels = EventLevels.learned(index, self.false_alarms_per_year, self.persistence, share)
         self.mean_test_ = test
@@ -517,14 +518,14 @@ class Monitor(SavesFrames, Estimator):
         kinds = {"is_blind": bool, "n_left_out": np.int64} | dict.fromkeys(texts, object)
         return pd.DataFrame(values, stamps).astype({name: kinds.get(name, float) for name in values})
 
-    def _decide(self, first: pd.Timestamp) -> None:
-        """Evaluate the records from a stamp on anew, each by what was known at the beginning of its day."""
+    def _decide(self, first: pd.Timestamp) -> pd.Timestamp:
+        """Evaluate the records from a stamp on anew, or from when a sensor had failed before it; gives that stamp."""
         earlier = [one for one in self.states_ if one.day <= first]
         begin = earlier[-1] if earlier else self.corrections_.start(min(self.began_, midnight(first)))
         raw = self.records_[self.records_.index >= begin.day]
         if not len(raw):
             self.states_ = (begin,)
-            return
+            return first
         states = self.corrections_.advanced(begin, raw)
         first = midnight(min([first, *changed_times(self._faults_of(self.states_[-1]), self._faults_of(states[-1]))]))
         if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
@@ -539,10 +540,10 @@ class Monitor(SavesFrames, Estimator):
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < first], seen])
         new = self._decided(first, notes, drifts)
         self.decisions_ = pd.concat([self.decisions_[self.decisions_.index < first], new])
-        self.weeks_ = pd.concat(
-            [self.weeks_[self.weeks_.index <= first], self.mean_test_.weeks(self.means_, self._test_times(first))]
-        )
+        weeks = self.weeks_[self.weeks_.index <= first]
+        self.weeks_ = pd.concat([weeks, self.mean_test_.weeks(self.means_, self._test_times(weeks.index))])
         self._explain(first)
+        return first
 
     def _drifts_before(self, time: pd.Timestamp, like: pd.DataFrame) -> pd.DataFrame:
         """Shares of stiffness that were taken out of records before a time."""
@@ -598,12 +599,12 @@ class Monitor(SavesFrames, Estimator):
             return index
         return rounded(self._index(pd.concat([records[records.index < raw.index[0]], then]))[place:])
 
-    def _test_times(self, first: pd.Timestamp) -> list[pd.Timestamp]:
-        """When means of the last days are tested after a record: each week of service."""
-        begin = midnight(self.baseline_.index[-1])
-        number = (first - begin) // (7 * DAY), (self.last_ - begin) // (7 * DAY) + 1
-        times = [days_later(begin, 7 * n) for n in range(max(number[0], 1), number[1] + 1)]
-        return [time for time in times if first < time <= self.last_]
+    def _test_times(self, known: pd.DatetimeIndex) -> list[pd.Timestamp]:
+        """When means of the last days are to be tested after those that are known: each week of service."""
+        begin, last = midnight(self.baseline_.index[-1]), self.last_
+        first = round((known[-1] - begin) / (7 * DAY)) + 1 if len(known) else 1
+        times = (days_later(begin, 7 * number) for number in range(first, (last - begin) // (7 * DAY) + 2))
+        return [time for time in times if time <= last]
 
     def _with_memory(self, n_before: int) -> tuple[pd.DataFrame, int]:
         """Records as the detector sees them, from those on that it looks back to, and the position of the first."""
@@ -635,9 +636,12 @@ class Monitor(SavesFrames, Estimator):
         decisions.loc[found.index, found.columns] = found
         self.decisions_ = decisions
 
-    def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
+    def _note(
+        self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any], events: Sequence[Events] | None = None
+    ) -> None:
         """Append the changes since a former state to the transitions, after the actions that made them."""
-        old, new = (events[~(events["end"] < first)] for events in (before._answered(), self._answered()))
+        tables = [one.table for one in events or (before._events(), self._events())]
+        old, new = (table[~(table["end"] < first)] for table in tables)
         found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
         for one in [*done, *sorted(found, key=lambda change: change["time"])]:
             plain = {"id": len(self.transitions_) + 1, "what": one["what"], "time": one["time"].isoformat()}
@@ -690,13 +694,15 @@ class Monitor(SavesFrames, Estimator):
         reasons = pd.concat([intake.too_late, intake.early])
         refused = self._decisions(reasons.index, reason=reasons.to_numpy())
         nobody = Events(refused, self.weeks_[:0], self.acknowledgements_, 1)
-        answers = evaluations(refused, nobody).assign(revised=False)
+        answers = evaluations(nobody).assign(revised=False)
         if len(fresh):
             known = pd.concat([self.records_, intake.fresh])
             after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
-            after._decide(fresh[0])
-            after._note(self, fresh[0])
-            news = _news(self.evaluations_, after.evaluations_, fresh)
+            first = after._decide(fresh[0])
+            was, now = self._events(), after._events()
+            after._note(self, fresh[0], events=(was, now))
+            places = (events.decisions.index.searchsorted(first) for events in (was, now))
+            news = _news(*map(evaluations, (was, now), places), fresh)
             answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
         vars(self).update(vars(after))
@@ -972,8 +978,8 @@ class Monitor(SavesFrames, Estimator):
     def _take_over(self, retraining: Retraining) -> None:
         """Put a retrained detector in charge, from the newest day on."""
         after, trained, today = self._twin(), retraining.baseline, midnight(self.last_)
-        after._take_charge(retraining.detector, trained)
         after.prior_, after.since_ = retraining.prior, retraining.since
+        after._take_charge(retraining.detector, trained)
         if retraining.kind == "new baseline":
             events = self.events_
             for _, event in events[events["end"].isna() & ~events["acknowledged"]].iterrows():
@@ -981,6 +987,7 @@ class Monitor(SavesFrames, Estimator):
                     event["kind"], event["peak_time"], True, f"ended by the new baseline since {retraining.since}"
                 )
             after.restarts_ = (*self.restarts_, today.as_unit("ns").value)
+            after.means_ = self.means_[:0]  # of the structure as it was
             raw = pd.concat([self.baseline_, self.records_])[self.reference_]
             T, F = trained.drop(columns=self.targets_), trained[self.targets_]
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now

@@ -183,7 +183,7 @@ def may_train(
     said = {True: "acknowledged", False: "not acknowledged"}
     spans = [
         (
-            one.start - margin - 30 * DAY * (one.kind == DRIFT),
+            one.start - margin - (30 if one.kind == DRIFT else 0) * DAY,
             one.end,
             "all",
             f"event {one.Index} ({one.kind}), " + said[one.acknowledged],

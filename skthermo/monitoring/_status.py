@@ -238,6 +238,7 @@ def status_of(monitor: Any) -> MonitorStatus:
     opened = events[events["end"].isna()].rename_axis("event").reset_index().rename(columns={"start": "since"})
     for name in ("modes", "groups"):
         opened[name] = pd.Series([[one for one in text.split(", ") if one] for text in opened[name]], dtype=object)
+    opened["size"] = opened["size"].astype(object).where(opened["size"].notna(), None)
     shown = ["event", "kind", "since", "peak", "modes", "groups", "size", "n_times", "acknowledged", "harmless"]
     failed = faults[faults["until"].isna()].astype({"column": str})
     levels = ("threshold_", "clear_threshold_", "watch_threshold_", "false_alarms_per_year", "watch_per_year")

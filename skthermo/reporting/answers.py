@@ -82,7 +82,7 @@ def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = No
         yield identified.answer()[0]
     elif event["groups"]:
         size = event.get("size", np.nan)
-        loss = f"A loss of stiffness{f' of about {share_text(size)}' if np.isfinite(size) else ''}"
+        loss = f"A loss of stiffness{f' of about {share_text(size)}' if pd.notna(size) else ''}"
         yield f"{loss} in {', '.join(event['groups'])} explains most of it."
 
 
