@@ -190,7 +190,7 @@ class LagFeatures(PastFeatures):
         else:
             self.freq_ = (
                 _most_frequent_step(stamps)
-                if self.freq is None or _is_month(self.freq)
+                if self.freq is None or self._calendar() is not None
                 else check_duration(self.freq, "freq", may_be_zero=False).to_timedelta64()
             )
             self.tolerance_ = 6 * self.freq_
@@ -234,13 +234,16 @@ class LagFeatures(PastFeatures):
 
     def _calendar(self) -> pd.offsets.BaseOffset | None:
         """The step of the calendar by which records of `fit` follow each other; None where steps are times."""
-        if _is_month(self.freq):
-            return pd.tseries.frequencies.to_offset(self.freq)
         stamps = pd.DatetimeIndex(self.stamps_).unique()
         if self.time_zone_ is not None:
             stamps = stamps.tz_localize("UTC").tz_convert(self.time_zone_).tz_localize(None)
+        if (stamps - stamps.normalize()).nunique() > 1:
+            return None
+        given = _step_of_calendar(self.freq)
+        if given is not None or self.freq_ is None:
+            return given if given is not None and all(map(given.is_on_offset, stamps)) else None
         n_days, is_rest = divmod(pd.Timedelta(self.freq_), DAY)
-        if len(stamps) < 3 or is_rest or (stamps - stamps.normalize()).nunique() > 1:
+        if len(stamps) < 3 or is_rest:
             return None
         if self.freq is None and 28 <= n_days <= 31 and (stamps.day.nunique() == 1 or stamps.is_month_end.all()):
             return pd.offsets.MonthEnd() if stamps.is_month_end.all() else pd.DateOffset(months=1)
@@ -289,13 +292,13 @@ class LagFeatures(PastFeatures):
         return _rows_by_lag(records, sources), [] if are_of_fit else self._doubts_of_history(unknown)
 
 
-def _is_month(freq: Any) -> bool:
-    """Whether a step is one of the calendar, such as "MS", and no length of time."""
+def _step_of_calendar(freq: Any) -> pd.offsets.BaseOffset | None:
+    """A step of the calendar, such as "MS"; None for lengths of time."""
     try:
         offset = pd.tseries.frequencies.to_offset(freq) if isinstance(freq, str | pd.offsets.BaseOffset) else None
     except ValueError:
-        return False
-    return offset is not None and not isinstance(offset, pd.offsets.Tick | pd.offsets.Day)
+        return None
+    return None if isinstance(offset, pd.offsets.Tick | pd.offsets.Day) else offset
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:

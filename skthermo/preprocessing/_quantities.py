@@ -70,11 +70,11 @@ def kind_of(name: Any, unit: Unit | None = None, values: ArrayLike | None = None
     """
     unit, words = unit or unit_in(name), words_of(name)
     by_unit = unit.kind if unit else OPEN
-    if re.search(r"[\^*]\d", str(name)) and not unit:
-        return OPEN, "it is a power"
+    if re.search(r"[\^*]\d|^t(0|_(s|ms|min|h))$", str(name)) and not unit:
+        return OPEN, "it may be a power or a time"
     if about := [meaning for word in words if (meaning := _table("about").get(word))]:
         return about[0], f"its name says {about[0]}"
-    named = [kind for word in words if (kind := _quantity(word))]
+    named = [kind for word in words if (kind := _table("words").get(word))]
     by_unit = TEMPERATURE if unit and unit.name == "°" and named == [TEMPERATURE] else by_unit
     others = [kind for kind in named if kind not in (TEMPERATURE, FREQUENCY)]
     if by_unit not in (OPEN, TEMPERATURE, FREQUENCY):
@@ -101,13 +101,15 @@ def words_of(name: Any) -> list[str]:
     text = text.translate(str.maketrans({"Δ": " delta ", "∆": " delta ", "ß": "ss", "ζ": " zeta ", "ξ": " xi "}))
     text = "".join(sign for sign in normalize("NFKD", text) if not combining(sign))
     text = re.sub(r"(?i)pt[ _-]?1000?(?!\d)", " thermometer ", text)
-    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", text)]
+    words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", text)]
+    return [part for word in words for part in _parts_of(word)]
 
 
-def _quantity(word: str) -> str:
-    """The quantity that a word names, or the end of a compound."""
-    ends = (kind for end, kind in _table("ends").items() if word.endswith(end))
-    return _table("words").get(word) or next(ends, OPEN)
+def _parts_of(word: str) -> list[str]:
+    """A word, or the parts of a compound that is no word of the tables."""
+    end = next((end for end in _table("ends") if word.endswith(end)), word)
+    is_compound = word != end and word not in _table("words") and word not in _table("about")
+    return [word.removesuffix(end), end] if is_compound else [word]
 
 
 def _symbol(words: list[str]) -> str:
@@ -116,10 +118,14 @@ def _symbol(words: list[str]) -> str:
     rest = [word for word in words if not word.isdigit() and word not in nothing]
     is_numbered = any(word.isdigit() or word in ("first", "second", "third") for word in words)
     first = rest[0] if rest else ""
-    if first in ("t", "tc") or (first[:1] == "t" and first[1:] in air | places | bounds) or air.intersection(rest):
+    if (
+        first in ("t", "tc")
+        or (len(first) > 2 and first[0] == "t" and first[1:] in air | places | bounds)
+        or air.intersection(rest)
+    ):
         beside = air | places | bounds | {"c", "f", "k"} | (set() if first[:1] == "t" else {"t", "tc", "tf"})
         return TEMPERATURE if beside.issuperset(rest[first[:1] == "t" :]) else OPEN
-    if re.fullmatch("f[nvhlbt]?", first) and (is_numbered or len(words) == 1):
+    if re.fullmatch("f[nvhlbt]?", first) and (is_numbered or words in (["f"], ["fn"])):
         return FREQUENCY if directions.issuperset(rest[1:]) else OPEN
     return FREQUENCY if modes.intersection(rest) and is_numbered and (modes | directions).issuperset(rest) else OPEN
 

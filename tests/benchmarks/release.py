@@ -106,6 +106,7 @@ PARTS = {
     "speed-records": timing(
         "speed.py --rows mahalanobis forest chain-records --against 43ba4fa4", "--quick --rounds 1"
     ),
+    "speed-year": timing("speed.py --rows detector-year mapper-year chain-year --against 43ba4fa4"),
     "scaling": timing(
         "scaling.py --rounds 1 --most-samples 100000 --most-full 100 --figure docs/images/scaling.png",
         "--most-samples 100 --most-full 100 --sizes 2 --rounds 1",

@@ -21,7 +21,7 @@ from skthermo._core.arrays import (
     without_mask,
 )
 from skthermo._core.warnings import warn_each
-from skthermo.exceptions import ModelWarning
+from skthermo.exceptions import RecordsWarning
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._terms import AffineTerms
 
@@ -378,7 +378,7 @@ def match_modes(
             f"another pairing of modes is as good, by frequencies alone: {changed}. Both may be right. Give the "
             "measured shapes and dofs, or compare the shapes"
         )
-        warn_each([ModelWarning(text, "mode-order")])
+        warn_each([RecordsWarning(text, "mode-order")])
     table["offset"] = 100 * (table["model"] / table["measured"] - 1)
     if macs is not None:
         table["mac"] = macs[np.arange(len(ranks)), ranks]

@@ -194,8 +194,8 @@ def check_supported(stiffness: Matrix, dofs: Sequence[Label] = ()) -> None:
     diagonal = stiffness.diagonal()
     if (diagonal <= 0).any():
         rows = np.flatnonzero(diagonal <= 0)
-        coupled = [row for row in rows if abs(stiffness[[row]]).sum() > abs(diagonal[row])]
-        if coupled:
+        coupled = rows[[abs(stiffness[[row]]).sum() > abs(diagonal[row]) for row in rows]]
+        if len(coupled):
             raise ValueError(
                 f"the stiffness has no positive diagonal at {_listed(coupled, dofs)}, which other rows are tied to, as "
                 "to Lagrange multipliers of constraints; expected a stiffness from which constraints are eliminated, "
@@ -262,7 +262,7 @@ def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
     return float(eigenvalue[0]), vector[:, 0]
 
 
-def _listed(rows: Sequence[int] | NDArray[np.intp], dofs: Sequence[Label]) -> str:
+def _listed(rows: NDArray[np.intp], dofs: Sequence[Label]) -> str:
     """Some of the degrees of freedom, by label where they have one."""
     shown = [f"node {dofs[i][0]!r} along {dofs[i][1]}" if dofs else f"degree of freedom {i}" for i in rows[:6]]
     return ", ".join(shown) + (f" and {len(rows) - 6} more" if len(rows) > 6 else "")
