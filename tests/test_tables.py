@@ -51,6 +51,30 @@ def test_masked_values_are_missing_to_estimators(estimator):
         np.testing.assert_allclose(output(estimator.fit(table), table), expected, rtol=0, atol=1e-9)
 
 
+@UNRELATED
+@each_estimator
+def test_tables_are_taken_as_scikit_learn_takes_them(estimator):
+    halves = RECORDS.astype(np.float16)
+    flags = RECORDS.assign(T1=RECORDS["T1"] > 10)
+    for table, same in (
+        (halves, halves.astype(float)),
+        (halves.to_numpy(), halves.to_numpy().astype(float)),
+        (flags, flags.astype(float)),
+        (flags.astype({"T1": "boolean"}), flags.astype(float)),
+    ):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            expected = output(estimator.fit(same), same)
+            np.testing.assert_array_equal(output(estimator.fit(table), table), expected)
+
+
+@each_estimator
+def test_tables_of_pyarrow_are_refused_in_one_sentence(estimator):
+    arrow = pytest.importorskip("pyarrow").Table.from_pandas(RECORDS, preserve_index=False)
+    with pytest.raises(ValueError, match="of pyarrow"):
+        estimator.fit(arrow)
+
+
 # What is not a real number
 
 
@@ -185,7 +209,6 @@ def no_tables(frame):
         "a series": (frame.iloc[:, 0], "Series"),
         "one dimension": (frame.to_numpy()[:, 0], "shape"),
         "three dimensions": (frame.to_numpy()[np.newaxis], "dimensions"),
-        "half precision": (frame.astype(np.float16), "float16"),
         "a mapping": (frame.to_dict("list"), "dict"),
         "complex": (frame + 1j, "complex"),
         "no columns": (frame.iloc[:, :0], "feature"),

@@ -229,28 +229,36 @@ def is_real(value: Any) -> bool:
 def refuse_no_numbers(values: Any, what: str = "the input") -> None:
     """Raise an error for an array, a table or nested lists with values that are no numbers.
 
-    NumPy and pandas would read "1.0" and True as 1, and a date as nanoseconds.
+    NumPy and pandas would read "1.0" and True as 1, and a date as nanoseconds. Flags are columns of a frame.
     """
+    refuse_arrow(values, what)
     if isinstance(values, type) or callable(values):
         raise ValueError(f"{what} is {values!r:.100}; expected numbers")
     parts = {None: values}
     if hasattr(type(values), "columns") and hasattr(type(values), "dtypes"):
         parts = {}
         for place, (name, dtype) in enumerate(zip(values.columns, values.dtypes, strict=True)):
-            if not isinstance(dtype, np.dtype) or dtype.kind not in "fiuc" or dtype == np.float16:
+            if str(dtype).lower() != "boolean" and (not isinstance(dtype, np.dtype) or dtype.kind not in "fiucb"):
                 parts[name] = values.iloc[:, place] if hasattr(values, "iloc") else values[name].to_numpy()
     for name, part in parts.items():
         kind, example = _no_number(part)
         if kind:
             where = what if name is None else f"column {name!r}"
-            hint = " of type float64 or float32" if "float16" in kind else ""
+            hint = ""
             if kind == "times" and name is not None:
                 hint = f", and times as the index of a pandas frame, as by frame.set_index({name!r})"
             raise ValueError(f"{where} holds {kind}, such as {example!r:.60}; expected numbers{hint}")
 
 
+def refuse_arrow(values: Any, what: str) -> None:
+    """Raise an error for a table of pyarrow, which is no frame to scikit-learn either."""
+    if type(values).__module__.startswith("pyarrow"):
+        raise ValueError(f"{what} is a {type(values).__name__} of pyarrow; expected a frame, as to_pandas() gives")
+
+
 def refuse_no_array(values: Any, what: str, expected: str = "expected an array or a frame of numbers") -> None:
     """Raise an error for an argument without rows: no list, no dense array and nothing that becomes one."""
+    refuse_arrow(values, what)
     if scipy.sparse.issparse(values):
         raise TypeError(f"{what} is a sparse matrix; expected a dense array of numbers")
     if isinstance(values, type) or not (isinstance(values, list | tuple) or hasattr(values, "__array__")):
@@ -299,9 +307,8 @@ def _no_number(values: Any) -> tuple[str, Any]:
             return "rows of different lengths", values
         return next((found for found in map(_no_number, values) if found[0]), ("", None))
     dtype = getattr(values, "dtype", None)
-    named = {"category": "categories", "float16": "numbers of half precision (float16)"}  # three digits are too few
     kinds = {"b": "booleans", "U": "text", "T": "text", "S": "bytes", "M": "times", "m": "times", "V": "records"}
-    kind = named.get(str(dtype)) or kinds.get(getattr(dtype, "kind", ""), "")
+    kind = "categories" if str(dtype) == "category" else kinds.get(getattr(dtype, "kind", ""), "")
     if kind:
         return kind, next(iter(np.ravel(np.asarray(values, dtype=object))), None)
     objects = [values] if dtype is None else []

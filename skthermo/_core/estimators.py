@@ -312,7 +312,7 @@ def fit_outputs(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array |
     """A clone of the regressor fitted to all outputs, or one clone for each output if it takes only one. Several
     outputs are tried: scikit-learn's tag is not reliable (False for ``MLPRegressor``)."""
     try:
-        return fit_weighted(clone(regressor), X, y, sample_weight)
+        return fit_checked(clone(regressor), X, y, sample_weight)
     except InvalidParameterError:
         raise
     except Exception as error:
@@ -322,6 +322,12 @@ def fit_outputs(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array |
             return fit_weighted(MultiOutputRegressor(regressor), X, y, sample_weight)
         except Exception:
             raise error from None
+
+
+def fit_checked(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
+    """Fit a regressor to records that were checked before: one that checks its own does not do so again."""
+    fit = getattr(regressor, "_fit_checked", None)
+    return fit_weighted(regressor, X, y, sample_weight) if fit is None else fit(X, y, sample_weight)
 
 
 def fit_weighted(estimator: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:

@@ -127,6 +127,29 @@ def first_disorder(X: Any) -> int:
     return int(np.argmax(times[1:] < times[:-1])) + 1
 
 
+def of_a_wrong_clock(stamps: pd.DatetimeIndex) -> NDArray[np.bool_]:
+    """Which stamps a clock that was wrong for a time has written: less than a tenth of all, apart from the others by
+    more than two years, or by four weeks where the clock goes back to them."""
+    wrong = np.zeros(len(stamps), dtype=bool)
+    if len(stamps) < 2 or stamps.hasnans:
+        return wrong
+    times = stamps.as_unit("s").asi8
+    order = np.argsort(times, kind="stable")
+    steps = np.diff(times)
+    goes_back = np.append(False, steps < 0) if 2 * np.count_nonzero(steps < 0) < len(steps) / 5 else wrong
+    gaps = np.diff(times[order]) / DAY.total_seconds()
+    part = np.append(0, np.cumsum(gaps > 28))
+    sizes = np.bincount(part)
+    main = int(sizes.argmax())
+    for number in np.flatnonzero(sizes < len(stamps) / 10):
+        rows = np.sort(order[part == number])
+        inner = int(np.flatnonzero(part == number)[0 if number > main else -1])
+        gap = gaps[inner - 1] if number > main else gaps[inner]
+        if gap > 730 or goes_back[rows[0]]:
+            wrong[rows] = True
+    return wrong
+
+
 def check_same_rows(X: Any, y: Any, names: tuple[str, str]) -> None:
     """Raise an error if two tables differ in length or, where both are frames, in index."""
     for what, table in zip(names, (X, y), strict=True):

@@ -24,8 +24,14 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._settings import RecordSettings, Settings, read_settings
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
-from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, read_file
-from skthermo.preprocessing.loggers.together import in_celsius, joined, once
+from skthermo.preprocessing.loggers.logger_files import (
+    NO_TEXT_FILES,
+    CsvFormat,
+    in_zone,
+    read_file,
+)
+from skthermo.preprocessing.loggers.stamps import of_the_right_clock
+from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
@@ -482,7 +488,7 @@ def files_in(folder: Path) -> list[Path]:
 def read_columns(
     file: Path, form: CsvFormat, records: RecordSettings, *, leave_unfinished: bool = False
 ) -> pd.DataFrame:
-    """Records of a file in the columns that the settings name, temperatures in degrees Celsius."""
+    """Records of a file in the columns that the settings name, in degrees Celsius and Hz."""
     table = read_file(file, form, ignore=records.ignore, leave_unfinished=leave_unfinished)
     unknown = [name for name in table if name not in records.columns]
     if unknown:
@@ -490,7 +496,7 @@ def read_columns(
             f"{file} has the columns {unknown}, which [records] does not name; expected {records.columns}, and other "
             "columns under ignore"
         )
-    return in_celsius(table, records.convert)
+    return in_usual_units(table, records.convert)
 
 
 def check_layout(table: pd.DataFrame, file: Path, records: RecordSettings, layouts: Sequence[Sequence[str]]) -> None:
@@ -507,6 +513,9 @@ def read_baseline(
 ) -> tuple[pd.DataFrame, list[list[str]]]:
     """Records of the baseline's files, in order of time, and the columns of each file."""
     tables = [read_columns(file, form, records) for file in files]
+    of_clocks = [of_the_right_clock(table, file) for table, file in zip(tables, files, strict=True)]
+    tables = [table for table, _ in of_clocks]
+    warn_each(finding for _, findings in of_clocks for finding in findings)
     lacking = [name for name in records.columns if not any(name in table for table in tables)]
     if lacking:
         raise ValueError(f"no file of the baseline has the columns {lacking}; expected {records.columns}")

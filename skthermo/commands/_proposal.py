@@ -89,15 +89,27 @@ class Proposal:
             shape = f"values with {form.separator!r} between and the decimal sign {form.decimal!r}, " if is_csv else ""
             zone = f" in {index.tz}" if index.tz else ", without a time zone"
             yield f"{look.file}: {len(index)} records, {shape}{index.min()} to {index.max()}{zone}"
-            yield from (f"not used: {name!r}, as {why}" for name, why in look.ignored.items())
             yield from (f"see: {note}" for note in look.notes)
+        yield from (f"not used: {name!r}, as {why}" for name, why in self.read.ignored.items())
+        yield from (f"see: {note}" for note in self.read.notes)
         if len(self.read.waiting):
             yield f"stamps that are not in all files, and are left out: {len(self.read.waiting)}"
         usual, missing = duration_text(self.step), self.baseline.isna().to_numpy().mean()
         yield f"baseline: {len(self.baseline)} records, usually every {usual}, {missing:.1%} of the values missing"
+        yield from self._gaps()
         yield f"temperatures: {', '.join(self.records.temperatures)}; responses: {', '.join(self.records.responses)}"
         earlier = "none" if self.means is None else f"with half-lives of {' and '.join(self.means.half_lives)}"
         yield f"means of earlier temperatures that lower the error of the responses in periods held out: {earlier}"
+
+    def _gaps(self) -> Iterator[str]:
+        """Outages of a day or more, and of ten records or more, the longest first."""
+        index = self.baseline.index
+        steps = pd.Series(index[1:] - index[:-1], index[:-1])
+        long = steps[steps >= max(pd.Timedelta("1D"), 10 * self.step)].nlargest(3)
+        n_long = int((steps >= max(pd.Timedelta("1D"), 10 * self.step)).sum())
+        listed = "; ".join(f"{start} to {start + step} ({duration_text(step)})" for start, step in long.items())
+        if n_long:
+            yield f"outages: {n_long}, {'the longest ' if n_long > 3 else ''}{listed}"
 
     @cached_property
     def detectors(self) -> list[TriedDetector]:

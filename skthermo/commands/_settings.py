@@ -27,7 +27,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import CompensatedDetector, DirectionalDetector
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing.loggers.logger_files import CsvFormat
+from skthermo.preprocessing.loggers.logger_files import CsvFormat, unit_called
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
 REQUIRED = inspect.Parameter.empty  # the default of what has none
@@ -81,7 +81,7 @@ class RecordSettings:
     ignore : list of str, optional
         Columns that are not used.
     convert : mapping of str to str, optional
-        Columns in another unit than degrees Celsius, and that unit: "K" or "°F".
+        Columns in another unit than degrees Celsius or Hz, and that unit: "K", "°F", "mHz", "kHz" or "rad/s".
     until : str, optional
         Last moment of the baseline; later records of these files are new ones. By default all of them are the
         baseline.
@@ -361,8 +361,10 @@ def _check_columns(records: RecordSettings) -> None:
         if not getattr(records, key):
             raise SettingError(f"[records] {key} is empty; expected names of columns", "records", key)
     for column, unit in records.convert.items():
-        if unit not in ("K", "°F") or column not in records.columns:
-            text = f"[records] convert has {column!r}: {unit!r}; expected a column that is used, in 'K' or '°F'"
+        found = unit_called(unit)
+        if found is None or (found.factor == 1 and not found.zero) or column not in records.columns:
+            expected = "a column that is used, in 'K', '°F', 'mHz', 'kHz' or 'rad/s'"
+            text = f"[records] convert has {column!r}: {unit!r}; expected {expected}"
             raise SettingError(text, "records", "convert")
 
 

@@ -9,6 +9,7 @@ from typing import Any, Self, overload
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import maximum_filter1d
 from sklearn.base import OutlierMixin
 from sklearn.utils.metaestimators import available_if
 
@@ -17,6 +18,7 @@ from skthermo._core.estimators import Estimator, Interval, _fit_context, check_i
 from skthermo._core.frames import row_times
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
+from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.numbers import independent_records
 
 
@@ -147,7 +149,8 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     threshold_, offset_ : float
         A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
     n_independent_ : float
-        Number of independent records that the indices of the baseline are worth.
+        Number of independent records that the residuals of the baseline are worth, or its indices where columns are
+        frequencies.
     report_ : DataFrame
         A row for each column: as what it was read (``read_as``, "frequency" or "residual"), what it was divided by
         (``level``), and in how many rows a value was set aside (``n_set_aside``).
@@ -214,15 +217,15 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         raise NotImplementedError
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: None = None) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike | None = None) -> Self:
         """Learn a healthy baseline and set the threshold.
 
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_modes)
             Frequencies in Hz, or residuals; NaN where a mode is missing.
-        y : None
-            Ignored.
+        y : array-like of shape (n_samples,), optional
+            Labels +1 and -1: what is labelled -1, as damaged, is not learned. Other values are ignored.
 
         Returns
         -------
@@ -241,15 +244,20 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
             If values were set aside, or the baseline has too few independent records for the rate of false alarms.
         """
         F = validate_data(self, X, ensure_min_samples=2, allow_infinite=True)
+        F = np.where(labelled_damaged(y, len(F))[:, np.newaxis], np.nan, F)
         times = row_times(X)
         self.findings_: list[SkthermoWarning] = []
         F, self.report_ = read_columns(F, getattr(X, "columns", range(F.shape[1])), self.findings_)
+        order, are_residuals = np.argsort(times, kind="stable"), (self.report_["read_as"] == "residual").to_numpy()
+        residuals = F[np.ix_(order, are_residuals)]
+        self.n_independent_ = independent_records(residuals) if are_residuals.any() else float(len(F))
         self.baseline_index_ = self._learn(F, times)
         self.threshold_ = self._limit(self.baseline_index_)
         self.offset_ = -self.threshold_
-        self.n_independent_ = independent_records(self.baseline_index_[np.argsort(times, kind="stable")])
-        # a dozen parts tell the number within a factor of two
-        if min(2 * self.n_independent_, len(F)) < 1 / self.contamination - 1:
+        if not are_residuals.any():  # the seasons of frequencies come again
+            self.n_independent_ = independent_records(self.baseline_index_[order])
+        # the parts tell the number within a factor of three
+        if min(3 * self.n_independent_, len(F)) < 1 / self.contamination - 1:
             self.findings_.append(
                 FewRecordsWarning(
                     "the baseline has too few independent records (n_independent_) for a false-alarm rate of "
@@ -261,19 +269,22 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         warn_each(self.findings_)
         return self
 
-    def _interleaved_folds(self, F: Array, times: Array) -> NDArray[np.intp]:
-        """The fold of each row: blocks of time dealt in turn to five folds, or up to twenty folds of few rows.
+    def _other_blocks(self, times: Array) -> list[tuple[Rows, Rows]]:
+        """Training and test rows of five folds, or of up to twenty of few rows: blocks of time dealt in turn.
 
         There are fifty blocks, so that each fold has all seasons; of residuals, which have none, as many as they are
-        worth pairs of independent rows, but at least five, so that a block is a stranger to its neighbours.
+        worth fours of independent rows, but at least five. Rows beside a block that remember it train nothing.
         """
         n_rows, order = len(times), np.argsort(times, kind="stable")
-        residuals = F.T[(self.report_["read_as"] == "residual").to_numpy()][:, order]
-        numbers = [independent_records(values) for values in residuals]
-        n_blocks = np.clip(np.median(numbers) / 2, 5, 50) if numbers else 50
-        ranks = np.empty(n_rows, dtype=np.intp)
-        ranks[order] = np.arange(n_rows)
-        return ranks // max(int(n_rows / n_blocks), 1) % (5 if n_rows > 100 else min(n_rows, 20))
+        number = min(self.n_independent_, n_rows)
+        n_blocks = np.clip(number / 4, 5, 50)
+        remembered = max(min(int(n_rows / number), n_rows // 6) - 1, 0)
+        folds = np.arange(n_rows) // max(int(n_rows / n_blocks), 1) % (5 if n_rows > 100 else min(n_rows, 20))
+        splits = []
+        for fold in np.unique(folds):
+            beside = maximum_filter1d((folds == fold).astype(np.uint8), 2 * remembered + 1)
+            splits.append((order[beside == 0], order[folds == fold]))
+        return splits
 
     def _relative(self, X: ArrayLike) -> Array:
         """Rows of X as `fit` read them: frequencies divided by their level, residuals as they are."""
@@ -308,6 +319,14 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         score, findings = mean_log_density(densities, ~np.isnan(F) & ~np.isnan(densities)[:, np.newaxis])
         warn_each(findings)
         return score
+
+
+def labelled_damaged(y: Any, n_rows: int) -> NDArray[np.bool_]:
+    """Which rows labels of +1 and -1 tell as damaged; none without such labels."""
+    labels = np.ones(n_rows) if y is None else np.asarray(y)
+    return (
+        labels == -1 if labels.shape == (n_rows,) and np.isin(labels, (-1, 1)).all() else np.zeros(n_rows, dtype=bool)
+    )
 
 
 def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:

@@ -15,14 +15,23 @@ from sklearn.model_selection import BaseCrossValidator
 from sklearn.utils.metaestimators import available_if
 
 from skthermo._core.arrays import Array, as_floats, check_probability, median, robust_deviation
-from skthermo._core.estimators import Estimator, HasMethods, Interval, StrOptions, _fit_context, check_is_fitted
+from skthermo._core.estimators import (
+    Estimator,
+    HasMethods,
+    Interval,
+    StrOptions,
+    _fit_context,
+    _safe_indexing,
+    check_is_fitted,
+)
 from skthermo._core.frames import column_names, first_disorder, frame_like, has_stamps, row_times
 from skthermo._core.warnings import collected, warn_each
-from skthermo.detection._base import DamageDetector, DamageIndexMixin, mean_log_density
+from skthermo.detection._base import DamageDetector, DamageIndexMixin, labelled_damaged, mean_log_density
 from skthermo.detection._compensator import TemperatureCompensator
 from skthermo.detection._directional import DirectionalDetector, smallest_amount
 from skthermo.detection._outlier import OutlierDetector
 from skthermo.exceptions import SkthermoWarning
+from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.numbers import independent_records
 from skthermo.residuals.regimes import change_of_scatter
 from skthermo.residuals.windows import Regimes, WindowMeans
@@ -146,7 +155,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         self.window_share = window_share
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: None = None) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike | None = None) -> Self:
         """Learn a healthy baseline.
 
         Parameters
@@ -154,8 +163,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         X : array-like or DataFrame of shape (n_samples, n_features)
             Temperatures in degrees Celsius, or other inputs, and frequencies in Hz of the healthy structure, side by
             side.
-        y : None
-            Ignored.
+        y : array-like of shape (n_samples,), optional
+            Labels +1 and -1: what is labelled -1, as damaged, is not learned. Other values are ignored.
 
         Returns
         -------
@@ -175,12 +184,12 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         """
         self.compensator_ = TemperatureCompensator(self.regressor, targets=self.targets, cv=self.cv)
         with collected() as findings:
-            residuals = self.compensator_.fit_transform(X)
+            residuals = self.compensator_.fit_transform(X, y)
         self.n_features_in_ = self.compensator_.n_features_in_
         if hasattr(self.compensator_, "feature_names_in_"):
             self.feature_names_in_ = self.compensator_.feature_names_in_
         T, R = self.compensator_.inputs(X)[0], as_floats(residuals)
-        self.regime_ = self._chosen_regime(X, T, R)
+        self.regime_ = self._chosen_regime(X, T, R, np.flatnonzero(~labelled_damaged(y, len(R))))
         regime = regimes_of(T, self.regime_)
         self.means_ = None
         Z = as_frame(X, residuals)
@@ -373,7 +382,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         """Threshold of the first regime's detector over that of another regime."""
         return self.detectors_[0].threshold_ / self.detectors_[number].threshold_
 
-    def _chosen_regime(self, X: Any, T: Any, R: Array) -> tuple[Any, float] | None:
+    def _chosen_regime(self, X: Any, T: Any, R: Array, healthy: Rows) -> tuple[Any, float] | None:
         """The input, by name or position, and the value at which records are divided."""
         names = column_names(T, "") if isinstance(T, pd.DataFrame) else list(range(T.shape[1]))
         if isinstance(self.regimes, tuple):
@@ -384,9 +393,11 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             return None
         far = np.abs(R - median(R)) > 8 * robust_deviation(R)
         found = change_of_scatter(as_floats(T), np.where(far, np.nan, R), self.compensator_.folds_)
-        if found is None or not (self.window is None or self._holds_later(X, T, names[found[0]], found[1])):
+        if found is None:
             return None
-        return names[found[0]], found[1]
+        regime = names[found[0]], found[1]
+        healthy_X, healthy_T = (_safe_indexing(table, healthy) for table in (X, T))
+        return regime if self.window is None or self._holds_later(healthy_X, healthy_T, *regime) else None
 
     def _holds_later(
         self, X: Any, T: Any, name: Any, value: float, *, most: float = 0.04, least_rows: int = 40

@@ -25,7 +25,7 @@ from skthermo._core.estimators import (
 )
 from skthermo._core.frames import column_names, frame_like, marker_findings, positions_of
 from skthermo._core.warnings import collected, warn_each
-from skthermo.detection._base import mean_log_density
+from skthermo.detection._base import labelled_damaged, mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
 from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing.checks import misplaced_columns, set_aside
@@ -158,7 +158,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         self.cv = cv
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: None = None) -> TemperatureCompensator:
+    def fit(self, X: ArrayLike, y: ArrayLike | None = None) -> TemperatureCompensator:
         """Fit the regression of the targets on the other columns.
 
         Parameters
@@ -166,8 +166,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         X : array-like or DataFrame of shape (n_samples, n_features)
             Temperatures in degrees Celsius, or other inputs, and frequencies in Hz of the healthy structure, side by
             side.
-        y : None
-            Ignored.
+        y : array-like of shape (n_samples,), optional
+            Labels +1 and -1: what is labelled -1, as damaged, is not learned. Other values are ignored.
 
         Returns
         -------
@@ -188,16 +188,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             like a temperature; if temperatures are missing, with the sensors that fill them; if a fold has weather that
             the others do not know.
         """
-        self.findings_, _ = self._learn(X)
+        self.findings_, _ = self._learn(X, y)
         warn_each(self.findings_)
         return self
 
     @overload
-    def fit_transform(self, X: pd.DataFrame, y: None = None) -> pd.DataFrame: ...
+    def fit_transform(self, X: pd.DataFrame, y: ArrayLike | None = None) -> pd.DataFrame: ...
     @overload
-    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64]: ...
+    def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64]: ...
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit_transform(self, X: ArrayLike, y: None = None) -> NDArray[np.float64] | pd.DataFrame:
+    def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
         """Fit on all rows of a baseline, and give its out-of-fold residuals; errors and warnings are those of `fit`.
 
         Parameters
@@ -205,8 +205,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         X : array-like or DataFrame of shape (n_samples, n_features)
             Temperatures in degrees Celsius, or other inputs, and frequencies in Hz of the healthy structure, side by
             side.
-        y : None
-            Ignored.
+        y : array-like of shape (n_samples,), optional
+            Labels +1 and -1: what is labelled -1, as damaged, is not learned. Other values are ignored.
 
         Returns
         -------
@@ -214,7 +214,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
             Relative, or in the unit of a response that may be zero; each row predicted by a clone that was not fitted
             on its fold.
         """
-        self.findings_, residuals = self._learn(X)
+        self.findings_, residuals = self._learn(X, y)
         warn_each(self.findings_)
         return residuals
 
@@ -336,9 +336,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         check_is_fitted(self)
         return _check_feature_names_in(self, input_features)[self.targets_]
 
-    def _learn(self, X: Any) -> tuple[list[SkthermoWarning], Any]:
+    def _learn(self, X: Any, y: Any) -> tuple[list[SkthermoWarning], Any]:
         """Learn from a baseline: findings, and residuals out of fold."""
         T, F, findings = self._read_baseline(X)
+        F = frame_like(F, np.where(labelled_damaged(y, len(F))[:, np.newaxis], np.nan, as_floats(F)))
         self.sensors_ = SensorRegression.fitted(T)
         inputs, filled = self._filled(T)
         Y, folds = as_floats(F), read_folds(self.cv, inputs)

@@ -67,7 +67,8 @@ class DirectionalDetector(MahalanobisDetector):
     baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline; with the conformal threshold, each record's index from those of other folds.
     n_independent_ : float
-        Number of independent records that the indices of the baseline are worth.
+        Number of independent records that the residuals of the baseline are worth, or its indices where columns are
+        frequencies.
     threshold_, offset_ : float
         A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
     report_ : DataFrame

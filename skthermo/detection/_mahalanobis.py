@@ -37,7 +37,7 @@ class MahalanobisDetector(DamageDetector):
 
         - ``"conformal"``: the ceil((n + 1)(1 - contamination))-th smallest of the distances of the n baseline records,
           each from records of other blocks of time, dealt in turn to five folds: fifty blocks or, of residuals, as
-          few as are longer than these remember.
+          few as are longer than these remember, without the records beside a block that remember it.
         - ``"quantile"``: the (1 - contamination) quantile of the baseline's own distances, as in the paper. Distances
           of the records that a covariance was fitted on are too small: 100 records of 6 modes give 5 % false alarms
           where 2 % are asked for.
@@ -51,8 +51,8 @@ class MahalanobisDetector(DamageDetector):
     baseline_index_ : ndarray of shape (n_samples,)
         Damage index of the baseline; with the conformal threshold, each record's distance from those of other folds.
     n_independent_ : float
-        Number of independent records that the indices of the baseline are worth, from the variance of the means of a
-        dozen parts.
+        Number of independent records that the residuals of the baseline are worth, or its indices where columns are
+        frequencies, from the variance of the means of a dozen parts.
     threshold_, offset_ : float
         A damage index above the threshold is an alarm; ``decision_function`` is ``score_samples - offset_``.
     report_ : DataFrame
@@ -124,7 +124,7 @@ class MahalanobisDetector(DamageDetector):
                 return lambda test: np.full_like(value(whole, F[test]), np.inf)
             return lambda test: value(others, F[test])
 
-        return out_of_fold(learn, self._interleaved_folds(F, times))
+        return out_of_fold(learn, self._other_blocks(times))
 
     def _limit(self, index: Array) -> float:
         if self.threshold == "chi2":

@@ -17,7 +17,7 @@ from skthermo._core.estimators import HasMethods, Interval, StrOptions
 from skthermo._core.frames import column_names
 from skthermo._core.text import listed
 from skthermo.detection._base import DamageDetector, conformal_threshold
-from skthermo.preprocessing.folds import BlockedKFold, out_of_fold
+from skthermo.preprocessing.folds import BlockedKFold, Rows, out_of_fold
 
 
 class OutlierDetector(DamageDetector):
@@ -54,7 +54,8 @@ class OutlierDetector(DamageDetector):
         Damage index of the baseline, with the conformal threshold by clones that were not fitted on the record; NaN
         where a mode is missing.
     n_independent_ : float
-        Number of independent records that the indices of the baseline are worth.
+        Number of independent records that the residuals of the baseline are worth, or its indices where columns are
+        frequencies.
     report_ : DataFrame
         As what each column was read, and in how many rows a value was set aside, as `DamageDetector` has it.
     findings_ : list of SkthermoWarning
@@ -130,10 +131,10 @@ class OutlierDetector(DamageDetector):
         index[complete] = out_of_fold(lambda train: lambda test: self._index_from(known[train], known[test]), folds)
         return index
 
-    def _folds(self, times: Array, F: Array) -> NDArray[np.intp]:
-        """The fold of each complete row."""
+    def _folds(self, times: Array, F: Array) -> Rows | list[tuple[Rows, Rows]]:
+        """The fold of each complete row, or training and test rows of each fold."""
         if self.block is None:
-            return self._interleaved_folds(F, times)
+            return self._other_blocks(times)
         is_timed = np.ptp(times) > 1e12  # numbers of rows are smaller, and nanoseconds larger
         index = pd.DatetimeIndex(times.astype("datetime64[ns]")) if is_timed else pd.Index(times)
         return BlockedKFold(min(5, len(times)), block=self.block).fold_of(pd.DataFrame(index=index))

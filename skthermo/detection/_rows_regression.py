@@ -18,7 +18,7 @@ from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
 from skthermo._core.arrays import Array, as_floats, is_model
-from skthermo._core.estimators import BaseSearchCV, _BaseImputer, fit_outputs, last_step, predict_with_std
+from skthermo._core.estimators import BaseSearchCV, _BaseImputer, fit_checked, fit_outputs, last_step, predict_with_std
 from skthermo._core.frames import column_names
 from skthermo.preprocessing import BlockedKFold
 from skthermo.preprocessing.folds import Rows, out_of_fold
@@ -104,7 +104,8 @@ def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:
     each = MultiOutputRegressor(one)
     named = hasattr(F, "iloc")  # so that a regressor may know which target it learns
     each.estimators_ = [
-        clone(one).fit(rows_of(inputs, own), F.iloc[own, k] if named else F[own, k]) for k, own in enumerate(rows.T)
+        fit_checked(clone(one), rows_of(inputs, own), F.iloc[own, k] if named else F[own, k])
+        for k, own in enumerate(rows.T)
     ]
     return each
 

@@ -334,8 +334,8 @@ def linearise_modes(
     Parameters
     ----------
     model : FE model
-        Exact derivatives come from its method ``linearised_modes`` or ``local_modes``, if it has one; else derivatives
-        of the shapes are central differences of its method ``modes``, and `linearise` gives the derivatives of the
+        Exact derivatives [Nel76]_ come from its method ``linearised_modes`` or ``local_modes``, if it has one; else
+        derivatives of the shapes are central differences of its method ``modes``, and `linearise` gives those of the
         frequencies.
     theta : array-like or DataFrame of shape (n_samples, n_parameters)
         Multipliers of the nominal parameters. NaN is allowed.

@@ -32,7 +32,7 @@ class FEModel(Protocol):
     - ``modes(theta)``, frequencies and mode shapes;
     - ``jacobian(theta)``, derivatives of the frequencies; ``linearised(theta)``, both from one solution;
     - ``linearised_modes(theta, dofs)``, these and mode shapes with their derivatives at some degrees of freedom;
-    - ``local_modes(theta, follow=...)``, modes and their derivatives at one theta, as `LocalModes`, with ``n_dof``, and
+    - ``local_modes(theta, follow=...)``, modes and their derivatives at one theta, with ``n_dof``, and
       ``track``, whether a column follows its mode (True) or its rank (False);
     - ``groups`` and ``damaged(damage)``, damage groups by name, and a model with less stiffness in some;
     - ``group_mass``, masses of damage groups, and ``damaged(damage, kind="section")``, a model with less of both;

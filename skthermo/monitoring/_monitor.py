@@ -68,6 +68,7 @@ from skthermo.monitoring._records import (
     read_records,
     usable_baseline,
     without_what_cannot_be,
+    without_wrong_clocks,
 )
 from skthermo.monitoring._retraining import Retraining, begun_again, retrained
 from skthermo.monitoring._status import MonitorStatus, status_of, summary_lines
@@ -410,7 +411,7 @@ class Monitor(SavesFrames, Estimator):
                 f"watch_per_year is {self.watch_per_year:g} and false_alarms_per_year {self.false_alarms_per_year:g}; "
                 "expected more watches than alarms a year, such as 12 and 1"
             )
-        given = read_records(X)
+        given, of_clocks = without_wrong_clocks(X, read_records(X))
         if not len(given):
             raise ValueError(
                 "the baseline has no records; expected those of the healthy structure, of a year if possible"
@@ -430,7 +431,7 @@ class Monitor(SavesFrames, Estimator):
             trained = baseline if not columns.reference else baseline[columns.inputs]
             self.features_ = columns.seen(detector)
             detector.fit(trained[self.features_])
-        findings += self._take_charge(detector, trained)
+        findings += [*of_clocks, *self._take_charge(detector, trained)]
         refuse_other_batches(detector, self.features_, trained, self.lookback_)
         findings += blind_findings(detector, self.features_, trained, self.targets_, self.lookback_, self.threshold_)
         self._begin_service(self.fem)

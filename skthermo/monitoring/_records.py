@@ -16,15 +16,16 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import as_floats, is_model, refuse_no_table
 from skthermo._core.estimators import check_is_fitted
-from skthermo._core.frames import DAY, YEAR, positions_of, usual_step
+from skthermo._core.frames import DAY, YEAR, of_a_wrong_clock, positions_of, usual_step
 from skthermo._core.saved_frames import SavesFrames
-from skthermo._core.text import duration_text
+from skthermo._core.text import counted, duration_text
 from skthermo.detection import (
     CompensatedDetector,
     DirectionalDetector,
     MahalanobisDetector,
     TemperatureCompensator,
 )
+from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing import HampelFilter
 from skthermo.preprocessing.checks import RecordFindings, set_aside
 
@@ -63,6 +64,18 @@ def read_records(X: Any, columns: list[Any] | None = None, zone: Any = None) -> 
     stamps.freq = None  # that of one batch is not that of its parts
     frame = pd.DataFrame(as_floats(X), stamps, X.columns)
     return frame if X.index.is_monotonic_increasing else frame.sort_index(kind="stable")
+
+
+def without_wrong_clocks(X: pd.DataFrame, records: pd.DataFrame) -> tuple[pd.DataFrame, list[RecordsWarning]]:
+    """Records of a table without those that a wrong clock has stamped, and a finding that names these."""
+    wrong = X.index[of_a_wrong_clock(X.index)]
+    if not len(wrong):
+        return records, []
+    text = (
+        f"the stamps of {counted(len(wrong), 'record')} of the baseline are far from the others, {wrong.min()} to "
+        f"{wrong.max()}. They are set aside, as of a wrong clock. Correct their stamps if they count"
+    )
+    return records[~records.index.isin(wrong)], [RecordsWarning(text, "wrong-stamps")]
 
 
 @dataclass(frozen=True)

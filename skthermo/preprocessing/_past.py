@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import Interval, StrOptions
-from skthermo._core.frames import Table, as_stamps, check_duration, frame_like
+from skthermo._core.frames import DAY, Table, as_stamps, check_duration, frame_like
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning
@@ -100,8 +100,9 @@ class LagFeatures(PastFeatures):
         Number of columns for each sensor, the current value included, or an explicit list of lags, such as ``[0, 1,
         24]``. At most 10,000 or as many as there are rows, and at most 100 years back.
     freq : str or timedelta, optional
-        Length of one lag, such as "1h", for frames on a DatetimeIndex. By default the most frequent time between
-        records of `fit`.
+        Length of one lag, such as "1h", for frames on a DatetimeIndex, or a step of the calendar, such as "MS". By
+        default the most frequent time between records of `fit`; the calendar's step where their stamps are of one time
+        of day in a time zone, whose days have 23 or 25 hours twice a year, or of one day of the month.
     tolerance : str or timedelta, optional
         How much older than t - k freq the record for lag k may be. By default 6 freq.
     padding : {"edge", "nan"}, default="edge"
@@ -189,7 +190,7 @@ class LagFeatures(PastFeatures):
         else:
             self.freq_ = (
                 _most_frequent_step(stamps)
-                if self.freq is None
+                if self.freq is None or self._calendar() is not None
                 else check_duration(self.freq, "freq", may_be_zero=False).to_timedelta64()
             )
             self.tolerance_ = 6 * self.freq_
@@ -231,6 +232,32 @@ class LagFeatures(PastFeatures):
         reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
         return no_earlier_records(f"lags reach {reach} back, and most rows lack lags", reach)
 
+    def _calendar(self) -> pd.offsets.BaseOffset | None:
+        """The step of the calendar by which records of `fit` follow each other; None where steps are times."""
+        stamps = pd.DatetimeIndex(self.stamps_).unique()
+        if self.time_zone_ is not None:
+            stamps = stamps.tz_localize("UTC").tz_convert(self.time_zone_).tz_localize(None)
+        if (stamps - stamps.normalize()).nunique() > 1:
+            return None
+        given = _step_of_calendar(self.freq)
+        if given is not None or self.freq_ is None:
+            return given if given is not None and all(map(given.is_on_offset, stamps)) else None
+        n_days, is_rest = divmod(pd.Timedelta(self.freq_), DAY)
+        if len(stamps) < 3 or is_rest:
+            return None
+        if self.freq is None and 28 <= n_days <= 31 and (stamps.day.nunique() == 1 or stamps.is_month_end.all()):
+            return pd.offsets.MonthEnd() if stamps.is_month_end.all() else pd.DateOffset(months=1)
+        return None if self.time_zone_ is None else pd.DateOffset(days=n_days)
+
+    def _steps_back(self, stamps: pd.DatetimeIndex, lag: int, step: pd.offsets.BaseOffset) -> NDArray[np.int64]:
+        """Times that are so many steps of the calendar earlier, by local clocks, in UTC."""
+        local = stamps if self.time_zone_ is None else stamps.tz_convert(self.time_zone_).tz_localize(None)
+        earlier = local - lag * step if lag else local
+        if self.time_zone_ is not None:
+            is_summer = np.ones(len(earlier), dtype=bool)
+            earlier = earlier.tz_localize(self.time_zone_, ambiguous=is_summer, nonexistent="shift_forward")
+        return earlier.as_unit("ns").asi8
+
     def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
         n_rows, sensors = len(values), np.ascontiguousarray(values.T)
         lagged = np.empty((len(sensors), len(lags), n_rows), dtype=values.dtype)
@@ -244,7 +271,8 @@ class LagFeatures(PastFeatures):
         own, old = stamps.as_unit("ns").asi8, self.stamps_.view(np.int64)
         freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
         rows_per_lag = _rows_per_step(own, freq)
-        if rows_per_lag and np.array_equal(own, old):
+        calendar = self._calendar()
+        if rows_per_lag and np.array_equal(own, old) and calendar is None:
             return self._by_row(values, [lag * rows_per_lag for lag in self.lags_]), []
         found = self._found(own, max(self.lags_) * freq + tolerance)
         found[old.argmin()] = True  # the padding of what is before the first record of all
@@ -253,7 +281,7 @@ class LagFeatures(PastFeatures):
         ascending = known[order]
         sources, unknown = [], np.zeros(len(own), dtype=bool)
         for lag in self.lags_:
-            wanted = own - lag * freq
+            wanted = own - lag * freq if calendar is None else self._steps_back(stamps, lag, calendar)
             at = np.searchsorted(ascending, wanted, side="right") - 1
             stale = wanted - ascending[at] > tolerance
             before = at < 0
@@ -262,6 +290,15 @@ class LagFeatures(PastFeatures):
             sources.append(np.where(before & (self.padding == "nan"), -1, source))
         are_of_fit = np.isin(own, old[found]).all()
         return _rows_by_lag(records, sources), [] if are_of_fit else self._doubts_of_history(unknown)
+
+
+def _step_of_calendar(freq: Any) -> pd.offsets.BaseOffset | None:
+    """A step of the calendar, such as "MS"; None for lengths of time."""
+    try:
+        offset = pd.tseries.frequencies.to_offset(freq) if isinstance(freq, str | pd.offsets.BaseOffset) else None
+    except ValueError:
+        return None
+    return None if isinstance(offset, pd.offsets.Tick | pd.offsets.Day) else offset
 
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:

@@ -33,8 +33,8 @@ def read_records(
         One file with all columns, or a file of temperatures and then a file of frequencies. Files with the same columns
         follow each other; others are joined by their stamps.
     temperatures, responses : sequence of str, optional
-        Names of the columns. By default, the columns of the first of two files are temperatures and the columns of the
-        second are responses; names and units decide in one file.
+        Names of the columns. By default units, names in five languages and values decide; of two files, the first has
+        the temperatures and the second the responses among the columns that these leave open.
     zone : str, optional
         Time zone of the logger's clock, such as "Europe/Brussels". By default stamps have no time zone, and those with
         an offset are in UTC.
@@ -46,7 +46,7 @@ def read_records(
     temperatures : DataFrame
         In degrees Celsius and in order of time, NaN where a value is missing.
     frequencies : DataFrame
-        On the same stamps.
+        On the same stamps, in Hz.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def read_records(
     temperatures, responses = _names(temperatures, "temperatures"), _names(responses, "responses")
     read = LoggerRecords.read(list(map(Path, files)), temperatures, responses, (), zone, stamps)
     findings = [finding for look in read.looks for finding in look.findings]
-    said = [note for look in read.looks for note in look.notes]
+    said = [*(note for look in read.looks for note in look.notes), *read.notes]
     said += [f"{name!r} is not used, as {why}" for name, why in read.ignored.items()]
     if said:
         text = f"{'; '.join(said)}. If that is wrong, name the columns, or the format of stamps"

@@ -18,6 +18,7 @@ from skthermo._core.frames import correlation_times
 from skthermo.exceptions import WeatherWarning
 from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.gaussian import Gaussian
+from skthermo.residuals.numbers import independent_records
 from skthermo.residuals.weather import (
     NearestPlaces,
     TrainingRange,
@@ -173,10 +174,12 @@ class BaselineResiduals:
     def _taken(self, similar: scipy.sparse.csr_array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of records in runs for rows with some similar records.
 
-        The mean length of a run is 1 and six times the correlation time less 1.
+        The mean length of a run is 1 and six times the correlation time less 1, or the number of records that are worth
+        one independent one if that is more: a slow part that is small moves means, and hardly the correlation.
         """
         n_rows, n_records = similar.shape
-        ends = np.flatnonzero(random_state.uniform(size=n_rows) < 1 / (1 + 6 * (self.correlation_time - 1)))
+        memory = max(self.correlation_time, n_records / independent_records(self.values))
+        ends = np.flatnonzero(random_state.uniform(size=n_rows) < 1 / (1 + 6 * (memory - 1)))
         which = random_state.randint(similar.indptr[1], size=n_rows)
         taken = similar.indices.reshape(n_rows, -1)[np.arange(n_rows), which].astype(np.intp)
         if len(ends) == n_rows:

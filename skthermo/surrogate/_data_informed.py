@@ -41,6 +41,7 @@ from skthermo._core.estimators import (
     check_array,
     check_is_fitted,
     check_takes_weights,
+    fit_checked,
     inputs_of_last_step,
     last_step,
     seed_parts,
@@ -79,7 +80,7 @@ from skthermo.surrogate._records import (
     frequency_table,
     measurement_noise,
 )
-from skthermo.surrogate._regression import FrequencyInverse, TemperatureMapper, fit_checked
+from skthermo.surrogate._regression import FrequencyInverse, TemperatureMapper
 from skthermo.surrogate._simulator import Simulator
 from skthermo.surrogate._thermal import (
     Discrepancy,

@@ -198,7 +198,7 @@ class FitReport(SavesFrames):
     findings : RecordFindings
         What `~skthermo.preprocessing.check_records` has found in the records.
     doubts : list of SkthermoWarning
-        What `fit` warns of: doubtful records, parts of the chain, rows and modes; a finding of each kind.
+        What ``fit`` warns of: doubtful records, parts of the chain, rows and modes; a finding of each kind.
 
     Examples
     --------
@@ -253,7 +253,7 @@ class FitReport(SavesFrames):
         return self.unexplained_offset > 1
 
     def warnings(self) -> Iterator[SkthermoWarning]:
-        """Warnings of `fit`, one of each kind.
+        """Warnings of ``fit``, one of each kind.
 
         Yields
         ------

@@ -83,6 +83,14 @@ class ThermalPrior:
         """Standard deviations of ln theta, (n_parameters,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def cautious(self) -> ThermalPrior:
+        """The prior by which each parameter may move by itself as far as all together, for standard deviations.
+
+        Parameters that all follow one temperature, each at its own rate, show nearly no movement of their own.
+        """
+        return replace(self, own=np.maximum(self.own, self.common))
+
     def __str__(self) -> str:
         own = listed(
             [f"{name!r} by itself by {percent(size, '.2g')}" for name, size in zip(self.names, self.own, strict=True)]
@@ -374,12 +382,13 @@ def inverted(taught_by: Any, inputs: Array, posterior: ThermalPosterior, n_jobs:
     weights, stated = weights[:, : slopes.shape[1]], posterior.noise[: slopes.shape[1]] ** -2.0
     std = deviations(information(slopes, weights, precision))
     at_best = deviations(information(slopes, np.where(weights > 0, weights, stated), precision))
+    cautious = deviations(information(slopes, weights, posterior.prior.cautious.precision))
     is_empty = np.isnan(inputs).all(axis=1)
     unknown = (is_empty | found.stalled)[:, np.newaxis]
     theta = np.where(unknown, np.nan, np.exp(found.x))
     return Bunch(
         theta=theta,
-        std=std * theta,
+        std=cautious * theta,
         residuals=np.where(unknown | (weights == 0), np.nan, found.residual)[:, : posterior.simulator.model.n_modes],
         weight=np.where(is_empty, 0.0, ((at_best / std) ** 2).mean(axis=1)),
         converged=found.converged & ~is_empty,
@@ -654,7 +663,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
     temperature moves all stiffness together by 6%
     >>> theta, std = inverse.transform(year.frequencies, return_std=True)
     >>> std.mean().round(2).to_dict()
-    {'bottom': 0.01, 'top': 0.02, 'diagonal': 0.01, 'vertical': 0.04}
+    {'bottom': 0.04, 'top': 0.05, 'diagonal': 0.02, 'vertical': 0.07}
     """
 
     _parameter_constraints: dict = {
@@ -773,7 +782,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         theta : ndarray or DataFrame of shape (n_samples, n_parameters)
             NaN in rows without any mode. A frame gives a frame on its own index.
         std : ndarray or DataFrame of shape (n_samples, n_parameters)
-            Only with ``return_std``: posterior standard deviations by Laplace's approximation.
+            Only with ``return_std``: posterior standard deviations by Laplace's approximation; with a learned prior, as
+            if each parameter could move by itself as far as all together.
 
         Warns
         -----
@@ -797,7 +807,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         Bunch
             - ``theta`` (n_samples, n_parameters): the multipliers, NaN in rows without any mode and in rows that have
               stalled;
-            - ``std`` (n_samples, n_parameters): their posterior standard deviations by Laplace's approximation;
+            - ``std`` (n_samples, n_parameters): their posterior standard deviations, as `transform` gives them;
             - ``residuals`` (n_samples, n_modes): ln f measured minus ln f of the model at theta, NaN where a mode is
               missing;
             - ``weight`` (n_samples,): mean precision of the parameters as a share of what all modes would give, 1 in

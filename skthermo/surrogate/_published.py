@@ -221,7 +221,7 @@ def paper_chain(
     Notes
     -----
     Its detector is ``MahalanobisDetector(threshold="quantile")``. Each network holds out a fifth of its rows, M2 of the
-    records that `fit` is given. Networks learn logarithms of frequencies and parameters, so that predictions are
+    records that ``fit`` is given. Networks learn logarithms of frequencies and parameters, so that predictions are
     positive; in the paper, the values themselves. ``set_params(reduce="auto")`` solves a reduced model, which takes a
     fraction of the time where the FE model is large.
 

@@ -28,7 +28,7 @@ from skthermo._core.arrays import (
     robust_deviation,
     spread_evenly,
 )
-from skthermo._core.estimators import _safe_indexing, last_step
+from skthermo._core.estimators import _safe_indexing, fit_checked, last_step
 from skthermo._core.frames import Table, check_same_rows, column_names, row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
@@ -38,7 +38,6 @@ from skthermo.preprocessing import BlockedKFold
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import unseen_weather
-from skthermo.surrogate._regression import fit_checked
 from skthermo.surrogate._thermal import Discrepancy, ThermalModel, Weather, ratio_regressor
 
 N_FOLDS = 5  # of records out of fold

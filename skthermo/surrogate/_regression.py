@@ -27,7 +27,6 @@ from skthermo._core.estimators import (
     check_is_fitted,
     check_takes_weights,
     fit_outputs,
-    fit_weighted,
     predict_with_std,
     seed_parts,
     seeded,
@@ -218,7 +217,7 @@ class MultiplierRegressor(TableRegressor):
             means, deviations = predict_with_std(self.regressor_, standardised)
             if deviations is None:
                 raise ValueError(
-                    f"{self.regressor_!r} gives no standard deviations; expected a regressor whose predict takes "
+                    f"{type(self.regressor_).__name__} gives no standard deviations; expected one whose predict takes "
                     "return_std, such as GaussianProcessRegressor or BayesianRidge"
                 )
             std[complete] = deviations * self.targets_.scale_
@@ -460,10 +459,3 @@ class TemperatureMapper(MultiplierRegressor):
     def _inputs(self, X: ArrayLike) -> Array:
         T = super()._inputs(X)
         return T if self.means_ is None else as_floats(self.means_.transform(frame_like(X, T)))
-
-
-def fit_checked(regressor: BaseEstimator, X: Table, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
-    """Fit a regressor to records that were checked before: a `TemperatureMapper` does not check them again."""
-    if isinstance(regressor, TemperatureMapper):
-        return regressor._fit_checked(X, y, sample_weight)
-    return fit_weighted(regressor, X, y, sample_weight)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import BaseEstimator
 
 from skthermo._core.arrays import (
     Array,
@@ -36,7 +36,7 @@ from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem.damage import LossKind
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import TrainingRange, unpredicted_findings
-from skthermo.surrogate._regression import TemperatureMapper, default_lines, fit_checked
+from skthermo.surrogate._regression import TemperatureMapper, default_lines
 from skthermo.surrogate._simulator import Simulator
 
 
@@ -105,9 +105,7 @@ class Discrepancy:
                 continue
             values, own = ratios[np.ix_(rows, modes)], None if weights is None else weights[rows]
             values = values[:, 0] if len(modes) == 1 else values
-            is_ours = isinstance(regressor, TemperatureMapper)
-            known = (clone(regressor), inputs[rows], values, own)
-            learned.append(LearnedRatios(modes, fit_checked(*known) if is_ours else fit_outputs(*known)))
+            learned.append(LearnedRatios(modes, fit_outputs(regressor, inputs[rows], values, own)))
         return cls(regressor, tuple(learned), limits, n_modes, sensors, mapper)
 
     def __call__(self, X: Table) -> Array:

@@ -269,13 +269,12 @@ def test_what_does_not_go_together_is_named(examples, table, kind):
 @pytest.mark.parametrize(
     "column",
     [
-        pd.array([True] * 120, dtype="boolean"),
         pd.array(["1.0"] * 120, dtype="string"),
         np.array([b"1"] * 120, dtype=object),
         pd.date_range("2020", periods=120, tz="UTC"),
         pd.Categorical([1.0] * 120),
     ],
-    ids=["booleans", "text", "bytes", "times", "categories"],
+    ids=["text", "bytes", "times", "categories"],
 )
 def test_columns_that_are_no_numbers_are_named(examples, column, request):
     calls = examples.with_a_column(column)

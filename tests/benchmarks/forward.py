@@ -14,6 +14,7 @@ Detectors, of single records and by day:
 - directions, softening, Mahalanobis: `CompensatedDetector` with the directions of a model, with "softening", with the
   Mahalanobis distance (an earlier version has pipelines behind `TemperatureCompensator` in their place)
 - one regime: the first of these that there is, with ``regimes=None``
+- stiffness alone: directions of losses of stiffness, as the damage here is, and as the directions of version 0.2 are
 - ridge with lags: ridge regression on squares of temperatures of now, of six hours and of one, three and twelve days
   ago, out of fold by weeks; by day, the median of a day; Mahalanobis distance
 - 20 neighbours, raw: of frequencies; by day, of medians of a day
@@ -140,6 +141,9 @@ class RawByDay:
 def detectors(model, targets, window):
     best = DirectionalDetector() if model is None else DirectionalDetector(model)
     found = {} if model is None else {"directions": compensated(targets, best, window=window)}
+    if hasattr(model, "group_mass"):
+        alone = DirectionalDetector(model.damage_directions(kind="stiffness"))
+        found["stiffness alone"] = compensated(targets, alone, window=window)
     found |= {
         "softening": compensated(targets, DirectionalDetector(), window=window),
         "Mahalanobis": compensated(targets, window=window),
@@ -239,8 +243,8 @@ def main():
         shown(f"{part}: percent of records in alarm", table, 1)
         last = table.xs(table.index.get_level_values("window")[-1], level="window").drop(columns="regime")
         means = last.groupby("detector", sort=False).mean()
-        if "directions" not in means.index:  # no model: the default
-            means.loc["directions"] = means.loc["softening"]
+        for missing in {"directions", "stiffness alone"} - {*means.index}:  # no model: the default
+            means.loc[missing] = means.loc["softening"]
         for name, row in means.iterrows():
             by_detector[name].append(row)
     overall = pd.DataFrame({name: pd.DataFrame(rows).mean() for name, rows in by_detector.items()}).T

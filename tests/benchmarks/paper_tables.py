@@ -10,8 +10,6 @@ are not tried. ``lines`` runs the code on the method page as it stands there; ``
 model beside the full one.
 """
 
-import re
-import textwrap
 import time
 
 import numpy as np
@@ -139,10 +137,8 @@ def appendix_part():
 
 def lines_part(seeds):
     """Seconds and results of the code on the method page, for the truss and for KW51."""
-    page = (EXAMPLES.parent / "docs" / "guide" / "method.rst").read_text()
-    section = page[page.index(".. _the-papers-chain:") :]
-    blocks = re.findall(r"\.\. code-block:: py(?:thon)?\n\n((?:    .*\n|\n)+)", section)
-    of_truss, of_kw51 = (textwrap.dedent(block) for block in blocks[:2])
+    recipes = EXAMPLES.parent / "docs" / "guide" / "recipes"
+    of_truss, of_kw51 = ((recipes / f"paper_chain_{name}.py").read_text() for name in ("truss", "kw51"))
     rows = {}
     for name, code, numbers in (("truss", of_truss, range(4)), ("KW51", of_kw51, seeds)):
         for seed in numbers:

@@ -84,6 +84,7 @@ PARTS = {
     "record-checks": Part("record_checks.py", **Z24),
     "record-defects": Part("record_defects.py"),
     "study-bands": Part("study_bands.py"),
+    "study-rates": Part("study_rates.py", "--structures truss --repeats 1"),
     "explained-damage": Part("explained_damage.py"),
     "explained-kw51": Part("explained_damage.py --structures KW51 --designs frequencies shapes"),
     "located-damage": Part("located_damage.py"),
@@ -105,6 +106,7 @@ PARTS = {
     "speed-records": timing(
         "speed.py --rows mahalanobis forest chain-records --against 43ba4fa4", "--quick --rounds 1"
     ),
+    "speed-year": timing("speed.py --rows detector-year mapper-year chain-year --against 43ba4fa4"),
     "scaling": timing(
         "scaling.py --rounds 1 --most-samples 100000 --most-full 100 --figure docs/images/scaling.png",
         "--most-samples 100 --most-full 100 --sizes 2 --rounds 1",

@@ -196,6 +196,37 @@ def hourly_chain(clock, quick, n_rows=100_000):
         DataInformedFEM(make_truss(), random_state=0).fit(T, F)
 
 
+def hourly_years(quick):
+    """Two years of hourly records of the truss, a twentieth of the frequencies missing, and rows of the first."""
+    n_rows = 1460 if quick else 8760
+    campaign = make_truss_campaign(2, samples_per_year=n_rows, samples_per_day=24, random_state=0)
+    F = campaign.frequencies
+    return campaign.temperatures, F.mask(np.random.default_rng(0).random(F.shape) < 0.05), slice(None, n_rows)
+
+
+def hourly_detector(clock, quick):
+    """Detector by day: a year of hourly records learned, and another one evaluated."""
+    T, F, year = hourly_years(quick)
+    detector, records = compensated(F, window="1D"), T.join(F)
+    with clock.work():
+        detector.fit(records[year])
+        detector.predict(records[year.stop :])
+
+
+def hourly_mapper(clock, quick):
+    """TemperatureMapper: a year of hourly records learned, and another one predicted."""
+    T, F, year = hourly_years(quick)
+    with clock.work():
+        TemperatureMapper().fit(T[year], F[year]).predict(T[year.stop :])
+
+
+def hourly_chain_year(clock, quick):
+    """Chain of the truss: a year of hourly records learned, and another one predicted."""
+    T, F, year = hourly_years(quick)
+    with clock.work():
+        DataInformedFEM(make_truss(), random_state=0).fit(T[year], F[year]).predict(T[year.stop :])
+
+
 def drawn_models(clock, quick):
     """Two models drawn from the calibration of KW51."""
     model = make_kw51().reduced(BOUNDS, random_state=0)
@@ -347,6 +378,11 @@ GROUPS = {
         "two-files": page_of_two_files,
     },
     "Many records": {"mahalanobis": mahalanobis, "forest": forest, "chain-records": hourly_chain},
+    "Years of hourly records": {
+        "detector-year": hourly_detector,
+        "mapper-year": hourly_mapper,
+        "chain-year": hourly_chain_year,
+    },
     "Chains and studies": {
         "truss-chain": truss_chain,
         "intervals": intervals,

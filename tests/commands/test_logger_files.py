@@ -261,6 +261,8 @@ UNDERSTOOD = {
     "names again": lambda: log(repeated(rows(), 20, 50)),
     "names and units again": lambda: log([*rows()[:1], ["", "degC", "Hz", ""], *rows()[1:9], rows()[0],
                                           ["", "degC", "Hz", ""], *rows()[9:]]),
+    "names in another order within": lambda: log([
+        *rows()[:30], ["time", "f1", "s1", "T1"], *([row[0], row[2], row[3], row[1]] for row in rows()[30:])]),
     "names again as the last line": lambda: log([*rows(), rows()[0]]),
     "a last line that is cut off": lambda: Log({"log.csv": log(rows()).files["log.csv"] + b"2026-02-04 0"}, RECORDS),
     "date and time in two columns": lambda: log(rows(RECORDS, "%d.%m.%Y", "%H:%M:%S"), ";"),
@@ -327,7 +329,6 @@ REFUSED = {
         lambda: log([*STATE[:30], [*STATE[30][:-1], '"OK'], *STATE[31:]]), "line 81"),
     "a quote that does not close, among quotes": (
         lambda: log([*quoted(STATE[:30]), [*STATE[30][:-1], '"OK'], *quoted(STATE[31:])]), "line 32"),
-    "other names within": (lambda: log([*rows()[:30], ["time", "f1", "T1", "s1"], *rows()[30:]]), "line 31"),
     "two columns like serial dates": (
         lambda: log(with_column(rows(DAILY, serial), "n", COUNTS, 0)), ""),
     "an empty workbook": (lambda: workbook([]), ""),

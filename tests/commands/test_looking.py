@@ -10,7 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from skthermo.preprocessing import read_records
-from skthermo.preprocessing.loggers.logger_files import DAYS, CsvFormat, look_at, read_file
+from skthermo.preprocessing.loggers.logger_files import CsvFormat, look_at, read_file
+from skthermo.preprocessing.loggers.stamps import DAYS
 from tests.commands.folders import run
 from tests.nights import by_day
 
@@ -52,7 +53,7 @@ def test_every_form_is_found(
     found = look_at(file)
     pd.testing.assert_frame_equal(found.records, RECORDS, check_exact=True, check_freq=False, check_index_type=False)
     assert found.ignored == {"state": "it holds text"}
-    assert found.units == {"T air [°C]": "°C", "f1 (Hz)": "Hz"}
+    assert {name: unit.name for name, unit in found.units.items()} == {"T air [°C]": "°C", "f1 (Hz)": "Hz"}
     again = read_file(file, found.form, ignore=found.ignored)
     pd.testing.assert_frame_equal(again, found.records, check_exact=True)
 
@@ -177,3 +178,37 @@ def test_columns_find_their_roles_and_units(tmp_path):
     baseline = load_monitor(tmp_path / "b" / "monitor.joblib").baseline_
     np.testing.assert_allclose(baseline[["steel [K]", "T_soil [degF]"]], np.column_stack([air, air]), atol=1e-9)
     assert run("init", tmp_path / "all.csv", "--into", tmp_path / "c", "--responses", "f9").code == 3
+
+
+@pytest.mark.usefixtures("one_detector")
+def test_a_hanger_that_loses_force_is_found_beside_its_measured_tension(tmp_path):
+    random, hours = np.random.default_rng(3), pd.date_range("2025-01-01", periods=395 * 24, freq="h")
+    n = np.arange(len(hours))
+    air = 10 - 9 * np.cos(2 * np.pi * n / 8766) + 5 * np.sin(2 * np.pi * n / 24) + random.normal(0, 0.5, len(n))
+    deck = pd.Series(air).ewm(halflife=5).mean().to_numpy()
+    tension = (
+        100 * (1 - 0.0006 * deck) + 3 * pd.Series(random.normal(0, 0.3, len(n))).ewm(halflife=12).mean().to_numpy()
+    )
+    tension[hours >= "2026-01-10"] *= 0.99  # the loss
+    table = pd.DataFrame({"T1": air, "T2": deck, "tension": tension}, hours)
+    table["f1"] = 4 * np.sqrt(tension / 100) + random.normal(0, 0.006, len(n))
+    table["f2"] = 7 * (1 - 0.0005 * deck) + random.normal(0, 0.012, len(n))
+    table[:"2025-12"].to_csv(tmp_path / "log.csv", index_label="time")
+    table["2026":].to_csv(tmp_path / "new.csv", index_label="time")
+    done = run("init", tmp_path / "log.csv", "--into", tmp_path / "b")
+    assert "'tension'" in done.out
+    assert run("fit", tmp_path / "b").code == 0
+    said = run("update", tmp_path / "b", tmp_path / "new.csv", "--now", "2026-02-01", "--json").json["bridges"][0]
+    damage = [event for event in said["status"]["events"] if event["kind"] == "damage"]
+    assert len(damage) == 1
+    assert pd.Timestamp("2026-01-10") <= pd.Timestamp(damage[0]["since"]) < pd.Timestamp("2026-01-11")
+
+
+def test_outages_of_days_are_named(tmp_path):
+    hours = pd.date_range("2025-03-01", periods=60 * 24, freq="h")
+    air = 10 + np.random.default_rng(0).normal(0, 3, len(hours))
+    table = pd.DataFrame({"T1": air, "f1": 4 - 0.01 * air}, hours).drop(hours[400:496])
+    table.to_csv(tmp_path / "log.csv", index_label="time")
+    lines = [line for line in run("check", tmp_path / "log.csv").out.splitlines() if line.startswith("outages")]
+    assert len(lines) == 1
+    assert f"{hours[399]} to {hours[496]}" in lines[0]

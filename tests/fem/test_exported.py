@@ -146,3 +146,23 @@ def test_the_building_frame():
     assert set(model.parameter_names) == {f"E_{i}" for i in range(1, 13)} | {"Influence_Link", "Influence_Rebar"}
     expected = [2.28649, 5.98051, 16.22121, 17.72160, 20.53380, 22.12960]
     np.testing.assert_allclose(model.frequencies(np.ones((1, 14)))[0], expected, rtol=3e-6)
+
+
+@pytest.mark.parametrize("form", ["dense", "sparse"])
+def test_rows_held_by_ones_are_no_modes(form, tmp_path):
+    held = np.zeros(N + 2)
+    held[[0, -1]] = 1.0
+    shown = scipy.sparse.csc_array if form == "sparse" else np.asarray
+
+    def with_supports(matrix, ones):
+        whole = np.diag(ones * held)
+        whole[1:-1, 1:-1] = matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
+        return shown(whole)
+
+    (first, term), *others = TERMS.items()
+    stiffness = {first: with_supports(term, 1.0)} | {name: with_supports(one, 0.0) for name, one in others}
+    scipy.io.savemat(tmp_path / "frame.mat", stiffness | {"M0": with_supports(M, 1.0)})
+    with pytest.warns(UserWarning, match="ones on the diagonals"):
+        model = load_affine(tmp_path / "frame.mat", n_modes=4)
+    free = AffineModel({(name,): one for name, one in TERMS.items()}, M, n_modes=4)
+    np.testing.assert_allclose(model.frequencies(THETA), free.frequencies(THETA), rtol=1e-9)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skthermo.fem import Beam, Structure
+from skthermo.fem import AffineModel, Beam, Structure
 
 MESHES = [((1.0, 0.0, 0.0), 500), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
 
@@ -32,3 +32,13 @@ def test_a_mechanism_is_one_in_every_mesh(direction, finest):
                 cantilever(n_beams, ends, direction=direction)
     with pytest.raises(ValueError, match="the structure is a mechanism"):
         cantilever(finest, {0: "xyz", finest: "xyz"}, direction=direction)
+
+
+@pytest.mark.parametrize("n_springs", [5, 300])
+def test_constraints_by_multipliers_are_no_mechanism(n_springs):
+    springs = 2 * np.eye(n_springs + 1) - np.eye(n_springs + 1, k=1) - np.eye(n_springs + 1, k=-1)
+    springs[-1], springs[:, -1] = 0.0, 0.0
+    springs[-1, 2] = springs[2, -1] = 1.0  # the third mass does not move
+    with pytest.raises(ValueError, match=f"Lagrange.*|degree of freedom {n_springs}") as refused:
+        AffineModel({"k": springs}, np.diag([*np.ones(n_springs), 0.0]))
+    assert "mechanism" not in str(refused.value)

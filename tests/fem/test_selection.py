@@ -1,6 +1,7 @@
 """Models of other modes and of fewer parameters; matching with measured modes."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -115,3 +116,14 @@ class TestMatching:
         table = match_modes(TRUSS, records)
         assert table.index.tolist() == ["a", "2"]
         np.testing.assert_allclose(table["measured"], [7.5, 27.5])
+
+
+@pytest.mark.parametrize(("second", "are_as_good"), [(410.0, True), (900.0, False)])
+def test_pairings_that_are_as_good_are_named(second, are_as_good):
+    model = AffineModel({"k": np.diag([400.0, second, 5000.0])}, np.eye(3))
+    measured = np.sqrt([400.0, second]) / (2 * np.pi) * [1.002, 0.998]
+    with warnings.catch_warnings(record=True) as given:
+        warnings.simplefilter("always")
+        assert match_modes(model, measured)["mode"].tolist() == [0, 1]
+        match_modes(model, measured, shapes=np.eye(3)[:, :2], dofs=[0, 1, 2])  # shapes decide
+    assert [one.message.kind for one in given] == ["mode-order"] * are_as_good

@@ -58,3 +58,20 @@ def assert_same_in_batches(records, cuts):
     assert whole.days_["n_records"].sum() == len(records) - N_BASELINE
     assert (whole.days_.index == parts.days_.index).all()
     assert whole.status(now=records.index[-1]).state == whole.status(whole.last_).state
+
+
+@pytest.mark.parametrize(
+    "start", ["1970-01-01", "1980-01-06", "2000-01-01", "2099-12-31", "1024 weeks later", "the beginning of a year"]
+)
+def test_records_of_a_wrong_clock_are_set_aside_in_fit(start):
+    records = campaign()[:N_BASELINE]
+    stamps = records.index.to_numpy().copy()
+    begin = {"1024 weeks later": stamps[500] + pd.Timedelta(weeks=1024), "the beginning of a year": "2024-06-01"}
+    stamps[500:520] = pd.date_range(begin.get(start, start), periods=20, freq="6h")
+    with pytest.warns(UserWarning, match="wrong-stamps"):
+        monitor = Monitor(targets=MODES, random_state=0).fit(records.set_axis(stamps))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        expected = Monitor(targets=MODES, random_state=0).fit(records.drop(records.index[500:520]))
+    assert monitor.last_ == records.index[-1]
+    assert monitor.threshold_ == expected.threshold_

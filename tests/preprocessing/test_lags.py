@@ -161,3 +161,21 @@ def test_a_batch_without_its_past_says_so():
         assert lags.transform(day)["T1_lag6"].isna().all()
     assert lags.transform(T[18:])["T1_lag6"].notna().sum() == 6  # given the 6 hours before
     lags.transform(training[6:])  # rows of fit, whose gaps are its own
+
+
+@pytest.mark.parametrize(
+    ("index", "freq"),
+    [
+        (pd.date_range("2025-01-01", periods=400, tz="Europe/Berlin"), None),  # days of 23 and 25 hours
+        (pd.date_range("2025-01-01 07:00", periods=400, tz="America/New_York"), "1D"),
+        (pd.date_range("2025-01-01", periods=40, freq="MS"), None),
+        (pd.date_range("2025-01-31", periods=40, freq="ME"), None),
+        (pd.date_range("2025-01-01", periods=40, freq="MS", tz="Europe/Berlin"), "MS"),
+        (pd.date_range("2025-01-01", periods=40, freq="QS"), "QS"),
+    ],
+)
+def test_lags_step_as_the_calendar_does(index, freq):
+    table = pd.DataFrame({"T1": np.arange(len(index), dtype=float)}, index)
+    lagged = LagFeatures([0, 1, 3], freq=freq, padding="nan").fit(table[:20]).transform(table)
+    expected = pd.concat([table.shift(lag) for lag in (0, 1, 3)], axis=1)
+    np.testing.assert_array_equal(lagged, expected)

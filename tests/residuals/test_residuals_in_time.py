@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
+from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.numbers import independent_records
 from skthermo.residuals.regimes import change_of_scatter
 from skthermo.residuals.windows import WindowMeans
@@ -24,12 +25,42 @@ def test_independent_records_are_the_variance_over_that_of_the_mean(correlation)
     assert np.median(counts) == pytest.approx(n * (1 - correlation) / (1 + correlation), rel=0.3)
 
 
+def test_columns_together_tell_how_few_records_that_remember_for_long_are_worth():
+    counts = [independent_records(autoregressive(60, 0.95, seed, 6)) for seed in range(30)]
+    assert np.median(counts) < 8  # the mean of the records scatters as that of 1.5
+    rows = autoregressive(600, 0.5, n_columns=3)
+    assert independent_records(rows * [1.0, 1e3, 1e-3]) == pytest.approx(independent_records(rows))
+
+
 def test_numbers_of_independent_records_have_bounds():
     drift = np.cumsum(np.random.default_rng(0).normal(size=500))
     assert 1 <= independent_records(drift) < 15
     assert independent_records(np.append(drift, np.nan)) == independent_records(drift)
     assert independent_records(np.arange(5.0)) == 5
     assert independent_records(np.array([])) == 1
+
+
+@pytest.mark.parametrize("share", [0.2, 0.7])
+def test_drawn_noise_has_the_slow_part_of_the_residuals_however_small(share):
+    """Means over a week and a month scatter as those of the law: independent records, and a memory of 20 days."""
+    weather = autoregressive(2920, 0.97, 9)
+    slow, fast = np.exp(-1 / 160), 1 - share**2
+
+    def monthly(values):
+        table = pd.DataFrame(values)
+        return [np.sqrt(table.rolling(length).mean().var().mean()) for length in (56, 240)]
+
+    def residuals(seed):
+        lasting = autoregressive(2920, slow, seed)
+        return 0.003 * (np.sqrt(fast) * autoregressive(2920, 0.0, seed + 50, 4) + share * lasting)
+
+    ratios = []
+    for seed in range(4):
+        own = residuals(seed)
+        learned = BaselineResiduals(weather, own, own, np.arange(2920) // 56 % 5)
+        drawn = [monthly(learned.draw(weather, np.random.RandomState(number))) for number in range(3)]
+        ratios.append(np.mean(drawn, axis=0) / monthly(own))
+    np.testing.assert_allclose(np.mean(ratios, axis=0), 1, atol=0.25)
 
 
 def means(values, window, regime=None, share=0.5, index=None):

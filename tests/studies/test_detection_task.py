@@ -237,8 +237,7 @@ def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*(other-weather|not-evaluated|trend)")
         search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
-    with pytest.warns(UserWarning, match="search-refits"):
-        best = task.refit(search)
+    best = task.refit(search)
     expected = with_memory("7D").fit(SIDE_BY_SIDE)
     assert best.threshold_ == expected.threshold_ != search.best_estimator_.threshold_
 

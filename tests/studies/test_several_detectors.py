@@ -6,13 +6,13 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import BaseEstimator, OutlierMixin
+from sklearn.base import BaseEstimator, OutlierMixin, clone
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
 
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector
 from skthermo.exceptions import RecordsWarning
-from skthermo.studies import Scenario
+from skthermo.studies import DetectabilityStudy, Scenario
 from tests.studies.studies import SIDE_BY_SIDE, WEATHER, compensated, study_of
 
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
@@ -222,3 +222,13 @@ def test_one_warning_of_each_kind_and_those_of_other_packages_pass(fem):
     assert study.warnings_ == [str(evaluated.message)]
     assert {str(one.message) for one in given[ConvergenceWarning]} == {"no convergence in 7 steps"}
     assert sum(map(len, given.values())) == len(caught)
+
+
+def test_parameters_of_detectors_by_name_are_reached(fem):
+    study = DetectabilityStudy(fem, {"a": MahalanobisDetector(), "b": MahalanobisDetector()}, [{}])
+    study.set_params(detectors__a__contamination=0.1, n_repeats=3)
+    assert [study.detectors[name].contamination for name in "ab"] == [0.1, MahalanobisDetector().contamination]
+    assert (study.get_params()["detectors__a__contamination"], study.n_repeats) == (0.1, 3)
+    assert clone(study).detectors["a"].contamination == 0.1
+    with pytest.raises(ValueError, match="'c'"):
+        study.set_params(detectors__c__contamination=0.1)

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from scipy.stats import multivariate_normal
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.fem import AffineModel, CallableModel, linearise
+from skthermo.fem import AffineModel, Beam, CallableModel, Structure, linearise
 from skthermo.metrics import mape
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse
 from tests.surrogate.chains import TRUSS, F, T
@@ -157,6 +157,29 @@ def test_what_records_teach_is_likelier_than_what_they_were_drawn_from(common, o
     np.testing.assert_allclose(fitted.prior_.common, common, atol=0.006)
     np.testing.assert_allclose(fitted.prior_.covariance @ fitted.prior_.precision, np.eye(4), atol=1e-6)
     np.testing.assert_allclose(np.diag(fitted.prior_.covariance), fitted.prior_.deviations**2)
+
+
+def three_spans():
+    """A beam whose spans are of three materials."""
+    groups = {"first": range(8), "second": range(8, 19), "third": range(19, 30)}
+    section = {"E": 34e9, "G": 14e9, "A": 3.0, "I_yy": 0.8, "I_zz": 8.0, "J": 1.0, "density": 2500.0}
+    members = {i: Beam(2.0 * i, 2.0 * (i + 1), **section) for i in range(30)}
+    supports = {2.0 * i: "x y z rx rz" if i in (0, 8, 19, 30) else "x y rx rz" for i in range(31)}
+    structure = Structure({x: (x, 0.0, 0.0) for x in supports}, members, supports, groups)
+    return structure.assemble(list(groups), n_modes=5)
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.01])
+def test_intervals_hold_where_each_parameter_follows_temperature_at_its_own_rate(noise):
+    model, held = three_spans(), []
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        weather = 12 * np.sin(2 * np.pi * np.arange(300) / 365) + 3 * random.standard_normal(300)
+        theta = 1 + np.outer(weather, [-0.004, -0.002, -0.006])
+        measured = model.frequencies(theta) * (1 + noise * random.standard_normal((300, 5)))
+        found, std = PosteriorInverse(model).fit(measured).transform(measured, return_std=True)
+        held.append((np.abs(found - theta) < 1.645 * std).mean(axis=0))
+    assert (np.mean(held, axis=0) > 0.8).all()
 
 
 def test_a_parameter_that_freezes_is_followed():

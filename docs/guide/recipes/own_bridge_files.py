@@ -62,8 +62,8 @@ h = np.arange(len(hours))
 fronts = 12 * pd.Series(random.normal(0, 1, len(h))).ewm(halflife=36).mean().to_numpy()
 air = 10 - 11 * np.cos(2 * np.pi * (h / 24 + 44) / 365) + 4 * np.sin(2 * np.pi * (h - 9) / 24) + fronts
 deck = 1 + pd.Series(air).ewm(halflife=5).mean().to_numpy()
-T = pd.DataFrame({"air": air, "deck": deck}, hours.rename("time")).round(1)
-T.loc["2023-07-10":"2023-07-12", "deck"] = -999  # a sensor fails
+T = pd.DataFrame({"T_air": air, "T_deck": deck}, hours.rename("time")).round(1)
+T.loc["2023-07-10":"2023-07-12", "T_deck"] = -999  # a sensor fails
 core = pd.Series(air).ewm(halflife=10).mean().to_numpy()  # not measured
 theta = 1 - np.column_stack([0.003 * (core - 10), 0.0035 * (core - 10), 0.01 * (air - 10), 0 * air])
 bridge = AffineModel({(name,): matrix for name, matrix in terms.items()}, M, n_modes=5)

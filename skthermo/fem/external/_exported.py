@@ -194,6 +194,8 @@ def load_affine(
     matrices, dofs = read_named_matrices(file, _used(keys, mass, total))
     try:
         pairs, mass_matrix, doubts = _roles(Exports(matrices), keys, mass, total, factor)
+        mass_matrix, of_supports = _without_mass_of_held_rows(pairs, mass_matrix)
+        doubts += of_supports
         model = AffineModel(
             pairs, mass_matrix, n_modes=n_modes, parameter_names=parameter_names, groups=groups, track=track, dofs=dofs
         )
@@ -201,6 +203,28 @@ def load_affine(
         raise ValueError(f"{file}: {error}") from error
     warn_each(doubtful_matrices([f"{file}: {doubt}" for doubt in doubts]))
     return model
+
+
+def _without_mass_of_held_rows(pairs: TermPairs, mass: Matrix) -> tuple[Matrix, list[str]]:
+    """The mass without the ones of rows that programs hold by ones on the diagonals of stiffness and mass, and a
+    sentence about them: each would be a mode of 1 rad/s that no parameter moves."""
+    matrices = [scipy.sparse.csc_array(matrix) for matrix in (mass, *(matrix for _, matrix in pairs))]
+    is_alone = np.ones(mass.shape[0], dtype=bool)
+    for matrix in matrices:
+        coupling = scipy.sparse.coo_array(matrix)
+        is_alone[coupling.col[(coupling.row != coupling.col) & (coupling.data != 0)]] = False
+    diagonals = np.array([matrix.diagonal() for matrix in matrices])
+    is_held = is_alone & (diagonals[0] == 1) & np.isin(diagonals, (0.0, 1.0)).all(axis=0) & diagonals[1:].any(axis=0)
+    held = np.flatnonzero(is_held)
+    if not len(held) or is_alone.all():
+        return mass, []
+    ones = scipy.sparse.diags_array(is_held.astype(float), format="csc")
+    more = f" and {len(held) - 5} more" if len(held) > 5 else ""
+    text = (
+        f"rows {held[:5].tolist()}{more} hold ones on the diagonals of stiffness and mass alone, as supports do: their "
+        "mass is left out. Export without these rows if they are free"
+    )
+    return matrices[0] - ones if scipy.sparse.issparse(mass) else mass - ones.toarray(), [text]
 
 
 def _used(keys: Collection[str] | None, mass: str | None, total: Total) -> Callable[[str], bool]:

@@ -20,6 +20,8 @@ from skthermo._core.arrays import (
     shape_array,
     without_mask,
 )
+from skthermo._core.warnings import warn_each
+from skthermo.exceptions import RecordsWarning
 from skthermo.fem._protocol import FEModel
 from skthermo.fem._terms import AffineTerms
 
@@ -309,6 +311,11 @@ def match_modes(
         If a mode was never measured or a frequency is not positive, there are more measured modes than the model has,
         or just one of ``shapes`` and ``dofs`` is given.
 
+    Warns
+    -----
+    UserWarning
+        If, without shapes, another pairing is as good.
+
     Notes
     -----
     Modes are paired one to one so that the sum of squared differences of ln f is smallest. With shapes, the sum of
@@ -365,10 +372,31 @@ def match_modes(
         cost += 1 - macs
     ranks: NDArray[np.intp] = linear_sum_assignment(cost)[1]
     table = pd.DataFrame({"mode": ranks, "measured": measured, "model": candidates[ranks]}, index=names)
+    if macs is None and (others := _other_pairing(cost, ranks)) is not None:
+        changed = ", ".join(f"{names[i]!r} mode {others[i]}" for i in np.flatnonzero(others != ranks))
+        text = (
+            f"another pairing of modes is as good, by frequencies alone: {changed}. Both may be right. Give the "
+            "measured shapes and dofs, or compare the shapes"
+        )
+        warn_each([RecordsWarning(text, "mode-order")])
     table["offset"] = 100 * (table["model"] / table["measured"] - 1)
     if macs is not None:
         table["mac"] = macs[np.arange(len(ranks)), ranks]
     return table
+
+
+def _other_pairing(cost: Array, ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
+    """The next best pairing, if it is as good: if its sum of squares is less than .05 more, as where two modes and
+    their candidates are about 2 % apart each."""
+    rivals = []
+    for row, rank in enumerate(ranks):
+        without = cost.copy()
+        without[row, rank] = 1e6
+        other: NDArray[np.intp] = linear_sum_assignment(without)[1]
+        if other[row] != rank:
+            rivals.append((float(cost[np.arange(len(ranks)), other].sum()), other.tolist()))
+    least, nearest = min(rivals, default=(np.inf, []))
+    return np.array(nearest) if least < float(cost[np.arange(len(ranks)), ranks].sum()) + 0.05 else None
 
 
 def shape_components(shapes: ArrayLike, reference: ArrayLike) -> Array:

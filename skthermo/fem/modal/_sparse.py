@@ -193,7 +193,15 @@ def check_supported(stiffness: Matrix, dofs: Sequence[Label] = ()) -> None:
     """
     diagonal = stiffness.diagonal()
     if (diagonal <= 0).any():
-        _refuse(np.flatnonzero(diagonal <= 0), dofs)
+        rows = np.flatnonzero(diagonal <= 0)
+        coupled = rows[[abs(stiffness[[row]]).sum() > abs(diagonal[row]) for row in rows]]
+        if len(coupled):
+            raise ValueError(
+                f"the stiffness has no positive diagonal at {_listed(coupled, dofs)}, which other rows are tied to, as "
+                "to Lagrange multipliers of constraints; expected a stiffness from which constraints are eliminated, "
+                "or stiff springs in their place"
+            )
+        _refuse(rows, dofs)
     scale = 1 / np.sqrt(diagonal)
     if isinstance(stiffness, np.ndarray):
         eigenvalues, vectors = np.linalg.eigh(scale[:, np.newaxis] * stiffness * scale)
@@ -254,10 +262,14 @@ def _lowest(matrix: scipy.sparse.csc_array) -> tuple[float, Array]:
     return float(eigenvalue[0]), vector[:, 0]
 
 
+def _listed(rows: NDArray[np.intp], dofs: Sequence[Label]) -> str:
+    """Some of the degrees of freedom, by label where they have one."""
+    shown = [f"node {dofs[i][0]!r} along {dofs[i][1]}" if dofs else f"degree of freedom {i}" for i in rows[:6]]
+    return ", ".join(shown) + (f" and {len(rows) - 6} more" if len(rows) > 6 else "")
+
+
 def _refuse(free: NDArray[np.intp], dofs: Sequence[Label]) -> None:
-    shown = [f"node {dofs[i][0]!r} along {dofs[i][1]}" if dofs else f"degree of freedom {i}" for i in free[:6]]
-    listed = ", ".join(shown) + (f" and {len(free) - 6} more" if len(free) > 6 else "")
     raise ValueError(
-        f"the structure is a mechanism: {listed} can move without resistance; "
+        f"the structure is a mechanism: {_listed(free, dofs)} can move without resistance; "
         "expected supports, springs or members that resist every motion (a positive definite stiffness)"
     )

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from skthermo._core.arrays import check_model
-from skthermo._core.frames import as_stamps
+from skthermo._core.frames import as_stamps, of_a_wrong_clock
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._beside_weather import look_at_both, looks_exchanged
@@ -282,6 +282,13 @@ def times_found(index: pd.Index) -> list[RecordFinding]:
         again = again[np.argsort(stamps[again], kind="stable")]
         detail = f"{len(again)} of {n_rows} rows have the time of another"
         found.append(RecordFinding.in_rows(index, "wrong-stamps", "", again, detail))
+    if len(wrong := np.flatnonzero(of_a_wrong_clock(index))):
+        detail = f"{len(wrong)} of {n_rows} rows are stamped far from the others, and count as missing"
+        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", wrong, detail))
+    years = index.year[[0, n_rows // 2, -1]] if n_rows else []
+    if n_rows and (max(years) < 1990 or min(years) > 2069):
+        detail = f"all {n_rows} rows are of {years[0]}, as of a clock that was not set"
+        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail))
     if len(late):
         detail = f"{len(late)} of {n_rows} rows are earlier than the row before, the first row {late[0]}"
         detail = f"{detail} ({period_of(index, late[:1])})"

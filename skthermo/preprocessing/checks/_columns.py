@@ -3,7 +3,6 @@ units."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -14,7 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from skthermo._core.arrays import HUGE, Array, as_floats, median, spread_evenly
-from skthermo._core.frames import MISSING_CODES, columns_by_sensor, named_frame
+from skthermo._core.frames import MISSING_CODES, columns_by_sensor, named_frame, of_a_wrong_clock
+from skthermo.preprocessing._quantities import OPEN, TEMPERATURE, kind_of
 from skthermo.preprocessing.checks._record_findings import ASIDE_REASONS, RecordFinding
 
 LOGGED = (*MISSING_CODES, 999.0, 9999.0, 99999.0, 999.9, -999.9, 9999.9, -9999.9, 999.99, 9999.99, 1e20, 1e30, -1e30)
@@ -55,6 +55,8 @@ class Reading:
         if isinstance(self.index, pd.DatetimeIndex) and not self.index.is_monotonic_increasing:
             self.order = self.order if self.index.hasnans else self.index.argsort(kind="stable")
             self.index, self.values = self.index[self.order], self.values[self.order]
+        if isinstance(self.given_index, pd.DatetimeIndex) and len(self.given_index) == n_rows:
+            self.values[of_a_wrong_clock(self.given_index)[self.order]] = np.nan
         self.before = self.values.copy()
         with np.errstate(invalid="ignore"):
             too_large = np.abs(self.values) > HUGE
@@ -93,6 +95,7 @@ class Reading:
         try:
             values, names = np.array(as_floats(table)), list(getattr(table, "columns", ()))
         except Exception as error:  # objects of users may raise anything
+            self.given = None
             return f"are a {kind} ({str(error).partition(';')[0]:.150})"
         if values.ndim in (1, 2):
             self.values = values[:, np.newaxis] if values.ndim == 1 else values
@@ -170,18 +173,14 @@ def texts_of(levels: Array) -> str:
 
 
 def are_temperatures(T: Reading) -> NDArray[np.bool_]:
-    """Which columns hold temperatures: those with such a name, and others whose values can be temperatures.
-
-    Inputs may be flags, radiation, wind or powers of temperatures too, which have no degrees.
-    """
+    """Which columns hold temperatures: those that a name says to be, and of those that stay open the ones whose values
+    can be temperatures. Inputs may be flags, radiation, wind or powers of temperatures too, which have no degrees."""
     found = np.ones(len(T.columns), dtype=bool)
     for place, (name, column) in enumerate(zip(T.columns, T.values.T, strict=True)):
-        text = str(name).strip().lower()
-        is_named = re.search(r"temp|°c|deg ?c|celsius", text) or re.fullmatch(r"t[a-z]{0,2}[-_ .]?\d*", text)
-        known = column[~np.isnan(column) & ~np.isin(column, LOGGED)]
-        if not is_named and known.size:
+        known, (kind, _) = column[~np.isnan(column) & ~np.isin(column, LOGGED)], kind_of(name)
+        if kind != TEMPERATURE and known.size:
             could_be = [((known > COLDEST + zero) & (known < HOTTEST + zero)).mean() for zero in (0.0, 273.15)]
-            found[place] = max(could_be) > 0.8 and not np.isin(known, (0.0, 1.0)).all()
+            found[place] = kind == OPEN and max(could_be) > 0.8 and not np.isin(known, (0.0, 1.0)).all()
     return found
 
 

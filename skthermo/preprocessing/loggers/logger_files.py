@@ -7,10 +7,11 @@ import csv
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress, product
+from datetime import datetime
+from itertools import product
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -18,30 +19,33 @@ import pandas as pd
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import import_optional
 from skthermo._core.frames import MISSING_CODES
+from skthermo._core.text import counted
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing._quantities import Unit, unit_called, unit_in
+from skthermo.preprocessing.loggers.stamps import (
+    EPOCHS,
+    EXCEL,
+    EXCEL_1904,
+    ISO,
+    MOST_LOOKED_AT,
+    MOSTLY,
+    UNIX,
+    UNIX_MS,
+    WITH_OFFSET,
+    ZONE_OPTIONS,
+    by_local_clock,
+    find_stamps,
+    of_the_right_clock,
+    otherwise_written,
+    parsed_or_iso,
+    stamp_text,
+    times_in,
+)
 
-ISO, UNIX, UNIX_MS, EXCEL = "ISO8601", "unix", "unix_ms", "excel"
-NUMERIC_STAMPS = {
-    UNIX: ("s", "unix", 5e8, 4e9), UNIX_MS: ("ms", "unix", 5e11, 4e12), EXCEL: ("D", "1899-12-30", 3e4, 7.5e4),
-}  # fmt: skip
-"""Stamps that are numbers: their unit, when they begin, and the least and the greatest that are taken for times."""
 PARQUET, WORKBOOKS = (".parquet", ".pq"), (".xlsx", ".xlsm")
 NO_TEXT_FILES = (*PARQUET, *WORKBOOKS)
-WITH_OFFSET = re.compile(r":\d\d(:\d\d([.,]\d+)?)? ?(Z|[+-]\d\d(:?\d\d)?)$")
 DECIMAL_SIGNS = (".", ",")
-DAYS = (
-    "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%y",
-    "%d/%m/%y", "%m/%d/%y", "%y/%m/%d", "%d-%m-%y", "%y-%m-%d", "%d-%b-%Y", "%d %b %Y", "%d-%b-%y", "%Y%m%d",
-)  # fmt: skip
-CLOCKS = (" %H:%M:%S", " %H:%M", "", " %H:%M:%S.%f", " %I:%M:%S %p", " %I:%M %p")
-WRITTEN_STAMPS = (ISO, *(day + clock for day, clock in product(DAYS, CLOCKS)))
-UNIT_NAMES = {
-    "°c": "°C", "degc": "°C", "deg c": "°C", "c": "°C", "k": "K", "kelvin": "K", "°f": "°F", "degf": "°F", "f": "°F",
-    "hz": "Hz", "mm": "mm", "m": "m", "mrad": "mrad", "rad": "rad", "°": "°", "deg": "°", "µm/m": "µm/m", "%": "%",
-}  # fmt: skip
-MOST_LOOKED_AT = 2000  # lines, by which the form of a file is found
-MOSTLY = 0.9  # share of the cells that are numbers, from which a column holds numbers
 
 Line: TypeAlias = tuple[int, list[str]]
 """The number of a line, and its cells."""
@@ -68,7 +72,8 @@ class CsvFormat:
         Columns that hold the stamp: one, or two with the date and the time of day. By default the first column.
     stamps : str, default="ISO8601"
         Format of stamps, such as "%d.%m.%Y %H:%M". "ISO8601" is 2026-01-31 13:00, "unix" and "unix_ms" are seconds and
-        milliseconds since 1970, "excel" are serial dates of a spreadsheet, such as 46053.5417.
+        milliseconds since 1970, "labview" and "labview_ms" since 1904, "gps" seconds since 6 January 1980 with leap
+        seconds, "since_2000" seconds since 2000, "excel" are serial dates of a spreadsheet, such as 46053.5417.
     time_zone : str, optional
         Time zone of the records, such as "Europe/Brussels" or "UTC". Stamps with an offset are converted to it, stamps
         without one are of its clocks. By default stamps have no time zone.
@@ -108,7 +113,9 @@ def read_and_doubted(
     if file.suffix.lower() in PARQUET:
         table, findings = _parquet(file).drop(columns=list(ignore), errors="ignore"), []
     else:
-        table, findings = _table(file, form, ignore, leave_unfinished)
+        blocks, findings = blocks_of_records(file, form)
+        tables = [_table(block, form, ignore, leave_unfinished, findings) for block in blocks]
+        table = _one_table([part for parts in tables for part in parts], file, findings)
     return table.mask(table.isin(list(form.missing))) if len(form.missing) else table, findings
 
 
@@ -134,103 +141,249 @@ def _parquet(file: Path) -> pd.DataFrame:
     return table
 
 
+class Block(NamedTuple):
+    """Lines of a text or of a sheet: what messages call it, whether its last line is complete, and how serial dates
+    are counted there."""
+
+    where: str
+    rows: list[Line]
+    is_finished: bool = True
+    serial: str = EXCEL
+    is_sheet: bool = False
+    names_line: int | None = None
+
+
+class Section(NamedTuple):
+    """Records below a line of names, and the lines between."""
+
+    line: int
+    names: list[str]
+    below: list[list[str]]
+    records: list[Line]
+
+
 def _table(
-    file: Path, form: CsvFormat, ignore: Collection[str], leave_unfinished: bool
-) -> tuple[pd.DataFrame, list[RecordsWarning]]:
-    """Numbers to the last bit, and a finding of a last line that may be cut off; a stamp that comes again with other
-    values is an error."""
-    rows, is_finished = rows_in(file, form)
-    if leave_unfinished and not is_finished:
-        rows, is_finished = rows[:-1], True
-    names_line, names = _names(rows, form, file)
-    findings = []
-    if not is_finished:
-        rows = rows[:-1] if len(rows[-1][1]) < len(names) else rows
+    block: Block, form: CsvFormat, ignore: Collection[str], leave_unfinished: bool, findings: list[RecordsWarning]
+) -> list[pd.DataFrame]:
+    """Numbers to the last bit, a table for each line of names; findings of a last line that may be cut off and of other
+    names. A stamp that comes again with other values is an error."""
+    if leave_unfinished and not block.is_finished:
+        block = block._replace(rows=block.rows[:-1], is_finished=True)
+    sections = sections_of(block, form)
+    if not block.is_finished:
+        *_, last = sections
+        if last.records and len(last.records[-1][1]) < len(last.names):
+            last.records.pop()
         text = (
-            f"{file} does not end with a line break. Its last value may be cut off, and a last line with fewer values "
-            "than names is left out. Rename files when they are complete"
+            f"{block.where} does not end with a line break. Its last value may be cut off, and a last line with fewer "
+            "values than names is left out. Rename files when they are complete"
         )
         findings.append(RecordsWarning(text, "read-as"))
+    others = [section for section in sections[1:] if set(section.names) != set(sections[0].names)]
+    if others:
+        lines = ", ".join(f"{section.line} ({len(section.records)} records)" for section in others)
+        text = (
+            f"{block.where} has other names from line {lines} on. Records are joined by name. Check that this is meant"
+        )
+        findings.append(RecordsWarning(text, "read-as"))
+    return [_part(section, block, form, ignore) for section in sections]
+
+
+def _part(section: Section, block: Block, form: CsvFormat, ignore: Collection[str]) -> pd.DataFrame:
+    """Records below one line of names."""
+    names, where = section.names, block.where
     stamp_columns = list(form.stamp_columns) or names[:1]
     wanted = [name for name in names if name not in stamp_columns and name not in ignore]
     if len(names) < 2 or any(names.count(name) != 1 for name in [*wanted, *stamp_columns]):
         raise ValueError(
-            f"{file}, line {names_line}: names {names}; expected stamps and columns, each once, with "
+            f"{where}, line {section.line}: names {names}; expected stamps and columns, each once, with "
             f"{form.separator!r} between"
         )
-    records = _records(rows, names_line, names, [names.index(name) for name in stamp_columns], form, file)
+    records = _records(section, where)
     lines = [line for line, _ in records]
     cells = dict(zip(names, zip(*(row for _, row in records), strict=True), strict=True)) if records else {}
     texts = [" ".join(parts) for parts in zip(*(cells.get(name, ()) for name in stamp_columns), strict=True)]
-    values = {name: _numbers(cells.get(name, ()), form.decimal, f"column {name!r}", file, lines) for name in wanted}
-    table = pd.DataFrame(values, _times(texts, form, file, lines), dtype=float)
+    values = {name: _numbers(cells.get(name, ()), form.decimal, f"column {name!r}", where, lines) for name in wanted}
+    table = pd.DataFrame(values, _times(texts, form, block, lines), dtype=float)
     again = table.index.duplicated()
     if again.any() and (is_other := again & ~table.reset_index().duplicated().to_numpy()).any():
         place = int(np.argmax(is_other))
         raise ValueError(
-            f"{file}, line {lines[place]}: {table.index[place]} comes again with other values; expected each once. "
-            "If the clocks go back then, --zone of init, or [csv] time_zone, says where"
+            f"{where}, line {lines[place]}: {table.index[place]} comes again with other values; expected each once. "
+            f"If the clocks go back then, {ZONE_OPTIONS}"
         )
-    return table, findings
+    return table
 
 
-def _names(rows: Sequence[Line], form: CsvFormat, file: Path) -> tuple[int, list[str]]:
-    """Line and names of the columns."""
-    rows = [(line, row) for line, row in rows if line >= form.names_line]
+def _one_table(parts: list[pd.DataFrame], file: Path, findings: list[RecordsWarning]) -> pd.DataFrame:
+    """Parts of a file, one below the other where they share columns, else side by side by their stamps."""
+    groups: list[list[pd.DataFrame]] = []
+    for part in parts:
+        alike = [group for group in groups if any(set(part).intersection(other) for other in group)]
+        groups = [group for group in groups if not any(group is one for one in alike)]
+        groups.append([*(other for group in alike for other in group), part])
+    tables = [group[0] if len(group) == 1 else pd.concat(group) for group in groups]
+    if len(tables) < 2:
+        return tables[0]
+    tables = [once(table) for table in tables]
+    whole = pd.concat(tables, axis=1, join="inner")
+    n_stamps = len(pd.concat(table.iloc[:, :0] for table in tables).index.unique())
+    if not len(whole):
+        raise ValueError(f"{file}: the sheets or parts have no stamp in common; expected records of the same times")
+    if n_stamps > len(whole):
+        text = (
+            f"{counted(n_stamps - len(whole), 'stamp')} are not in all sheets or parts of {file}. They are left out; "
+            f"{len(whole)} records have all columns. If they are many, compare the loggers' clocks"
+        )
+        findings.append(RecordsWarning(text, "different-rows"))
+    return whole
+
+
+def once(table: pd.DataFrame) -> pd.DataFrame:
+    """Records that come twice with the same values are one; with other values they are an error."""
+    again = table.index.duplicated()
+    if not again.any():
+        return table
+    table = table[~table.reset_index().duplicated().to_numpy()]
+    again = table.index.duplicated()
+    if again.any():
+        raise ValueError(
+            f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
+            f"{table.index[again][0]}; expected each once. If the clocks go back then, {ZONE_OPTIONS}"
+        )
+    return table
+
+
+def sections_of(block: Block, form: CsvFormat) -> list[Section]:
+    """Records below each line of names: the first one, and those below that name the stamps again.
+
+    Lines of units between names and records, and those above names as at the beginning, belong to neither.
+    """
+    first = block.names_line or form.names_line
+    rows = [(line, row) for line, row in block.rows if line >= first]
     if not rows:
-        raise ValueError(f"{file} is empty; expected a line of names, then a line for each record")
-    line, names = rows[0]
-    return line, names_of(names[: used_width([row for _, row in rows], len(names))])
+        raise ValueError(f"{block.where} is empty; expected a line of names, then a line for each record")
+    titles = {row[0] for line, row in block.rows if line < first}
+    n_lines = (form.values_line or form.names_line + 1) - form.names_line
+    stamps, usual = list(form.stamp_columns) or names_of(rows[0][1][:1]), set(filter(None, rows[0][1]))
+    heads = [
+        place
+        for place, (_, row) in enumerate(rows)
+        if not place
+        or (stamps[0] and all(name in row for name in stamps))
+        or (not stamps[0] and not row[0] and 2 * len(usual.intersection(row)) > len(usual))
+    ]
+    sections: list[Section] = []
+    for head, end in zip(heads, [*heads[1:], len(rows)], strict=True):
+        line, names = rows[head]
+        below = rows[head + 1 : end]
+        while end < len(rows) and below and _is_title(below[-1][1], len(names), titles):
+            below.pop()
+        places = [names.index(name) for name in stamps if name in names]
+        least = first + n_lines if not sections and block.names_line is None else None
+        n_between = _n_above_records(below, places, form, least)
+        width = used_width([row for _, row in rows[head:end]], len(names))
+        found = Section(line, names_of(names[:width]), [row for _, row in below[:n_between]], below[n_between:])
+        if sections and found.names == sections[-1].names:
+            sections[-1].records.extend(found.records)
+        else:
+            sections.append(found)
+    return sections
 
 
-def _records(
-    rows: Sequence[Line], names_line: int, names: Sequence[str], places: Sequence[int], form: CsvFormat, file: Path
-) -> list[Line]:
-    """Lines with as many values as there are names, without comments and lines that repeat those above the first
-    record, which may come earlier than in other files."""
-    first = max(form.values_line or 0, names_line + 1)
-    heads = [(line, row) for line, row in rows if names_line < line < first and len(row) >= len(names)]
-    is_stamp = parsed_or_iso([" ".join(row[place] for place in places) for _, row in heads], form.stamps).notna()
-    first = min([first, *(line for line, _ in compress(heads, is_stamp))])
-    above = [row for line, row in rows if line < first]
-    records = [(line, without_margin(row, len(names))) for line, row in rows if line >= first and row not in above]
-    records = [(line, row) for line, row in records if len(row) == len(names) or not row[0].startswith("#")]
+def _n_above_records(below: list[Line], places: list[int], form: CsvFormat, least: int | None) -> int:
+    """How many lines below the names are no records: without a stamp, and before a line or, if none is known, without
+    numbers, as units are."""
+    for count, (line, row) in enumerate(below):
+        is_record = any(_is_number(cell, form.decimal) for cell in row) if least is None else line >= least
+        has_places = len(row) > max(places, default=0)
+        if is_record or (has_places and parsed_or_iso([stamp_text(row, places)], form.stamps).notna()[0]):
+            return count
+    return len(below)
+
+
+def _is_title(row: list[str], width: int, titles: set[str]) -> bool:
+    """Whether a line above names is no record: it begins as at the top of the file, or with a letter."""
+    return row[0] in titles or (len(row) != width and row[0][:1].isalpha())
+
+
+def _records(section: Section, where: str) -> list[Line]:
+    """Lines with as many values as there are names, without comments."""
+    width = len(section.names)
+    records = [(line, without_margin(row, width)) for line, row in section.records]
+    records = [(line, row) for line, row in records if len(row) == width or not row[0].startswith("#")]
     for line, row in records:
-        if len(row) != len(names):
-            raise ValueError(f"{file}, line {line}: values: {len(row)}; expected {len(names)} as named above")
+        if len(row) != width:
+            raise ValueError(f"{where}, line {line}: values: {len(row)}; expected {width} as named above")
         if "\n" in "".join(row):
-            raise ValueError(f"{file}, line {line}: quotes hold several lines; expected quotes that close in theirs")
+            raise ValueError(f"{where}, line {line}: quotes hold several lines; expected quotes that close in theirs")
     return records
 
 
-def rows_in(file: Path, form: CsvFormat) -> tuple[list[Line], bool]:
-    """Cells of each line that is not empty, with the number of the line, and whether the last line is complete."""
+def blocks_in(file: Path, form: CsvFormat) -> list[Block]:
+    """Cells of each line that is not empty, with the number of the line: of a text, or of each sheet."""
     if file.suffix.lower() in WORKBOOKS:
-        return _rows_of_cells(_longest_sheet(file)[0], form.decimal), True
+        sheets, serial = sheets_of(file)
+        names = {name: f"{file}, sheet {name!r}" if len(sheets) > 1 else str(file) for name in sheets}
+        rows = {name: _rows_of_cells(cells, form.decimal) for name, cells in sheets.items()}
+        return [Block(names[name], rows[name], serial=serial, is_sheet=True) for name in sheets]
     text = text_of(file, form.encoding)
     try:
         rows = rows_of(text, form.separator)
     except ValueError as error:
         raise ValueError(f"{file}, {error}") from error
-    return rows, not rows or text.endswith(("\n", "\r")) or rows[-1][0] < len(text.splitlines())
+    is_finished = not rows or text.endswith(("\n", "\r")) or rows[-1][0] < len(text.splitlines())
+    return [Block(str(file), rows, is_finished)]
 
 
-def _longest_sheet(file: Path) -> tuple[Any, list[str]]:
-    """Cells of the sheet with the most rows, as others are covers or notes; which one of several it is, in words."""
+def blocks_of_records(file: Path, form: CsvFormat) -> tuple[list[Block], list[RecordsWarning]]:
+    """Blocks that name the stamps as the longest one does, from that line on, and a finding that tells which sheets
+    these are."""
+    blocks = blocks_in(file, form)
+    if len(blocks) == 1:
+        return blocks, []
+    longest = max(blocks, key=lambda block: len(block.rows))
+    names = next((row for line, row in longest.rows if line >= form.names_line), [])
+    lines = {block.where: _line_of_names(block, form, names) for block in blocks if block is not longest}
+    found = [block._replace(names_line=lines.get(block.where)) for block in blocks if lines.get(block.where, 1)]
+    read = [block.where.rpartition("sheet ")[2] for block in found]
+    others = [block.where.rpartition("sheet ")[2] for block in blocks if not lines.get(block.where, 1)]
+    text = f"sheets of {file.name} that are read: {', '.join(read)}"
+    if others:
+        text += f"; not {', '.join(others)}, without stamps as on the longest"
+    return found, [RecordsWarning(f"{text}. Name the stamps alike on each sheet that holds records", "read-as")]
+
+
+def _line_of_names(block: Block, form: CsvFormat, names: Sequence[str]) -> int | None:
+    """The line of names of a sheet: one that names the stamps as the longest sheet does, or the one above stamps in the
+    first column; None where there is neither."""
+    stamps = list(form.stamp_columns) or names[:1]
+    if named := [line for line, row in block.rows if stamps != [""] and all(name in row for name in stamps)]:
+        return named[0]
+    is_stamp = parsed_or_iso([row[0] for _, row in block.rows], form.stamps).notna()
+    first = int(is_stamp.argmax()) if len(is_stamp) else 0
+    if form.stamp_columns or not first or 2 * is_stamp.sum() < len(is_stamp):
+        return None
+    return max(block.rows[:first], key=lambda one: sum(map(bool, one[1])))[0]
+
+
+def sheets_of(file: Path) -> tuple[dict[str, Any], str]:
+    """Cells of each sheet that is not empty, by its name, and how serial dates are counted."""
     try:
         import_optional("openpyxl", extra="excel")
         with pd.ExcelFile(file, engine="openpyxl") as book:
-            longest = max(book.sheet_names, key=lambda name: book.book[name].max_row or 0)
-            cells = pd.read_excel(book, sheet_name=longest, header=None, dtype=object, na_filter=False).to_numpy()
+            sheets = {
+                name: pd.read_excel(book, sheet_name=name, header=None, dtype=object, na_filter=False).to_numpy()
+                for name in book.sheet_names
+            }
+            serial = EXCEL_1904 if book.book.epoch.year == 1904 else EXCEL
     except OSError:
         raise
     except ImportError as error:  # as of any other file that cannot be read: it keeps no other out
         raise ValueError(f"{file}: {error}") from error
     except Exception as error:
         raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
-    n_sheets = len(book.sheet_names)
-    note = f"{file.name} has {n_sheets} sheets; the one with the most rows, {longest!r}, is read"
-    return cells, [note] * (n_sheets > 1)
+    return {name: cells for name, cells in sheets.items() if cells.size} or {"": np.empty((0, 0))}, serial
 
 
 def _rows_of_cells(cells: Any, decimal: str) -> list[Line]:
@@ -242,6 +395,8 @@ def _rows_of_cells(cells: Any, decimal: str) -> list[Line]:
 def _text_of_cell(cell: Any, decimal: str) -> str:
     if isinstance(cell, float):
         return str(cell).replace(".", decimal)
+    if isinstance(cell, datetime) and cell.microsecond:  # a formula, such as =A2+1/24, is not exact
+        cell = pd.Timestamp(cell).round("s")
     return str(cell).strip().replace("\n", "").removesuffix(" 00:00:00")
 
 
@@ -266,6 +421,9 @@ def text_of(file: Path, encoding: str | None = None) -> str:
     """The text of a file, without marks of its encoding, and without NUL bytes at its end."""
     content = file.read_bytes()
     found = ["utf-16"] if content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else ["utf-8", "cp1252"]
+    for one, others in (("utf-16-le", content[1:400:2]), ("utf-16-be", content[:400:2])):
+        if len(content) % 2 == 0 and 2 * others.count(0) > len(others):
+            found = [one]
     for one in [encoding] if encoding else found:
         try:
             text = content.decode(one).replace("\ufeff", "").rstrip("\0")
@@ -290,14 +448,14 @@ def rows_of(text: str, separator: str) -> list[Line]:
         raise ValueError(f"line {lines.line_num}: {error}; expected quotes that close") from error
 
 
-def _numbers(texts: Sequence[str], decimal: str, column: str, file: Path, lines: Sequence[int]) -> Array:
+def _numbers(texts: Sequence[str], decimal: str, column: str, where: str, lines: Sequence[int]) -> Array:
     values = np.full(len(texts), np.nan)
     for place, text in enumerate(texts):
         try:
             values[place] = number(text, decimal)
         except ValueError as error:
             expected = f"a number with the decimal sign {decimal!r}, or nothing"
-            raise ValueError(f"{file}, line {lines[place]}, {column}: {text!r:.100}; expected {expected}") from error
+            raise ValueError(f"{where}, line {lines[place]}, {column}: {text!r:.100}; expected {expected}") from error
     return values
 
 
@@ -324,18 +482,19 @@ def number(text: str, decimal: str) -> float:
     raise ValueError(text)
 
 
-def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[int]) -> pd.DatetimeIndex:
+def _times(texts: Sequence[str], form: CsvFormat, block: Block, lines: Sequence[int]) -> pd.DatetimeIndex:
     """Texts as times: in the time zone of the records; without one, in UTC if they have offsets."""
     has_offset = [WITH_OFFSET.search(text) is not None for text in texts]
     if 0 < sum(has_offset) < len(texts):
         place = has_offset.index(not has_offset[0])
         raise ValueError(
-            f"{file}, line {lines[place]}: {texts[place]!r:.100}; {sum(has_offset)} of {len(texts)} stamps have an "
-            "offset from UTC; expected all or none"
+            f"{block.where}, line {lines[place]}: {texts[place]!r:.100}; {sum(has_offset)} of {len(texts)} stamps have "
+            "an offset from UTC; expected all or none"
         )
-    index = parsed_or_iso(texts, form.stamps)
-    if file.suffix.lower() in WORKBOOKS:
-        index = _otherwise_written(texts, index, form.stamps, file)
+    stamps = block.serial if form.stamps in (EXCEL, EXCEL_1904) else form.stamps
+    index = parsed_or_iso(texts, stamps)
+    if block.is_sheet:
+        index = otherwise_written(texts, index, stamps, block.serial, block.where)
     is_wrong = np.array(index.isna())
     if is_wrong.any():
         place = int(np.argmax(is_wrong))
@@ -344,79 +503,13 @@ def _times(texts: Sequence[str], form: CsvFormat, file: Path, lines: Sequence[in
             EXCEL: "a serial date of Excel, such as 46053.5417",
         }  # fmt: skip
         raise ValueError(
-            f"{file}, line {lines[place]}: {texts[place]!r:.100} is no time; expected "
+            f"{block.where}, line {lines[place]}: {texts[place]!r:.100} is no time; expected "
             f"{stamp_texts.get(form.stamps, f'one like the format {form.stamps}')}; "
             f"{is_wrong.sum()} of {len(texts)} stamps are wrong"
         )
     if form.time_zone is None:
         return index
-    return index.tz_convert(form.time_zone) if index.tz else _by_local_clock(index, form.time_zone, file, lines)
-
-
-def parsed(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
-    """Texts as times, NaT for a text in another format; in UTC if they have offsets."""
-    if form in NUMERIC_STAMPS:
-        unit, origin, least, most = NUMERIC_STAMPS[form]
-        numbers = pd.to_numeric(pd.Series([text.replace(",", ".") for text in texts], dtype=object), errors="coerce")
-        numbers = numbers.astype(float).where(numbers.between(least, most))
-        times = pd.to_datetime(numbers, unit=unit, origin=origin, errors="coerce", utc=form != EXCEL)
-        index = pd.DatetimeIndex(times).as_unit("ns")
-        return index.round("s") if form == EXCEL else index  # a serial date is cut after some decimals
-    has_offsets = any(WITH_OFFSET.search(text) for text in texts)
-    index = pd.DatetimeIndex(pd.to_datetime(list(texts), format=form, errors="coerce", utc=has_offsets))
-    is_other = np.array([form == ISO and re.match(r"\d{4}-\d\d-\d\d", text) is None for text in texts], dtype=bool)
-    return index.where(~is_other) if is_other.any() else index
-
-
-def parsed_or_iso(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
-    """Texts as times in this format, or as in ISO 8601, which cannot be taken for another one: dates of a workbook."""
-    index = parsed(texts, form)
-    others = np.flatnonzero(index.isna())
-    if form in (ISO, *NUMERIC_STAMPS) or not len(others):
-        return index
-    times, iso = index.to_series(index=range(len(index))), parsed([texts[place] for place in others], ISO)
-    if iso.notna().any() and (iso.tz is None) == (index.tz is None):
-        times.iloc[others] = iso
-    return pd.DatetimeIndex(times)
-
-
-def _otherwise_written(texts: Sequence[str], index: pd.DatetimeIndex, form: str, file: Path) -> pd.DatetimeIndex:
-    """Stamps of a workbook, where dates, serial dates and texts mean the same: those that are none in its format read
-    by the only other one that they may have. Texts in two formats might be days and months that are exchanged."""
-    others = np.flatnonzero(index.isna())
-    rows = [[texts[place]] for place in others]
-    for forms in (WRITTEN_STAMPS if form in (ISO, EXCEL) else (), (EXCEL,)) if rows else ():
-        if fitting := _fitting(rows, (0,), forms):
-            times = index.to_series(index=range(len(index)))
-            found = _times_in(rows, (0,), _certain(rows, (0,), fitting, file)[0])
-            if (found.tz is None) == (index.tz is None):
-                times.iloc[others] = found
-            return pd.DatetimeIndex(times)
-    return index
-
-
-def _by_local_clock(index: pd.DatetimeIndex, zone: str, file: Path, lines: Sequence[int]) -> pd.DatetimeIndex:
-    """Times of local clocks, in the order of the file. Of times that come twice in a night, those are of winter time
-    that follow a step back, or a step that only winter time makes as long as the usual one."""
-    times = index.as_unit("ns").asi8
-    first, second = (
-        index.tz_localize(zone, ambiguous=np.full(len(index), is_summer), nonexistent="NaT")
-        for is_summer in (True, False)
-    )
-    shift = np.where(first.isna(), 0, second.as_unit("ns").asi8 - first.as_unit("ns").asi8)
-    step = np.diff(times)
-    usual = np.median(step) if len(step) else 0
-    is_again = np.zeros(len(times), dtype=bool)
-    is_again[1:] = (step + shift[1:] <= usual) | (times[1:] <= np.maximum.accumulate(times)[:-1])
-    is_again = pd.Series(is_again & (shift > 0)).groupby(index.normalize()).cummax().to_numpy()
-    local = second.where(is_again, first)
-    if local.hasnans:
-        place = int(np.argmax(local.isna()))
-        raise ValueError(
-            f"{file}, line {lines[place]}: {index[place]} is no time in {zone}, as the clocks go forward then; "
-            "expected the time zone of the logger's clock, such as 'Etc/GMT-1' for UTC+1 all year"
-        )
-    return local
+    return index.tz_convert(form.time_zone) if index.tz else by_local_clock(index, form.time_zone, block.where, lines)
 
 
 @dataclass(frozen=True)
@@ -431,7 +524,7 @@ class FileLook:
     form: CsvFormat
     records: pd.DataFrame
     ignored: dict[str, str]
-    units: dict[str, str]
+    units: dict[str, Unit]
     notes: tuple[str, ...]
     findings: tuple[RecordsWarning, ...] = ()
 
@@ -444,40 +537,38 @@ def look_at(file: Path, zone: str | None = None, stamps: str | None = None, want
     if file.suffix.lower() in PARQUET:
         form, units, ignored, notes = CsvFormat(time_zone=zone), {}, {}, []
     else:
-        form, units, ignored, notes = _look_at_table(file, zone, stamps)
+        form, notes = _form_of(file, zone, stamps)
+        units, ignored = _units_and_texts(file, form, wanted)
     records, findings = read_and_doubted(file, form, ignore=ignored)
     ignored |= {name: why for name, why in _no_measurements(records) if name not in wanted}
     records = records.drop(columns=[name for name in records if name in ignored])
     marked = [marker for marker in MISSING_CODES if records.isin([marker]).to_numpy().any()]
     if marked:
         records, form = records.mask(records.isin(marked)), replace(form, missing=marked)
-    for name in records:
-        named = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]", str(name))
-        if named and named[1].lower() in UNIT_NAMES:
-            units[name] = UNIT_NAMES[named[1].lower()]
-    return FileLook(file, form, records, ignored, units, tuple(notes), tuple(findings))
+    units |= {name: unit for name in records if (unit := unit_in(name))}
+    records, aside = of_the_right_clock(records, file)
+    return FileLook(file, form, records, ignored, units, tuple(notes), (*findings, *aside))
 
 
-def _look_at_table(
-    file: Path, zone: str | None, stamps: str | None
-) -> tuple[CsvFormat, dict[str, str], dict[str, str], list[str]]:
-    """Form of a CSV file or workbook, units of its columns as a line below the names has them, columns of text, and
-    notes."""
+def _form_of(file: Path, zone: str | None, stamps: str | None) -> tuple[CsvFormat, list[str]]:
+    """Form of a CSV file or workbook, and notes."""
     if file.suffix.lower() in WORKBOOKS:
-        sheet, sheets = _longest_sheet(file)
+        sheet = max(sheets_of(file)[0].values(), key=len)
         separator, decimal = ",", _decimal_of(sheet)
-        rows = _rows_of_cells(sheet, decimal)
     else:
-        (separator, decimal), sheets = _division(text_of(file), file), []
-        rows, _ = rows_in(file, CsvFormat(separator, decimal))
-    width = used_width([row for _, row in rows], _usual_width([row for _, row in rows[:MOST_LOOKED_AT]]))
-    rows = [(line, without_margin(row, width)) for line, row in rows]
-    rows = [(line, row) for line, row in rows if len(row) == width]
-    cells = [row for _, row in rows]
-    places, stamps, notes = _stamps_of(cells, file, stamps)
-    is_record = _times_in(cells[:MOST_LOOKED_AT], places, stamps).notna()
-    first = int(np.argmax(is_record))
-    above = [one for one in rows[:first] if one[1][0] != "TOA5"]
+        separator, decimal = _division(text_of(file), file)
+    block = max(blocks_in(file, CsvFormat(separator, decimal)), key=lambda block: len(block.rows))
+    width = used_width([row for _, row in block.rows], _usual_width([row for _, row in block.rows[:MOST_LOOKED_AT]]))
+    rows = [(line, without_margin(row, width)) for line, row in block.rows]
+    cells = [row for _, row in rows if len(row) == width]
+    places, stamps, notes = find_stamps(cells, file, stamps, block.serial)
+    looked = [row if len(row) > max(places) else [""] * (max(places) + 1) for _, row in rows[:MOST_LOOKED_AT]]
+    is_record = times_in(looked, places, stamps).notna()
+    titles = [
+        (place, [one for one in rows[:place] if len(one[1]) == len(rows[place][1]) and one[1][0] != "TOA5"])
+        for place in np.flatnonzero(is_record)[:100]
+    ]
+    first, above = next(((place, above) for place, above in titles if above), (0, []))
     above = [one for one in above if not one[1][0].startswith("#")] or above
     if not above:
         raise ValueError(
@@ -485,32 +576,49 @@ def _look_at_table(
             f"decimal sign {decimal!r}; expected one, then a line for each record"
         )
     names_line, names = max(above, key=lambda one: sum(map(bool, one[1])))  # a title has fewer cells
-    names = names_of(names)
-    columns = dict(zip(names, zip(*compress(cells, is_record), strict=True), strict=True))
-    stamp_columns = [names[place] for place in places]
-    units = {
-        name: UNIT_NAMES[cell.lower()]
-        for line, row in above
-        if line > names_line
-        for name, cell in zip(names, row, strict=True)
-        if cell.lower() in UNIT_NAMES
-    }
-    texts = {}
-    for name, column in columns.items():
-        kinds = [kind for cell in column if (kind := _is_number(cell, decimal)) is not None]
-        if name not in stamp_columns and sum(kinds) < MOSTLY * len(kinds):
-            texts[name] = "it holds text"
-    has_offsets = WITH_OFFSET.search(_stamp_text(cells[first], places)) is not None
+    lost = [place for place in np.flatnonzero(is_record[:first]) if sum(map(bool, rows[place][1])) > 1 + len(places)]
+    if lost:
+        raise ValueError(f"{block.where}, line {rows[lost[0]][0]} has a stamp above the names; expected names above it")
+    stamp_columns = [names_of(names)[place] for place in places]
+    has_offsets = WITH_OFFSET.search(stamp_text(rows[first][1], places)) is not None
     form = CsvFormat(
         separator,
         decimal,
         names_line=names_line,
         values_line=rows[first][0] if rows[first][0] != names_line + 1 else None,
-        stamp_columns=() if stamp_columns == names[:1] else stamp_columns,
+        stamp_columns=() if stamp_columns == names_of(names)[:1] else stamp_columns,
         stamps=stamps,
-        time_zone="UTC" if zone is None and (has_offsets or stamps.startswith(UNIX)) else zone,
+        time_zone="UTC" if zone is None and (has_offsets or stamps in EPOCHS) else zone,
     )
-    return form, units, texts, [*sheets, *notes]
+    return form, notes
+
+
+def _units_and_texts(file: Path, form: CsvFormat, wanted: Collection[str]) -> tuple[dict[str, Unit], dict[str, str]]:
+    """Units of columns as lines below the names have them, and why columns are no numbers, or not of all records."""
+    units: dict[str, Unit] = {}
+    kinds: dict[str, list[bool]] = {}
+    sections = [section for block in blocks_of_records(file, form)[0] for section in sections_of(block, form)]
+    for section in sections:
+        for row in section.below:
+            for name, cell in zip(section.names, row, strict=False):
+                unit = unit_called(cell)
+                if unit and units.setdefault(name, unit) != unit:
+                    text = f"{name!r} is in {unit.name} and in {units[name].name}"
+                    raise ValueError(f"{file}, line {section.line}: {text}; expected one unit of a column")
+        stamps = list(form.stamp_columns) or section.names[:1]
+        for _, row in section.records[:MOST_LOOKED_AT]:
+            for name, cell in zip(section.names, row, strict=False):
+                if name not in stamps and (is_number := _is_number(cell, form.decimal)) is not None:
+                    kinds.setdefault(name, []).append(is_number)
+    ignored = {name: "it holds text" for name, found in kinds.items() if sum(found) < MOSTLY * len(found)}
+    shared = [section for section in sections if len(set(section.names) & set(sections[0].names)) > len(stamps)]
+    if len(shared) == len(sections):
+        n_records = sum(len(section.records) for section in sections)
+        for name in kinds:
+            n_own = sum(len(section.records) for section in sections if name in section.names)
+            if n_own < n_records and name not in wanted:
+                ignored.setdefault(name, f"only {n_own} of {n_records} records have it")
+    return units, ignored
 
 
 def _decimal_of(sheet: Any) -> str:
@@ -526,7 +634,7 @@ def _decimal_of(sheet: Any) -> str:
 def _division(text: str, file: Path) -> tuple[str, str]:
     """Separator and decimal sign by which lines of the usual number of columns have the most numbers."""
     head, found = "\n".join(text.splitlines()[:MOST_LOOKED_AT]), []
-    separators = (";", "\t", "|", ",")  # a comma last, as it may be a decimal sign
+    separators = (";", "\t", "|", ",", " ")  # a comma late, as it may be a decimal sign
     for rank, (separator, decimal) in enumerate(product(separators, DECIMAL_SIGNS)):
         try:
             rows = [row for _, row in rows_of(head, separator)]
@@ -553,102 +661,6 @@ def _is_number(cell: str, decimal: str) -> bool | None:
         return None if np.isnan(number(cell, decimal)) else True
     except ValueError:
         return False
-
-
-def _stamps_of(rows: Sequence[Sequence[str]], file: Path, given: str | None) -> tuple[tuple[int, ...], str, list[str]]:
-    """Places of the columns that hold the stamps, their format, and doubts about it."""
-    looked = rows[:MOST_LOOKED_AT]
-    for forms in [(given,)] if given else [WRITTEN_STAMPS, (UNIX, UNIX_MS), (EXCEL,)]:
-        tried = [(places, _fitting(looked, places, forms)) for places in _places(looked)]
-        found = [one for one in tried if one[1]]
-        if forms == (EXCEL,) and len(found) > 1:  # whole numbers may be counts of records
-            times = [_times_in(looked, places, EXCEL).dropna() for places, _ in found]
-            found = [
-                one for one, index in zip(found, times, strict=True) if (index.normalize() != index).any()
-            ] or found
-            if len(found) > 1:
-                columns = " and ".join(str(places[0] + 1) for places, _ in found)
-                raise ValueError(f"{file}: columns {columns} may all hold serial dates; expected one that does")
-        if found:
-            return found[0][0], *_certain(rows, *found[0], file)
-    expected = f"in the format {given}" if given else "such as 2026-01-31 13:00 or 31.01.2026 13:00"
-    raise ValueError(f"{file}: no column holds stamps, {expected}; the first values are {list(*rows[:1])!r:.200}")
-
-
-def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
-    """Columns that may hold stamps: each with the nearest time of day, and alone."""
-    columns = list(zip(*rows, strict=True))
-    time_of_day = re.compile(r"\d{1,2}:\d\d(:\d\d(\.\d+)?)?( ?[AaPp][Mm])?$")
-    clocks = [n for n, cells in enumerate(columns) if 2 * sum(map(bool, map(time_of_day.match, cells))) > len(cells)]
-    for n in range(len(columns)):
-        near = sorted((abs(clock - n), clock < n, clock) for clock in clocks if clock != n)
-        yield from ((n, clock) for *_, clock in near[:1])
-        yield (n,)
-
-
-def _stamp_text(row: Sequence[str], places: Sequence[int]) -> str:
-    return " ".join(row[place] for place in places)
-
-
-def _times_in(rows: Sequence[Sequence[str]], places: Sequence[int], form: str) -> pd.DatetimeIndex:
-    """Stamps in some columns of rows, NaT where there is none that is plausible."""
-    index = parsed_or_iso([_stamp_text(row, places) for row in rows], form)
-    return index.where((index.year >= 1970) & (index.year <= 2100))
-
-
-def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str]) -> list[str]:
-    """Formats by which the most rows have a stamp, if these are most rows, and their stamps are not all the same."""
-    half = len(rows) // 2
-    sample = [*rows[half :: max(len(rows) // 8, 1)], *rows[half : half + 4]]
-    signs = {sign for row in sample for sign in _stamp_text(row, places)}
-    likely = [form for form in forms if signs.issuperset(re.sub(r"%.|\w", "", form))]
-    texts = [_stamp_text(row, places) for row in sample]
-    found = {form: _times_in(rows, places, form) for form in likely if parsed(texts, form).notna().any()}
-    least = max([len(rows) / 2, *(index.notna().sum() for index in found.values())])
-    return [
-        form
-        for form, index in found.items()
-        if index.notna().sum() == least
-        and 2 * index.nunique() >= least
-        and (form != EXCEL or _is_in_order(index))  # other numbers are as large
-    ]
-
-
-def _certain(
-    rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str], file: Path
-) -> tuple[str, list[str]]:
-    """Of several formats, the one by which the most rows have a stamp, or else the only one by which they follow each
-    other regularly, which must also be that of the shortest time: days and months that are exchanged lengthen it."""
-    found: dict[str, pd.DatetimeIndex] = {}
-    for form in forms:
-        index = _times_in(rows, places, form)
-        if not any(index.equals(other) for other in found.values()):
-            found[form] = index
-    most = max(index.notna().sum() for index in found.values())
-    readings = [form for form, index in found.items() if index.notna().sum() == most]
-    shortest = min(readings, key=lambda form: found[form].max() - found[form].min())
-    certain = readings if len(readings) == 1 else [form for form in readings if _is_regular(found[form])]
-    if certain != [shortest]:
-        raise ValueError(
-            f"{file}: stamps such as {_stamp_text(rows[-1], places)!r} may have the formats "
-            f"{' or '.join(map(repr, readings))}; expected --stamps with the right one"
-        )
-    others = [form for form in readings if form not in certain]
-    return certain[0], [
-        f"stamps of {file.name} may also have the format {form}: by {certain[0]}, they follow each other regularly"
-        for form in others[:1]
-    ]
-
-
-def _is_in_order(stamps: pd.DatetimeIndex) -> bool:
-    known = stamps.dropna()
-    return known.is_monotonic_increasing or known.is_monotonic_decreasing
-
-
-def _is_regular(stamps: pd.DatetimeIndex) -> bool:
-    """Whether stamps are in order, with few gaps."""
-    steps = np.abs(np.diff(stamps.dropna().asi8))
-    return _is_in_order(stamps) and (not len(steps) or bool(steps.mean() <= 1.5 * np.median(steps)))
 
 
 def _no_measurements(records: pd.DataFrame) -> Iterator[tuple[str, str]]:

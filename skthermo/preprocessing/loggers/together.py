@@ -1,4 +1,4 @@
-"""Records of several files side by side, joined by their stamps, in degrees Celsius; which columns are what."""
+"""Records of several files side by side, joined by their stamps, in degrees Celsius and Hz; which columns are what."""
 
 from __future__ import annotations
 
@@ -11,19 +11,30 @@ from zoneinfo import ZoneInfo
 
 import pandas as pd
 
-from skthermo._core.text import counted
-from skthermo.preprocessing.loggers.logger_files import MOSTLY, FileLook, look_at
+from skthermo.preprocessing._quantities import (
+    FREQUENCY,
+    OPEN,
+    TEMPERATURE,
+    Unit,
+    can_be_temperature,
+    in_usual_units,
+    kind_of,
+    varies_as_modes,
+)
+from skthermo.preprocessing.loggers.logger_files import FileLook, look_at, once
+from skthermo.preprocessing.loggers.stamps import MOSTLY
 
 HZ = "Hz"
 
 
 @dataclass(frozen=True)
 class LoggerRecords:
-    """Records of files, in order of time and in degrees Celsius.
+    """Records of files, in order of time, in degrees Celsius and Hz.
 
     ``roles`` are names of columns by role: temperatures, reference and responses; ``units`` are the units of the
-    responses, "" where unknown; ``convert`` has the units of temperatures that were not in degrees Celsius. ``waiting``
-    are stamps that are not in all files; ``ignored`` says why columns are not used."""
+    responses, "" where unknown; ``convert`` has the units of columns that were in others than degrees Celsius or Hz.
+    ``waiting`` are stamps that are not in all files; ``ignored`` says why columns are not used, ``notes`` what else a
+    reader should know."""
 
     looks: Sequence[FileLook]
     table: pd.DataFrame
@@ -32,6 +43,7 @@ class LoggerRecords:
     convert: Mapping[str, str]
     waiting: pd.DatetimeIndex
     ignored: Mapping[str, str]
+    notes: Sequence[str]
 
     @classmethod
     def read(
@@ -61,9 +73,9 @@ class LoggerRecords:
         if again and len({frozenset(look.records) for look in looks}) > 1:
             raise ValueError(f"several files have the columns {again}; expected each in one, beside the stamps")
         columns = list(dict.fromkeys(name for look in looks for name in look.records))
-        roles = _roles(looks, columns, {"temperatures": temperatures, "reference": reference, "responses": responses})
-        used = [name for names in roles.values() for name in names]
+        given = {"temperatures": temperatures, "reference": reference, "responses": responses}
         units = {name: unit for look in looks for name, unit in look.units.items()}
+        roles, ignored, notes = _roles(looks, columns, units, given)
         table, waiting = joined([look.records for look in looks], columns)
         if not len(table):
             spans = "; ".join(
@@ -71,75 +83,95 @@ class LoggerRecords:
             )
             raise ValueError(f"the files have no stamp in common ({spans}); expected records of the same times")
         table = once(table).sort_index()
-        convert = {
-            name: unit
-            for name in (*roles["temperatures"], *roles["reference"])
-            if (unit := _foreign(table, name, units))
-        }
-        units = {name: units.get(name, HZ if is_like_frequency(name) else "") for name in roles["responses"]}
-        ignored = {name: why for look in looks for name, why in look.ignored.items()}
-        ignored |= {name: "nothing says what it is" for name in columns if name not in used}
-        return cls(looks, in_celsius(table, convert)[used], roles, units, convert, waiting, ignored)
+        used = [name for names in roles.values() for name in names]
+        convert = {name: unit for name in used if (unit := _foreign(table[name], name, columns, units, roles))}
+        if convert:
+            notes.append(f"converted to degrees Celsius and Hz: {', '.join(map(' from '.join, convert.items()))}")
+        of_responses = {name: _response_unit(name, units.get(name), table[name]) for name in roles["responses"]}
+        by_values = [n for n, unit in of_responses.items() if unit == HZ and kind_of(n, units.get(n))[0] != FREQUENCY]
+        if by_values:
+            notes.append(f"{', '.join(by_values)}: taken for natural frequencies in Hz, by their values")
+        if unknown := [name for name, unit in of_responses.items() if not unit]:
+            notes.append(
+                f"the unit of {', '.join(map(repr, unknown))} is unknown, so that a change up counts as a change down; "
+                "natural frequencies need names such as 'f1 [Hz]'"
+            )
+        ignored = {name: why for look in looks for name, why in look.ignored.items()} | ignored
+        table = in_usual_units(table, convert)[used]
+        return cls(looks, table, roles, of_responses, convert, waiting, ignored, notes)
 
 
-def _roles(looks: Sequence[FileLook], columns: list[str], given: dict[str, Any]) -> dict[str, list[str]]:
-    """Columns by role: as given, else as the first and the other of two files, or by unit and name."""
+def _roles(
+    looks: Sequence[FileLook], columns: list[str], units: Mapping[str, Unit], given: dict[str, Any]
+) -> tuple[dict[str, list[str]], dict[str, str], list[str]]:
+    """Columns by role, why others have none, and what to know about it: as given, else by unit, name and values. Of two
+    files, what stays open in the first is a temperature, and a response in the second, if its values can be that."""
     unknown = [name for names in given.values() for name in names or () if name not in columns]
     if unknown:
         raise ValueError(f"there are no columns {unknown}; expected some of {columns}{_others(looks)}")
     named = {name for names in given.values() for name in names or ()}
-    rest = [name for name in columns if name not in named]
-    units = {name: unit for look in looks for name, unit in look.units.items()}
-    is_pair = len({frozenset(look.records) for look in looks}) == 2
-    for role, unit, is_like in (
-        ("temperatures", {"°C", "K", "°F"}, is_like_temperature),
-        ("responses", {HZ}, is_like_frequency),
-    ):
-        if given[role] is None and is_pair:
-            first = set(looks[0].records)
-            given[role] = [name for name in rest if (name in first) == (role == "temperatures")]
-        elif given[role] is None:
-            found = [n for n in rest if units.get(n) in unit or (n not in units and is_like(n))]
-            given[role] = [n for n in found if n not in (given["temperatures"] or ())]
+    values = {name: look.records[name] for look in looks for name in look.records}
+    kinds = {name: kind_of(name, units.get(name), values[name]) for name in columns if name not in named}
+    is_pair, notes = len({frozenset(look.records) for look in looks}) == 2, []
+    for role, kind in (("temperatures", TEMPERATURE), ("responses", FREQUENCY)):
+        if given[role] is not None:
+            continue
+        given[role] = found = [name for name, (one, _) in kinds.items() if one == kind]
+        if is_pair:
+            own = [name for name in kinds if (name in looks[0].records) == (role == "temperatures")]
+            if role == "temperatures" and found and not set(found).intersection(own):
+                notes.append(f"the files are exchanged, as {', '.join(found)} of the second are temperatures")
+            by_file = [name for name in own if _is_open(role, kinds[name][0], values[name])]
+            if by_file:
+                notes.append(f"{', '.join(by_file)}: {role} as their file says, as names and units do not")
+            given[role] = [name for name in kinds if name in found or name in by_file]
+    others = {name: why for name, (_, why) in kinds.items() if not any(name in names for names in given.values())}
+    for role in ("temperatures", "responses"):
         if not given[role]:
             raise ValueError(
                 f"no column is known to be one of the {role}; expected {role} (--{role}) by name, some of "
-                f"{columns}{_others(looks)}"
+                f"{columns}{_others(looks, others)}"
             )
-    return {role: list(names) for role, names in given.items()}
+    return {role: list(names) for role, names in given.items()}, others, notes
 
 
-def is_like_temperature(name: Any) -> bool:
-    """Whether a column has a name as temperatures have."""
-    return re.match(r"t\d*$|t[A-Z_]|temp|.*temp|air|.*luft", str(name), re.IGNORECASE) is not None
+def _is_open(role: str, kind: str, values: pd.Series) -> bool:
+    """Whether a column may have the role that its file says: with another quantity than frequency, as a response."""
+    if role == "temperatures":
+        return kind == OPEN and can_be_temperature(values)
+    return kind == OPEN or kind in ("force", "strain", "displacement", "inclination", "acceleration")
 
 
-def is_like_frequency(name: Any) -> bool:
-    """Whether a column has a name as frequencies have."""
-    return re.match(r"f_?\d*$|.*freq|(.*\W)?(mode|hz)", str(name), re.IGNORECASE) is not None
+def _response_unit(name: str, unit: Unit | None, values: pd.Series) -> str:
+    """The unit of a response, "" where nothing tells; Hz for a letter and a number with values of frequencies."""
+    kind, _ = kind_of(name, unit)
+    is_mode = re.fullmatch(r"[A-Za-z]{1,2}[ _-]?\d+", name) is not None and varies_as_modes(values)
+    if kind == FREQUENCY or (unit is None and is_mode):
+        return HZ
+    return unit.name if unit else ""
 
 
-def _others(looks: Sequence[FileLook]) -> str:
+def _others(looks: Sequence[FileLook], others: Mapping[str, str] | None = None) -> str:
     """Columns that cannot be used, and why."""
-    others = [f"{name!r} is none, as {why}" for look in looks for name, why in look.ignored.items()]
-    return f"; {', '.join(others)}" if others else ""
+    others = {name: why for look in looks for name, why in look.ignored.items()} | (others or {})
+    listed = ", ".join(f"{name!r} is none, as {why}" for name, why in others.items())
+    return f"; {listed}" if listed else ""
 
 
-def _foreign(records: pd.DataFrame, name: str, units: Mapping[str, str]) -> str:
-    """The unit of a temperature that is not in degrees Celsius."""
-    unit = units.get(name, "")
-    if unit in ("K", "°F"):
-        return unit
-    return "K" if unit == "" and records[name].between(200, 340).mean() > MOSTLY else ""
-
-
-def in_celsius(table: pd.DataFrame, units: Mapping[str, str]) -> pd.DataFrame:
-    """A table with columns that are in K or °F converted to degrees Celsius."""
-    found = {name: unit for name, unit in units.items() if name in table}
-    scaled = {
-        name: table[name] - 273.15 if unit == "K" else (table[name] - 32.0) * (5 / 9) for name, unit in found.items()
-    }
-    return table.assign(**scaled)
+def _foreign(
+    values: pd.Series, name: str, columns: Sequence[str], units: Mapping[str, Unit], roles: Mapping[str, list[str]]
+) -> str:
+    """The unit of a column that is in another one than degrees Celsius or Hz: as it is named, F behind the word or
+    symbol of a temperature if it is no letter of a series, and kelvin by the values."""
+    if unit := units.get(name):
+        return unit.name if unit.kind in (TEMPERATURE, FREQUENCY) and unit.name not in ("°C", HZ) else ""
+    if name in roles["responses"]:
+        return ""
+    letter = re.search(r"F(?=(_[A-Za-z]+)?$)", name)
+    series = [name[: letter.start()] + other + name[letter.end() :] for other in "ABDEG"] if letter else []
+    if letter and not set(series).intersection(columns):
+        return "°F"
+    return "K" if values.between(200, 340).mean() > MOSTLY else ""
 
 
 def joined(tables: Iterable[pd.DataFrame], columns: Sequence[str]) -> tuple[pd.DataFrame, pd.DatetimeIndex]:
@@ -161,19 +193,3 @@ def joined(tables: Iterable[pd.DataFrame], columns: Sequence[str]) -> tuple[pd.D
     if not whole:
         return pd.DataFrame(columns=list(columns), index=waiting[:0], dtype=float), waiting
     return pd.concat([one[list(columns)] for one in whole]), waiting
-
-
-def once(table: pd.DataFrame) -> pd.DataFrame:
-    """Records that come twice with the same values are one; with other values they are an error."""
-    again = table.index.duplicated()
-    if not again.any():
-        return table
-    table = table[~table.reset_index().duplicated().to_numpy()]
-    again = table.index.duplicated()
-    if again.any():
-        raise ValueError(
-            f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
-            f"{table.index[again][0]}; expected each once. If the clocks go back then, give the time zone ([csv] "
-            "time_zone of settings)"
-        )
-    return table

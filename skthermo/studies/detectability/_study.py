@@ -216,6 +216,60 @@ class DetectabilityStudy(BaseEstimator):
         self.memory = memory
         self.verbose = verbose
 
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Parameters by name, also of detectors in a mapping, as ``detectors__name__parameter``.
+
+        Parameters
+        ----------
+        deep : bool, default=True
+            Whether parameters of parts are among them.
+
+        Returns
+        -------
+        dict
+            Names and values.
+        """
+        parameters = super().get_params(deep)
+        if deep and isinstance(self.detectors, Mapping):
+            for name, detector in self.detectors.items():
+                own = detector.get_params() if hasattr(detector, "get_params") else {}
+                parameters |= {f"detectors__{name}": detector}
+                parameters |= {f"detectors__{name}__{key}": value for key, value in own.items()}
+        return parameters
+
+    def set_params(self, **params: Any) -> DetectabilityStudy:
+        """Set parameters, also of detectors in a mapping, as ``detectors__name__parameter``.
+
+        Parameters
+        ----------
+        **params : dict
+            Names and values.
+
+        Returns
+        -------
+        DetectabilityStudy
+            This study.
+
+        Raises
+        ------
+        ValueError
+            If there is no such parameter.
+        """
+        if "detectors" in params:
+            super().set_params(detectors=params.pop("detectors"))
+        for key, value in params.items():
+            part, _, rest = key.partition("__")
+            name, _, parameter = rest.partition("__")
+            if part != "detectors" or not isinstance(self.detectors, Mapping):
+                super().set_params(**{key: value})
+            elif name not in self.detectors:
+                raise ValueError(f"there is no detector {name!r}; expected one of {list(self.detectors)}")
+            elif parameter:
+                self.detectors[name].set_params(**{parameter: value})
+            else:
+                self.detectors = {**self.detectors, name: value}
+        return self
+
     def run(
         self,
         T: ArrayLike | Sequence[ArrayLike],

@@ -246,16 +246,19 @@ class DetectionTask(Bunch):
         Warns
         -----
         UserWarning
-            If the search has fitted its best detector to all records of the task, damaged ones among them.
+            If the search has fitted its best detector to all records of the task, damaged ones among them, as those of
+            other libraries are, which ignore ``y``.
         """
         if isinstance(detector, BaseSearchCV):
             if not hasattr(detector, "best_params_"):
                 raise ValueError(f"{detector!r:.200} has no best_params_; expected a search that is fitted")
-            if hasattr(detector, "best_estimator_"):
+            if hasattr(detector, "best_estimator_") and not hasattr(
+                last_step(detector.best_estimator_), "damage_index"
+            ):
                 text = (
-                    "the search has fitted best_estimator_ to all records of the task, damaged ones among them. It "
-                    "takes such damage for healthy: do not use it. Give the search refit=False, and learn the "
-                    "baseline by task.refit(search)"
+                    "the search has fitted best_estimator_ to all records of the task, damaged ones among them, since "
+                    "a detector of another library ignores their labels. It takes such damage for healthy: do not use "
+                    "it. Give the search refit=False, and learn the baseline by task.refit(search)"
                 )
                 warn_each([ResultWarning(text, "search-refits")])
             detector = clone(detector.estimator).set_params(**clone(detector.best_params_, safe=False))
@@ -428,9 +431,11 @@ def detection_task(
 
     Notes
     -----
-    The score is the probability of detection at a limit of false alarms. Give the search ``refit=False``, and fit its
-    best detector to the baseline by ``task.refit``. :ref:`how-a-task-is-scored` says how states are kept apart, and
-    :ref:`tune-by-simulated-damage` how to read the score of the best of many settings.
+    The score is the probability of detection at a limit of false alarms. Fit the search's best detector to the baseline
+    by ``task.refit``. Detectors of skthermo do not learn what ``y`` labels damaged, so that a search may also refit,
+    on the baseline and the simulated healthy records; for those of other libraries give it ``refit=False``.
+    :ref:`how-a-task-is-scored` says how states are kept apart, and :ref:`tune-by-simulated-damage` how to read the
+    score of the best of many settings.
 
     Examples
     --------
