@@ -268,6 +268,7 @@ def with_station():
     return records.assign(station=station)
 
 
+@pytest.mark.filterwarnings("ignore:.*undetected-changes")
 def test_a_reference_finds_the_drift_of_the_only_thermometer_and_fills_its_place():
     records = with_station()
     monitor = Monitor(detector(MODES), reference=["station"]).fit(records[:N_BASELINE])
