@@ -54,14 +54,14 @@ def public_callables():
 CALLABLES = list(public_callables())
 OBJECTS = [(name, thing) for name, thing in public_objects() if inspect.isfunction(thing) or inspect.isclass(thing)]
 PROTOCOLS = {name for name, thing in OBJECTS if getattr(thing, "_is_protocol", False)}
-ELEMENT_METHODS = ("properties", "dofs", "ends", "stiffness", "mass")
+ELEMENT_METHODS = {name for name in vars(skthermo.fem.Element) if name[0] != "_"}
 LONGEST_SIGNATURE = 700  # characters that help() prints
 
 
 def is_documented_elsewhere(name):
     """Methods whose parameters the protocol of elements documents."""
-    owner, _, method = name.rpartition(".")
-    return owner.rsplit(".", 1)[-1] in ("Bar", "Beam", "Membrane", "Spring", "PointMass") and method in ELEMENT_METHODS
+    owner, _, method = name.removeprefix("skthermo.fem.").partition(".")
+    return method in ELEMENT_METHODS and getattr(skthermo.fem, owner).__module__.startswith("skthermo.fem.elements.")
 
 
 DOCUMENTED = [c for c in CALLABLES if not is_documented_elsewhere(c[0]) and c[0] not in PROTOCOLS]

@@ -107,6 +107,12 @@ def test_pages_import_nothing_private():
     assert not {page: imports for page, imports in private.items() if imports}
 
 
+def test_the_users_pages_have_at_most_30000_words():
+    others = {"measured", "reference", "contributing", "_templates"}
+    pages = [page for page in PAGES if page != README and not others & set(page.relative_to(ROOT / "docs").parts)]
+    assert sum(len(page.read_text().split()) for page in pages) <= 30_000
+
+
 def test_the_guide_shows_code():
     assert sum(len(python_blocks(page)) for page in PAGES) >= 5
 
@@ -116,8 +122,11 @@ def test_the_reference_lists_every_public_name(room):
     page = (API / f"{room}.rst").read_text()
     tables = re.findall(r"autosummary::\n(?:   :.*\n)+\n((?:   \w+\n)+)", page)
     assert f"currentmodule:: skthermo.{room}\n" in page
-    names = sorted(importlib.import_module(f"skthermo.{room}").__all__)
-    assert sorted(" ".join(tables).split()) == names
+    names, listed = importlib.import_module(f"skthermo.{room}").__all__, " ".join(tables).split()
+    missing, gone = sorted({*names} - {*listed}), sorted({*listed} - {*names})
+    assert not missing, f"docs/reference/api/{room}.rst: add {missing} to one of its tables"
+    assert not gone, f"docs/reference/api/{room}.rst: remove {gone}"
+    assert len(listed) == len(names), f"docs/reference/api/{room}.rst: a name stands there twice"
 
 
 def test_reference_and_guide_have_every_package():
@@ -125,6 +134,19 @@ def test_reference_and_guide_have_every_package():
     inside = re.findall(r"</reference/api/(?!index)(\w+)>", (ROOT / "docs/guide/method.rst").read_text())
     assert sorted(toctree) == sorted(ROOMS) == sorted(page.stem for page in API.glob("*.rst") if page.stem != "index")
     assert sorted(inside) == sorted(ROOMS)
+
+
+def test_files_that_contributors_are_sent_to_are_there():
+    pages = [ROOT / "CONTRIBUTING.md", *(ROOT / "docs" / "contributing").glob("*.rst")]
+    path = re.compile(r"(?<![\w/.])((?:skthermo|tests|docs|examples|tools)/[\w/.]*\w)")
+    named = {page.name: path.findall(page.read_text()) for page in pages}
+    assert len(named["extending.rst"]) > 50
+    invented = re.compile("NAME|PAGE|PART|ROOM|_build")
+    missing = {
+        name: [file for file in files if not invented.search(file) and not (ROOT / file).exists()]
+        for name, files in named.items()
+    }
+    assert not any(missing.values()), missing
 
 
 def test_sources_are_listed_and_cited():

@@ -7,7 +7,7 @@ import pytest
 import scipy.io
 import scipy.sparse
 
-from skthermo.fem.external._files import read_named_matrices
+from skthermo.fem.external import read_named_matrices
 
 N = 6
 RNG = np.random.default_rng(0)

@@ -23,8 +23,8 @@ LIMITS = pd.DataFrame.from_dict(
         "monitoring": (8, 13, 11, 33),
         "plotting": (5, 0, 9, 5),
         "preprocessing": (12, 7, 7, 6),
-        "reporting": (1, 11, 0, 0),
-        "studies": (13, 17, 11, 24),
+        "reporting": (1, 12, 0, 0),
+        "studies": (13, 18, 11, 24),
         "surrogate": (11, 11, 9, 11),
         "updating": (4, 10, 0, 3),
     },
@@ -36,6 +36,7 @@ LARGER = {  # what has more, and why
     "fem.AffineModel": "all that a model may offer: what it is, its modes, what can be changed of it",
     "fem.ReducedModel": "an AffineModel, and what was reduced",
     "fem.Beam": "the properties of a section in space, each of which can be a parameter",
+    "reporting.owner_report": "one call for studies, monitors and fleets, each with facts of its own",
     "monitoring.Monitor": "a detector in service: its settings, its records, its events, what an owner decides",
     "studies.DetectabilityStudy": "what is simulated, what is uncertain, and every table of the result",
     "studies.detection_task": "the settings of a study, for grid searches",
@@ -86,11 +87,17 @@ def sizes():
 def test_no_package_has_grown(sizes):
     found = by_package(sizes)
     assert found.index.symmetric_difference(LIMITS.index).empty
-    grown = found[(found > LIMITS.loc[found.index]).any(axis=1)]
-    assert grown.empty, f"more than their limits:\n{grown}"
+    grown = [
+        f"{package}: {size} {what}, limit {LIMITS.at[package, what]}"
+        for package, sizes in found.iterrows()
+        for what, size in sizes.items()
+        if size > LIMITS.at[package, what]
+    ]
+    assert not grown, f"{__file__}: raise LIMITS, with the reason in the commit, or keep names private: {grown}"
 
 
 def test_what_is_large_has_a_reason(sizes):
     large = sizes.index[(sizes > pd.Series(MOST)).any(axis=1)]
-    assert set(large) <= set(LARGER), f"more than {MOST}:\n{sizes.loc[large.difference(LARGER)]}"
+    without = sizes.loc[large.difference(LARGER)]
+    assert without.empty, f"{__file__}: add to LARGER, with a reason, what has more than {MOST}:\n{without}"
     assert set(LARGER) <= set(sizes.index)

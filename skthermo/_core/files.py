@@ -5,7 +5,7 @@ import shutil
 import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any
@@ -77,8 +77,15 @@ class ReadWhenAsked(Mapping[Any, Any]):
 
 
 def write_when_complete(path: Path, content: str | bytes) -> None:
-    """Write a file beside it, and put it in its place when it is complete and on the disk; links and rights stay."""
+    """Write a file beside it, and put it in its place when it is complete and on the disk; links and rights stay.
+
+    What a killed process has left of it an hour ago or earlier is removed.
+    """
     path = path.resolve()
+    for left in path.parent.glob(f".*{UNFINISHED}"):
+        with suppress(FileNotFoundError):  # another process has removed it
+            if left.name.startswith(f".{path.name}.") and left.stat().st_mtime < time.time() - 3600:
+                left.unlink()
     unfinished = path.with_name(f".{path.name}.{uuid4().hex}{UNFINISHED}")
     try:
         with open(unfinished, "wb") as file:

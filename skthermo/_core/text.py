@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from skthermo._core.frames import midnight
+
 SPACE = "\N{NO-BREAK SPACE}"
 
 
@@ -20,15 +22,19 @@ def percent(share: float, digits: str = ".4g") -> str:
 
 
 def share_text(share: float) -> str:
-    """A share in percent with two significant digits; shares of nearly 1 do not become 100 %."""
+    """A share in percent with two significant digits; shares of nearly 1 do not become 100 %, nor tiny ones long."""
     value = 100 * float(share)
+    if 0 < value < 0.005:
+        return f"below{SPACE}0.01{SPACE}%"
     if 99.5 <= value < 100:
         return percent(share, ".1f") if value < 99.95 else f"over{SPACE}99.9{SPACE}%"
     return f"{significant(value)}{SPACE}%" if np.isfinite(share) else "not known"
 
 
 def bounds_text(lowest: float, highest: float) -> str:
-    """Bounds of a share in percent, on one line."""
+    """Bounds of a share in percent, on one line; a tiny lower one is none."""
+    if 0 < lowest < 0.0005:
+        return f"up{SPACE}to{SPACE}{share_text(highest)}"
     return f"{share_text(lowest)}{SPACE}to{SPACE}{share_text(highest)}"
 
 
@@ -84,6 +90,11 @@ def listed(names: Sequence[Any], word: str = "and") -> str:
     return f"{', '.join(first)} {word} {last}" if first else last
 
 
+def bare(name: Any) -> str:
+    """The name of a column without a unit in brackets, as sentences have it."""
+    return re.sub(r"\s*[\[(][^\])]*[\])]$", "", str(name)) or str(name)
+
+
 def capital(text: str) -> str:
     """A text as the beginning of a sentence."""
     return text[:1].upper() + text[1:]
@@ -103,6 +114,15 @@ def duration_text(wait: Any) -> str:
     )
     text = f"{size:.2g}" if size < 99 else f"{size:.0f}"
     return f"{text} {unit}{'' if text == '1' else 's'}"
+
+
+def day_text(time: Any, *, is_short: bool = False) -> str:
+    """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
+    if pd.isna(time):
+        return ""
+    stamp = pd.Timestamp(time)
+    day = f"{stamp.day} {stamp.month_name()[: 3 if is_short else None]} {stamp.year}".replace(" ", SPACE)
+    return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"
 
 
 def plain(value: Any) -> Any:

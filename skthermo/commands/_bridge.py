@@ -6,8 +6,9 @@ import argparse
 import json
 import logging
 import os
+import re
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -24,17 +25,16 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._settings import RecordSettings, Settings, read_settings
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
-from skthermo.preprocessing.loggers.logger_files import (
-    NO_TEXT_FILES,
-    CsvFormat,
-    in_zone,
-    read_file,
-)
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, look_at, read_file, text_of
 from skthermo.preprocessing.loggers.stamps import of_the_right_clock
 from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
-CODES = {"healthy": HEALTHY, "watch": HEALTHY, "alarm": ALARM, "not evaluated": NOT_EVALUATED}
+CODES = {
+    "healthy": HEALTHY, "watch": HEALTHY, "known damage": HEALTHY, "drift": ALARM, "alarm": ALARM,
+    "not evaluated": NOT_EVALUATED,
+}  # fmt: skip
+AS_BEFORE = ("records:", "damage events:", "expected:", "smallest change:")  # of a summary, what no night changes
 COUNTS = {"n_repeated": "repeated", "n_late": "late", "n_too_late": "too late"}
 
 logger = logging.getLogger("skthermo.commands")
@@ -55,8 +55,10 @@ class Bridge:
         self.metrics_file: Path | None = None
         self.lines: list[str] = []
         self.transitions: list[dict[str, Any]] = []
+        self.identified: Any = None
         self.written: list[Path] = []
         self.errors: list[str] = []
+        self.said = ""
 
     def attempt(self, command: str) -> Exception | None:
         """Do the work of a command, which fails on this bridge alone; the error."""
@@ -76,6 +78,8 @@ class Bridge:
         """What JSON says of it."""
         status = None if self.status_ is None else self.status_.as_dict()
         done = {name: getattr(self, name) for name in ("name", "state", "records", "transitions", "errors")}
+        found = self.identified
+        done["identified"] = None if found is None else {"answer": found.answer(), "limits": found.limits()}
         return done | {"exit_code": self.code, "status": status, "written": list(map(str, self.written))}
 
     @cached_property
@@ -112,6 +116,11 @@ class Bridge:
             )
         return monitor
 
+    @property
+    def call(self) -> str:
+        """How the bridge is named in a call."""
+        return str(self.file.parent if self.file.name == "monitor.toml" else self.file)
+
     def failed(self, error: Exception, what: str = "") -> None:
         """Note an error, which does not hide an alarm."""
         self.errors.append(f"{what}{sentence(error)}")
@@ -133,11 +142,19 @@ class Bridge:
         self.state, reason = self.status_.state, self.status_.reason
         if had_alarm or self.state == "alarm":
             self.state, reason = "alarm", "" if self.state == "alarm" else "an event has opened and closed again"
-        elif doubt and self.state in ("healthy", "watch"):
+        elif doubt and CODES[self.state] == HEALTHY:
             self.state, reason = "not evaluated", doubt
-        self.code = FAILED if self.errors and self.state != "alarm" else CODES[self.state]
+        self.code = FAILED if self.errors and CODES[self.state] != ALARM else CODES[self.state]
         newest = f" (newest record {monitor.last_})" if len(monitor.days_) else ""
-        self.lines.append(f"state: {self.state}{newest}{f'; {reason}' if reason else ''}")
+        self.said = f"state: {self.state}{newest}{f'; {reason}' if reason else ''}"
+        self.lines.append(self.said)
+        if opened := [event for event in self.status_.events if event["kind"] != "watch"]:
+            from skthermo.reporting.answers import acknowledgement, event_sentences  # of what a quiet job needs none
+
+            for event in opened:
+                self.lines += event_sentences(monitor, event, self.identified)
+                if not event["acknowledged"]:
+                    self.lines.append(f"when you know what it was: {acknowledgement(event['event'], self.call)}")
         self.lines += monitor.summary().splitlines()[1:]
         before = None if self.settings is None else Taken.read(self.taken_file).settings
         if before is not None and (changed := self.settings.changed_since(before)):
@@ -147,6 +164,17 @@ class Bridge:
                 "--replace, or the settings as they were"
             )
             warn_each([SkthermoWarning(text, "changed-settings")])
+
+    def identify_open(self, monitor: Monitor) -> None:
+        """Find what explains an open event by the monitor's model; an error hides no alarm."""
+        events = [one["since"] for one in monitor.status(self.options.now).events if one["kind"] in ("damage", "drift")]
+        if events and monitor.fem is not None:
+            from skthermo.reporting.answers import identified_in
+
+            try:
+                self.identified = identified_in(monitor, min(events))
+            except ValueError as error:
+                self.lines.append(f"what has changed could not be identified: {error}")
 
     def fit(self) -> None:
         """Fit a monitor to its baseline, and save it."""
@@ -175,6 +203,7 @@ class Bridge:
             Taken(self.taken_file, layouts, {}, fitted, settings.of_a_fit).write()
         settings.path(settings.records.folder).mkdir(exist_ok=True)
         self.written.append(file)
+        self.lines += [f"code that the settings name was run: {name}" for name in settings.code]
         self.lines.append(f"fitted to {len(baseline)} records, {baseline.index[0]} to {baseline.index[-1]}")
         if len(records) > len(baseline):
             self.lines.append(f"later records of these files, for update: {len(records) - len(baseline)}")
@@ -185,7 +214,8 @@ class Bridge:
         """Evaluate what is new, and save the monitor."""
         with self.alone():
             monitor, taken = self.load(), Taken.read(self.taken_file)
-            before, new = monitor.counts_, self._new_files(monitor, taken)
+            before, n_known, new = monitor.counts_, len(monitor.transitions()), self._new_files(monitor, taken)
+            read = list(self.lines)  # that a file is empty, or holds no records
             with collected() as findings:
                 evaluated, handed = self._take_in(monitor, new)
             warn_each(one for one in findings if one.kind != "not-evaluated")  # said below, with all reasons
@@ -195,10 +225,23 @@ class Bridge:
                 for file in new:
                     if file.path in handed:
                         taken.note(file, handed[file.path])
-                taken.write()
-            self._describe_update(monitor, evaluated, before)
+            self.identify_open(monitor)
+            is_usual = self._describe_update(monitor, evaluated, before)
             self.append_transitions(monitor)
+            if not self.options.verbose:
+                changed = {str(one["event"]) for one in monitor.transitions(n_known)}
+                self.lines = [line for line in self.lines if _is_news(line, changed)]
+                if is_usual and not (changed or self.errors or read):
+                    self.lines = [f"{self.said}; {self._came(evaluated)}, nothing has changed"]
+            taken.state = self.state
+            taken.write()
         self.write_page(monitor)
+
+    def _came(self, evaluated: pd.DataFrame) -> str:
+        """How many records came, and how many of these could not be evaluated."""
+        n_unknown = int((evaluated["state"] == "not evaluated").sum())
+        unknown = f" ({n_unknown} not evaluated)" if n_unknown else ""
+        return f"{counted(len(evaluated), 'new record')}{unknown}".replace("\N{NO-BREAK SPACE}", " ")
 
     def _new_files(self, monitor: Monitor, taken: Taken) -> list[NewFile]:
         """Files with rows to take in: those that are named, or those of the folder, and of the baseline's files after
@@ -212,7 +255,14 @@ class Bridge:
             if settings is None:
                 table = read_file(file, form, leave_unfinished=leave_unfinished)
             else:
-                table = read_columns(file, form, settings.records, leave_unfinished=leave_unfinished)
+                options = {"leave_unfinished": leave_unfinished}
+                try:
+                    table = read_columns(file, form, settings.records, **options)
+                except ValueError:
+                    if settings.has_text_baseline or file.suffix.lower() in NO_TEXT_FILES:
+                        raise
+                    own = look_at(file, form.time_zone, wanted=settings.records.columns).form
+                    table = read_columns(file, replace(own, missing=form.missing), settings.records, **options)
                 check_layout(table, file, settings.records, taken.layouts)
             table = in_zone(table, monitor.last_.tz, file).rename_axis(monitor.baseline_.index.name)
             return table if after is None else table[table.index > after]
@@ -220,7 +270,11 @@ class Bridge:
         sources: list[tuple[Path, pd.Timestamp | None]] = [(file, None) for file in named]
         if not named:
             later = settings.records.baseline if settings.records.until else []
-            sources += [(file, None) for file in files_in(settings.path(settings.records.folder))]
+            for file in files_in(settings.path(settings.records.folder)):
+                if why := taken.no_records(file, settings.records.columns):
+                    self.lines += [f"no records in {file}: {why}"] if taken.is_first_seen(file) else []
+                else:
+                    sources.append((file, None))
             sources += [(settings.path(name), monitor.baseline_.index[-1]) for name in later]
         found = []
         for file, after in sources:
@@ -265,30 +319,37 @@ class Bridge:
         answers = [one for one in answers if len(one)]
         return pd.concat(answers) if answers else pd.DataFrame(columns=["state", "reason", "revised"]), handed
 
-    def _describe_update(self, monitor: Monitor, evaluated: pd.DataFrame, before: dict[str, int]) -> None:
-        """What became of the records, and the state: an alarm that has ended again counts, and without a new
-        evaluation, or with records of a time to come, nothing is healthy."""
+    def _describe_update(self, monitor: Monitor, evaluated: pd.DataFrame, before: dict[str, int]) -> bool:
+        """What became of the records, and the state; whether all is as after the call before.
+
+        An alarm that has ended again counts, and without a new evaluation, or with records of a time to come, nothing
+        is healthy.
+        """
         counts = {name: number - before[name] for name, number in monitor.counts_.items()}
-        n_ahead, new = monitor.counts_["n_ahead"], evaluated[~evaluated["revised"].astype(bool)]
+        n_ahead, new = counts["n_ahead"], evaluated[~evaluated["revised"].astype(bool)]
         states = new["state"].value_counts().reindex(list(CODES), fill_value=0).to_dict()
         is_unknown = new["state"] == "not evaluated"
         reasons = new.loc[is_unknown, "reason"].value_counts().to_dict()
         remarks = new.loc[~is_unknown & (new["reason"] != ""), "reason"].value_counts()
-        shown = ", ".join(f"{number} {state}" for state, number in states.items() if number or state != "watch")
+        always = ("healthy", "alarm", "not evaluated")
+        shown = ", ".join(f"{number} {state}" for state, number in states.items() if number or state in always)
         others = ", ".join(f"{counts[name]} {text}" for name, text in COUNTS.items())
         self.lines.append(f"new: {len(new)}{f' ({shown})' if len(evaluated) else ''}; {others}")
-        notes = {"evaluated anew, as records came late": len(evaluated) - len(new)}
+        notes = {"evaluated anew, as records came late or a sensor had failed": len(evaluated) - len(new)}
         notes |= {"set aside, stamped too far ahead": n_ahead}
         notes |= {f"not evaluated, {reason}": number for reason, number in reasons.items()}
         notes |= {f"evaluated, with a remark, {remark}": number for remark, number in remarks.items()}
         self.lines += [f"{note}: {number}" for note, number in notes.items() if number]
         self.records = {"new": len(new), **{state.replace(" ", "_"): number for state, number in states.items()}}
-        self.records |= {"revised": len(evaluated) - len(new), "ahead": n_ahead, "reasons": reasons}
+        ahead = monitor.counts_["n_ahead"]
+        self.records |= {"revised": len(evaluated) - len(new), "ahead": ahead, "reasons": reasons}
         self.records |= {name.removeprefix("n_"): counts[name] for name in COUNTS}
-        doubt = "records are stamped too far ahead" if counts["n_ahead"] > 0 else ""
+        doubt = "records are stamped too far ahead" if n_ahead > 0 else ""
         if not (doubt or states["healthy"] or states["watch"]):
             doubt = "no new record could be evaluated"
         self.describe(monitor, doubt, bool((evaluated["state"] == "alarm").any()))
+        is_usual = len(new) == len(evaluated) and not (n_ahead or any(counts[name] for name in COUNTS))
+        return is_usual and self.state == Taken.read(self.taken_file).state
 
     def append_transitions(self, monitor: Monitor) -> None:
         """Append what has changed to the file of transitions, for whoever holds the lock of the monitor."""
@@ -314,6 +375,7 @@ class Bridge:
             options = {} if self.settings is None else self.settings.page()
             options |= {"title": self.options.title} if self.options.title else {}
             options.pop("fdr", None)
+            options |= {"identified": self.identified, "settings": self.call}
             self.written.append(owner_report(monitor, page, now=self.options.now, **options))
         except Exception as error:  # it does not hide an alarm
             self.failed(error, f"{page} was not written: ")
@@ -323,11 +385,27 @@ class Bridge:
         monitor = self.load()
         self.describe(monitor)
         if self.options.report is not None:
+            self.identify_open(monitor)
             self.write_page(monitor)
+
+    def identify(self) -> None:
+        """Say which damage explains the newest records by the model."""
+        from skthermo.reporting.answers import identified_in, shifts_of
+
+        monitor = self.load()
+        if monitor.fem is None:
+            raise ValueError(f"{self.file} names no FE model; expected one in [fem], and a fit with it")
+        opened = [one["since"] for one in monitor.status(self.options.now).events if one["kind"] in ("damage", "drift")]
+        since = self.options.since or min(opened, default=monitor.last_ - pd.Timedelta("30D"))
+        self.identified = identified_in(monitor, since)
+        moved = shifts_of(monitor, since)
+        self.lines += [f"{name}: {100 * shift:+.2f} % against the healthy structure" for name, shift in moved.items()]
+        self.lines += [*self.identified.answer(), *self.identified.limits()]
 
     def report(self) -> None:
         """Write the page for the owner."""
         monitor = self.load()
+        self.identify_open(monitor)
         self.describe(monitor)
         self.code = HEALTHY
         self.write_page(monitor)
@@ -369,6 +447,12 @@ class Bridge:
             self.append_transitions(monitor)
 
 
+def _is_news(line: str, changed: Collection[str]) -> bool:
+    """Whether a line of a summary is not as after the call before: of events, those that are open or have changed."""
+    event = re.match(r"event (\d+):", line)
+    return not line.startswith(AS_BEFORE) and (not event or "still open" in line or event[1] in changed)
+
+
 def sentence(error: Exception) -> str:
     """What is wrong, in words: an error of the operating system names its file."""
     if isinstance(error, FileNotFoundError) and error.filename:
@@ -388,7 +472,11 @@ def append_lines(file: Path, entries: Sequence[Mapping[str, Any]], own: Mapping[
     if file.exists():
         content = file.read_bytes()
         whole = content[: content.rfind(b"\n") + 1]
-        for line in map(json.loads, whole.splitlines()):
+        for number, text in enumerate(whole.splitlines(), start=1):
+            try:
+                line = dict(json.loads(text))
+            except (ValueError, TypeError) as error:
+                raise ValueError(f"line {number} of {file} is damaged; expected JSON: mend or remove it") from error
             if all(line.get(name) == value for name, value in own.items()):
                 known = max(known, line["id"])
         if len(whole) < len(content):
@@ -416,10 +504,11 @@ class NewFile:
 class Taken:
     """What has been taken in from which files, kept beside the monitor.
 
-    ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit, and
-    ``settings`` are those of the fit. For each file there are its size, the time of its last change, and how many of
-    its first rows are done, with a checksum of these. If a command is killed after it has saved the monitor, rows come
-    again, and the monitor knows them.
+    ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit,
+    ``settings`` are those of the fit, ``state`` is what the last call said, and ``others`` are files without records.
+    For each file there are its size, the time of its last change, and how many of its first rows are done, with a
+    checksum of these. If a command is killed after it has saved the monitor, rows come again, and the monitor knows
+    them.
     """
 
     file: Path
@@ -427,13 +516,16 @@ class Taken:
     files: dict[str, dict[str, Any]] = field(default_factory=dict)
     fitted: str = ""
     settings: dict[str, Any] | None = None
+    state: str | None = None
+    others: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def read(cls, file: Path) -> Taken:
         """What an earlier call has left in a file beside the monitor; nothing if that cannot be read."""
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            return cls(file, content["layouts"], content["files"], content["fitted"], content.get("settings"))
+            names = ("layouts", "files", "fitted", "settings", "state", "others")
+            return cls(file, *(content[name] for name in names))
         except (OSError, ValueError, KeyError, TypeError):
             return cls(file)
 
@@ -446,8 +538,6 @@ class Taken:
         """What is new in a file; None if it is as it was when all of it was taken in."""
         known = self.files.get(self._key(file), {})
         found = file.stat()
-        if not found.st_size:
-            return None
         seen = {"size": found.st_size, "changed": found.st_mtime_ns}
         is_as_before = all(known.get(name) == value for name, value in seen.items())
         if is_as_before and known.get("whole"):
@@ -458,6 +548,20 @@ class Taken:
         end = file.read_bytes().rstrip(b"\0")[-1:]
         is_finished = is_as_before or file.suffix.lower() in NO_TEXT_FILES or end in (b"\n", b"\r")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
+
+    def no_records(self, file: Path, columns: Sequence[str]) -> str:
+        """Why a file holds no records, as an empty one, or a text that names no column; "" if it does."""
+        if not file.stat().st_size:
+            return "the file is empty"
+        if file.suffix.lower() != ".txt" or self._key(file) in self.files:
+            return ""
+        return "" if any(name in text_of(file) for name in columns) else "it names no column of the records"
+
+    def is_first_seen(self, file: Path) -> bool:
+        """Whether a file without records is new, or has changed; it is known from now on."""
+        seen = {"size": file.stat().st_size, "changed": file.stat().st_mtime_ns}
+        before, self.others[self._key(file)] = self.others.get(self._key(file)), seen
+        return seen != before
 
     def _key(self, file: Path) -> str:
         """How a file is called: by its path from the folder of the monitor, wherever the command is started."""
@@ -476,7 +580,9 @@ class Taken:
 
 
 def _checksum(table: pd.DataFrame) -> int:
-    return zlib.crc32(pd.util.hash_pandas_object(table.astype(float)).to_numpy().tobytes())
+    """Of the stamps and of nine digits of the values: a program that writes the file anew may change the last bits."""
+    digits = table.astype(float).map("{:.9g}".format)
+    return zlib.crc32(pd.util.hash_pandas_object(digits).to_numpy().tobytes())
 
 
 def files_in(folder: Path) -> list[Path]:

@@ -27,7 +27,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import CompensatedDetector, DirectionalDetector
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing.loggers.logger_files import CsvFormat, unit_called
+from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, unit_called
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
 REQUIRED = inspect.Parameter.empty  # the default of what has none
@@ -45,9 +45,9 @@ class Files:
     monitor : str, default="monitor.joblib"
         File of the fitted monitor, .joblib or .skops.
     page : str, default="status.html"
-        Page for the owner; "" for none.
+        Page for the owner, within the folder of the settings; "" for none.
     transitions : str, default="transitions.jsonl"
-        File to which each change of state is appended, a line of JSON for each; "" for none.
+        File within that folder to which each change of state is appended, a line of JSON for each; "" for none.
     metrics : str, optional
         File in Prometheus' text format, for a textfile collector; by default none.
     max_age : str, optional
@@ -118,7 +118,7 @@ SECTIONS: dict[str, tuple[str, str]] = {
     "compensator": ("skthermo.detection.CompensatedDetector", "detector regressor targets"),
     "monitor": ("skthermo.monitoring.Monitor", "detector targets reference fem"),
     "fem": ("skthermo.surrogate.DataInformedFEM", "inverse mapper imputer"),
-    "page": ("skthermo.reporting.owner_report", "subject path identified detector max_false_alarms now"),
+    "page": ("skthermo.reporting.owner_report", "subject path identified detector max_false_alarms now settings"),
 }
 """What each section calls, imported when it is needed, and which parameters come from elsewhere."""
 
@@ -192,6 +192,18 @@ class Settings:
 
         now, then = flat(self.of_a_fit), flat(before)
         return [name for name in now | then if now.get(name) != then.get(name) and name != "[records] folder"]
+
+    @property
+    def has_text_baseline(self) -> bool:
+        """Whether [csv] was found in text files, and not in workbooks, which say nothing of the form of texts."""
+        return not all(Path(name).suffix.lower() in NO_TEXT_FILES for name in self.records.baseline)
+
+    @property
+    def code(self) -> list[str]:
+        """Functions of Python files that the settings name: programs, which a command runs."""
+        named = {"fem": "model", "page": "structure"}
+        given = [str(self.options[section].get(key, "")) for section, key in named.items()]
+        return [name for name in dict.fromkeys(given) if ".py:" in name]
 
     def path(self, name: str) -> Path:
         """A file that the settings name: beside them, if it has no folder of its own."""
@@ -312,6 +324,11 @@ def _checked(file: Path, content: Mapping[str, Any]) -> Settings:
     except (KeyError, ValueError, OSError) as error:
         text = f"[csv] time_zone is {form.time_zone!r}; expected a name such as 'Europe/Brussels' or 'UTC'"
         raise SettingError(text, "csv", "time_zone") from error
+    for key in ("page", "transitions"):
+        name = getattr(files, key)
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            text = f"[files] {key} is {name!r}; expected a file in the folder of the settings"
+            raise SettingError(text, "files", key)
     monitor = found.monitor()
     _validate("monitor", monitor)
     _validate("compensator", monitor.detector)

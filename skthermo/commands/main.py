@@ -8,6 +8,7 @@
     skthermo update bridge/monitor.toml NEW.csv    evaluate the records of a file
     skthermo status bridge/monitor.toml            say how things stand
     skthermo report bridge/monitor.toml --out PAGE write the owner's page
+    skthermo identify bridge/monitor.toml          say which damage explains the newest records
     skthermo acknowledge bridge/monitor.toml 3 --harmless --note "a special transport"
     skthermo rebaseline bridge/monitor.toml --since 2027-05-01
     skthermo refit bridge/monitor.toml             learn anew, the records since the fit included
@@ -16,10 +17,10 @@
 The folder stands for the monitor.toml in it, and the file of a monitor alone, .skops or .joblib, for settings. Several
 settings in one call are a fleet.
 
-Exit codes of update and status: 0 healthy, 1 alarm, 2 not evaluated (also if there was no new record), 3 an error, and
-the monitor's file is as it was: no state is printed that was not saved. An alarm is 1 also if its page cannot be
-written. Of several bridges: 1 if one is in alarm, else 3 if one failed, else 2 if one is not evaluated. check: 0 no
-finding, 1 findings. All others: 0 done, 3 an error.
+Exit codes of update and status: 0 healthy, watch or known damage, 1 alarm or drift, 2 not evaluated (also if there was
+no new record), 3 an error, and the monitor's file is as it was: no state is printed that was not saved. An alarm is 1
+also if its page cannot be written. Of several bridges: 1 if one is in alarm or drifts, else 3 if one failed, else 2 if
+one is not evaluated. check: 0 no finding, 1 findings. All others: 0 done, 3 an error.
 """
 
 from __future__ import annotations
@@ -55,12 +56,13 @@ COMMANDS = {
     "update": "take in new records",
     "status": "say how things stand",
     "report": "write the page for the owner",
+    "identify": "say which damage explains the newest records",
     "acknowledge": "say what an event was",
     "rebaseline": "begin a new baseline after a repair",
     "refit": "learn anew from the baseline and the records since",
     "discard": "take back records, such as those stamped by a wrong clock",
 }
-RECORDS, SINGLE, SEVERAL = "check init", "acknowledge rebaseline refit discard", "fit update status report"
+RECORDS, SINGLE, SEVERAL = "check init", "identify acknowledge rebaseline refit discard", "fit update status report"
 PAGE = {"dest": "report", "type": Path, "metavar": "PAGE", "help": "HTML for the owner, or of the fleet"}
 BRIDGES = "settings (.toml), their folder, or the file of a monitor (.skops, .joblib)"
 OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
@@ -96,6 +98,7 @@ OPTIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("--damage", "acknowledge", {"action": "store_true", "help": "its records may not"}),
     ("--note", "acknowledge", {"default": "", "help": "what was found"}),
     ("--since", "rebaseline", {"required": True, "metavar": "TIME", "help": "when the work was complete"}),
+    ("--since", "identify", {"metavar": "TIME", "help": "first record (default: of the event, or of 30 days)"}),
     ("--since", "discard", {"required": True, "metavar": "TIME", "help": "first stamp of the records"}),
     ("--until", "rebaseline refit", {"metavar": "TIME", "help": "last moment that may train"}),
     ("--until", "discard", {"metavar": "TIME", "help": "last stamp (default: all records since)"}),
@@ -354,7 +357,7 @@ def write_metrics(file: Path, bridges: Sequence[Mapping[str, Any]], now: pd.Time
 
     def open_events(bridge: Mapping[str, Any]) -> dict[str, int]:
         kinds = [event["kind"] for event in bridge["status"]["events"]] if bridge["status"] else None
-        known = ("damage", "watch", "measurement or structure")
+        known = ("damage", "watch", "drift", "fault")
         return {} if kinds is None else {kind: kinds.count(kind) for kind in known}
 
     add("up", "1 if the last command could do its work on this bridge, else 0", lambda one: {"": not one["errors"]})

@@ -157,12 +157,12 @@ def _n_in_time(stamps: pd.DatetimeIndex, last: pd.Timestamp, jump: pd.Timedelta)
 
 
 def same_rows(batch: pd.DataFrame, table: pd.DataFrame) -> NDArray[np.bool_]:
-    """Which rows of a batch stand in a table; an error if some have other values there."""
+    """Which rows of a batch stand in a table, up to the last bits; an error if some have other values there."""
     known = batch.index.isin(table.index)
     if not known.any():
         return known
     new, old = batch.to_numpy()[known], table.to_numpy()[table.index.get_indexer(batch.index[known])]
-    differs = ~((new == old) | (np.isnan(new) & np.isnan(old)))
+    differs = ~np.isclose(new, old, rtol=1e-9, atol=0.0, equal_nan=True)
     if differs.any():
         row, column = np.argwhere(differs)[0]
         raise ValueError(

@@ -20,10 +20,13 @@ from skthermo.monitoring import Fleet
 from skthermo.reporting._monitor import Standing, Time, monitor_facts
 from skthermo.reporting._page import Row, rendered, rows_of, settings_of
 
-PLACES = ("significant", "open", "unexplained", "raised", "worn", "silent", "broken", "unwatched", "drifting", "well")
-"""Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; one
-that would be significant, has ended and was not explained; a raised index; much stiffness lost; not evaluated; not
-fitted; without a monitor; a drift beyond its error; healthy."""
+PLACES = (
+    "significant", "open", "slow", "unexplained", "raised", "worn", "silent", "broken", "unwatched", "known",
+    "drifting", "well",
+)  # fmt: skip
+"""Places of a bridge, the worst first: an open event that is significant among all bridges; another open event; a slow
+change; one that would be significant, has ended and was not explained; a raised index; much stiffness lost; not
+evaluated; not fitted; without a monitor; damage that its owner knows; a drift beyond its error; healthy."""
 
 
 def watched(standing: Standing, is_significant: bool, unexplained: list[int]) -> Row:
@@ -37,12 +40,14 @@ def watched(standing: Standing, is_significant: bool, unexplained: list[int]) ->
     lost = max([-group["change"] for group in certain], default=0.0)
     places = {
         "alarm": ("significant" if is_significant else "open", peak),
+        "drift": ("slow", peak),
         "watch": ("raised", peak),
+        "known damage": ("known", peak),
         "attention": ("worn", lost),
         "not evaluated": ("silent", standing.now - standing.since),
     }
     place, size = places.get(state, ("drifting" if lost > 0 else "well", lost))
-    if unexplained and state != "alarm":
+    if unexplained and state not in ("alarm", "drift"):
         place, size = "unexplained", standing.events.loc[unexplained, "peak"].max()
     month = midnights_between(standing.now - pd.Timedelta(days=30), standing.now)
     month = month[month >= standing.days.index[0]] if standing.has_records else month[:0]

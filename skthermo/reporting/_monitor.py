@@ -16,6 +16,7 @@ from skthermo.fem import Structure
 from skthermo.monitoring import Monitor, MonitorStatus
 from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 from skthermo.reporting._page import Drawing, Row, draw, draw_structure, rows_of, settings_of
+from skthermo.reporting.answers import acknowledgement, event_sentences
 
 Time: TypeAlias = str | datetime | None
 
@@ -56,20 +57,28 @@ class Standing:
     def state(self) -> str:
         """The monitor's at the time of the page; not healthy either after an error, or with much stiffness lost."""
         said = self.status.state
-        if said in ("healthy", "watch") and self.errors:
+        if self.errors and said not in ("alarm", "drift"):
             return "not evaluated"
         return "attention" if said == "healthy" and self.worn else said
 
     @property
     def since(self) -> pd.Timestamp:
         """When the present state began; if it is healthy, after the last damage event or with the service."""
-        kinds = {"alarm": ["damage", "measurement or structure"], "watch": ["watch"]}.get(self.state, [])
+        kinds = {"alarm": ["damage", "fault"], "drift": ["drift"], "watch": ["watch"]}.get(self.state, [])
         if opened := [event["since"] for event in self.status.events if event["kind"] in kinds]:
             return min(opened)
+        if self.state == "known damage":
+            return self.known["start"].min()
         if self.state == "not evaluated":
             return self.status.records.evaluated or self.status.records.baseline_end
         ends = self.events.loc[self.events["kind"] == "damage", "end"]
         return ends.max() if len(ends) else self.days.index[0]
+
+    @property
+    def known(self) -> pd.DataFrame:
+        """Events that the owner has acknowledged as damage."""
+        events = self.events
+        return events[events["acknowledged"].astype(bool) & ~events["harmless"].astype(bool)]
 
     @property
     def drift(self) -> list[Row] | None:
@@ -81,9 +90,10 @@ class Standing:
         """Groups whose slow loss of stiffness has reached the limit."""
         return [one["name"] for one in self.drift or () if one["significant"] and one["change"] <= -self.limit]
 
-    def opened(self, kind: str) -> pd.DataFrame:
-        """Events of a kind that have not ended."""
-        return self.events[self.events["end"].isna() & (self.events["kind"] == kind)]
+    @property
+    def opened(self) -> list[Row]:
+        """Events that have not ended, but for those to be watched."""
+        return [event for event in self.status.events if event["kind"] != "watch"]
 
     @property
     def faults(self) -> list[Row]:
@@ -102,8 +112,8 @@ class Standing:
 
     @property
     def waiting(self) -> list[int]:
-        """Numbers of events that have ended and were not acknowledged; nobody has to explain a watch."""
-        events = self.events[self.events["kind"] != "watch"]
+        """Numbers of events that have ended and were not acknowledged; nobody has to explain a watch, or a sensor."""
+        events = self.events[self.events["kind"].isin(["damage", "drift"])]
         return events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
 
     @property
@@ -122,7 +132,7 @@ class Standing:
     def unknown(self) -> Row:
         """How many records were not evaluated and why, remarks on others, and how many days had no record."""
         is_unknown, reasons = self.evaluations["state"] == "not evaluated", self.evaluations["reason"]
-        n_days = (self.days.index[-1] - self.days.index[0]).days + 1
+        n_days = len(midnights_between(self.days.index[0], self.days.index[-1]))
         remarks = reasons[~is_unknown & (reasons != "")]
         return {
             "number": int(self.monitor.counts_["n_not_evaluated"]),
@@ -183,6 +193,9 @@ def monitor_facts(standing: Standing, structure: Structure | None = None) -> dic
         "monitor": monitor,
         "losses": losses,
         "draw_detectable": partial(draw_structure, structure, losses=losses),
+        "sentences_of": partial(event_sentences, monitor),
+        "acknowledgement": acknowledgement,
+        "call": None,
         "settings": settings_of(parts, but=("monitor: detector", "monitor: fem")),
         "identified": None,
         "fleet": None,

@@ -33,6 +33,7 @@ def owner_report(
     fdr: float = 0.1,
     now: str | pd.Timestamp | None = None,
     templates: str | os.PathLike[str] | None = None,
+    settings: str | None = None,
 ) -> Path:
     """Write a report for the owner of a structure, or of many: one HTML file, with all drawings in it.
 
@@ -67,7 +68,11 @@ def owner_report(
         When the page on a monitor or a fleet is written, in the time zone of the records; by default the clock's time.
     templates : str or path, optional
         Folder of templates in Jinja that go before the package's, such as ``monitor.html.j2`` in another language.
-        They are programs: take them from those you trust only.
+        They run in Jinja2's sandbox, which keeps them from files and code; a page is still what they make of it.
+
+    settings : str, optional
+        Settings of the monitor as they are named in commands, such as "river": the page on a monitor then names the
+        commands by which events are acknowledged, in place of calls in Python.
 
     Returns
     -------
@@ -121,7 +126,7 @@ def owner_report(
         write_fleet(subject, file, title, now, limit, fdr, folder)
         return file
     if kind == "Monitor":
-        facts = monitor_facts(Standing.at(subject, now, limit), structure)
+        facts = monitor_facts(Standing.at(subject, now, limit), structure) | {"call": settings}
         facts["identified"] = None if identified is None else identified_facts(identified)
     else:
         from skthermo.reporting._study import study_facts

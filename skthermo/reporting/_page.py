@@ -28,15 +28,12 @@ import skthermo
 from skthermo._core import text
 from skthermo._core.arrays import check_path
 from skthermo._core.estimators import import_optional
-from skthermo._core.frames import midnight
 from skthermo._core.text import printable
 from skthermo._core.warnings import collected
 from skthermo.fem import Structure
 from skthermo.plotting import DetectorsDisplay, StructureDisplay
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from jinja2 import Environment
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -54,6 +51,8 @@ POLICY = (
     f"script-src 'sha256-{b64encode(sha256(SCRIPT.encode()).digest()).decode()}'"
 )
 """What a browser may load: drawings within the page, and the page's own script; nothing from a network."""
+UNSAFE = r"to_(?!dict$)\w+|tofile|save(fig)?|eval|query|pipe|apply|fit|update|acknowledge|discard|re(fit|base\w+)"
+"""Names of methods and attributes of facts that write files, run code or change a monitor."""
 
 
 def rendered(name: str, facts: Mapping[str, Any], folder: str = "") -> str:
@@ -93,10 +92,17 @@ def check_templates(folder: str | os.PathLike[str] | None) -> str:
 @lru_cache(maxsize=8)
 def environment_of(folder: str = "") -> Environment:
     """What finds and writes templates, with the filters that they may use."""
-    jinja2 = import_optional("jinja2", extra="pages")
+    jinja2, sandbox = (import_optional(name, extra="pages") for name in ("jinja2", "jinja2.sandbox"))
     own = jinja2.PackageLoader("skthermo.reporting")
     changed = [jinja2.FileSystemLoader(folder)] if folder else []
-    environment = jinja2.Environment(
+
+    class Sandbox(sandbox.ImmutableSandboxedEnvironment):
+        """Templates read facts: they reach no private name, and no method that writes files, runs code or changes."""
+
+        def is_safe_attribute(self, obj: Any, attr: str, value: Any) -> bool:
+            return super().is_safe_attribute(obj, attr, value) and not re.fullmatch(UNSAFE, attr)
+
+    environment = Sandbox(
         loader=jinja2.ChoiceLoader([*changed, own, jinja2.PrefixLoader({"skthermo": own})]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
@@ -107,8 +113,8 @@ def environment_of(folder: str = "") -> Environment:
     environment.globals |= {"policy": POLICY, "style": STYLE, "script": SCRIPT, "versions": versions}
     environment.tests["finite"] = np.isfinite
     environment.filters |= {name: one for name, one in vars(text).items() if isfunction(one)}
-    environment.filters |= {"moment": moment, "rows_of": rows_of, "sections_of": sections_of}
-    environment.filters |= {"grouped": "{:,}".format, "day": partial(moment, is_short=True)}
+    environment.filters |= {"moment": text.day_text, "rows_of": rows_of, "sections_of": sections_of}
+    environment.filters |= {"grouped": "{:,}".format, "day": partial(text.day_text, is_short=True)}
     return environment
 
 
@@ -124,15 +130,6 @@ def rows_of(table: pd.DataFrame) -> list[Row]:
 def sections_of(page: str) -> list[tuple[str, str]]:
     """Anchors and headings of the sections of a page, as HTML."""
     return re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
-
-
-def moment(time: str | datetime | None, *, is_short: bool = False) -> str:
-    """A time as text that stays on one line: its day, and the hour where it is not midnight; nothing for none."""
-    if pd.isna(time):
-        return ""
-    stamp = pd.Timestamp(time)
-    day = f"{stamp.day} {stamp.month_name()[: 3 if is_short else None]} {stamp.year}".replace(" ", text.SPACE)
-    return day if stamp == midnight(stamp) else f"{day}, {stamp:%H:%M}"
 
 
 def _printable(value: Any) -> Any:

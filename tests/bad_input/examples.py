@@ -1,6 +1,7 @@
 """A valid call of every public function, class and method, with bad values of its arguments; and calls in which several
 arguments do not go together."""
 
+import inspect
 from pathlib import Path
 
 import matplotlib as mpl
@@ -15,9 +16,21 @@ from sklearn.neighbors import LocalOutlierFactor
 
 from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
 from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector
-from skthermo.fem import AffineModel, Bar, Beam, Membrane, PointMass, Spring, evaluate_modes
+from skthermo.fem import AffineModel, Bar, Beam, Membrane, Spring, evaluate_modes
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
-from tests.bad_input.registry import EXAMPLES, FOLDER, LEGAL, NOT_CALLED, UNTRIED, USUAL, Example, fitted, method, use
+from tests.bad_input.registry import (
+    EXAMPLES,
+    FOLDER,
+    LEGAL,
+    NOT_CALLED,
+    UNTRIED,
+    USUAL,
+    Example,
+    fitted,
+    is_registered,
+    method,
+    use,
+)
 from tests.bad_input.values import (
     HUGE,
     INF,
@@ -154,6 +167,7 @@ AFFINE = {
         {"all": ["k"]},
         bad(["k"], {"all": ["x"]}, {"all": []}, True, 3, "k", {"all": None}, {"all": [4]}, {"all": [True]}),
     ),
+    "group_mass": ({"all": EYE / 10}, bad("x", 3, True, {"no": EYE}, {"all": np.eye(3)}, {"all": "m"}, {"all": -EYE})),
     "track": (False, flag()),
     "dofs": (
         [(1, "x"), (2, "x")],
@@ -226,19 +240,19 @@ def member(cls, **extra):
     def call(**values):
         element = cls(**values)
         if cls is Bar:
-            whole = fem.Structure(NODES, BARS | {"tie": element}, SUPPORTS, {"g": ["tie"]})
+            whole = fem.Structure(NODES, BARS | {"tie": element}, SUPPORTS, GROUPS)
         elif cls is Beam:
             whole = fem.Structure(
                 SPACE,
                 {"b": element, "c": Beam("b", "c", **BEAM)},
                 {"a": ["x", "y", "z", "rx", "ry", "rz"]},
-                {"g": ["b"]},
+                {"rafters": ["b"]},
             )
         elif cls is Membrane:
-            whole = fem.Structure(SQUARE, {"m": element}, {"a": "xy", "b": "xy"}, {"g": ["m"]})
+            whole = fem.Structure(SQUARE, {"m": element}, {"a": "xy", "b": "xy"}, {"rafters": ["m"]})
         else:
-            whole = fem.Structure(NODES, BARS | {"s": element}, SUPPORTS, GROUPS | {"g": ["s"]})
-        return whole.assemble(["g" if cls is not PointMass else "rafters"], n_modes=1).frequencies([[1.1]])
+            whole = fem.Structure(NODES, BARS | {"s": element}, SUPPORTS, GROUPS)
+        return whole.assemble(["rafters"], n_modes=1).frequencies([[1.1]])
 
     return call
 
@@ -257,16 +271,6 @@ VECTOR = {"two": (0.0, 1.0), "times": (STAMP,) * 3} | bad(
     b"001",
 )
 RELEASES = bad(["rw"], 3, True, None, [NAN], b"ry", [1], str)
-use(
-    "fem.Bar",
-    member(Bar),
-    usual="lumped",
-    start=("left", NODE),
-    end=("right", NODE),
-    E=(210e9, PHYSICAL),
-    A=(0.01, PHYSICAL),
-    density=(7850.0, MAY_BE_0),
-)
 use(
     "fem.Beam",
     member(Beam),
@@ -291,14 +295,23 @@ use(
     nu=(0.3, number(-2, 0.6, 30)),
     density=(2500.0, MAY_BE_0),
 )
-use("fem.PointMass", member(PointMass), node=("apex", NODE), m=(5.0, PHYSICAL))
 use(
     "fem.Spring",
     member(Spring),
     node=("apex", NODE),
     direction=("y", bad("w", "xy", None, 1, True, b"y", str, NAN, ["y"])),
     k=(1e6, PHYSICAL),
+    to=("right", NODE),
 )
+ENDS = {"start": ("left", NODE), "end": ("right", NODE), "node": ("apex", NODE)}
+for name in fem.__all__:  # elements between one or two nodes
+    cls = getattr(fem, name)
+    if cls.__module__.startswith("skthermo.fem.elements.") and name != "Element" and not is_registered(cls):
+        given = inspect.signature(cls).parameters
+        of_nodes = {one: pair for one, pair in ENDS.items() if one in given}
+        physical = {one: (1.0, MAY_BE_0 if one in cls._may_be_zero else PHYSICAL) for one in cls._properties}
+        others = " ".join(given.keys() - of_nodes.keys() - physical.keys())
+        use(f"fem.{name}", member(cls), usual=others, **of_nodes, **physical)
 use(
     "fem.Structure",
     lambda **a: fem.Structure(**a).assemble(["rafters"], n_modes=1).frequencies([[1.0]]),
@@ -732,6 +745,7 @@ fitted(
     usual="random_state",
     after=lambda estimator, X: estimator.predict(X),
     regressor=(Ridge(), estimators("None")),
+    means=(None, bad("no", 3, True, ["-1h"], [3], [])),
 )
 use(
     "surrogate.TemperatureMapper.fit",
@@ -846,6 +860,10 @@ fitted(
     after=DAMAGE_INDEX,
     estimator=(IsolationForest(n_estimators=5, random_state=0), estimators()),
 )
+for name in detection.__all__:  # detectors that take what all detectors take
+    cls = getattr(detection, name)
+    if issubclass(cls, detection.DamageDetector) and not inspect.isabstract(cls) and not is_registered(cls):
+        fitted(cls, (F, WATCHED), usual=" ".join(inspect.signature(cls).parameters), after=DAMAGE_INDEX)
 for name in ("damage_index", "decision_function", "predict", "score_samples"):
     for owner in (DETECTOR, OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F)):
         method(f"detection.{type(owner).__name__}.{name}", owner, X=(F, table(F, rows=False)))
@@ -933,7 +951,7 @@ use(
 )
 use(
     "datasets.make_truss_campaign",
-    usual="noise random_state n_years samples_per_day",
+    usual="noise random_state n_years samples_per_day kind",
     samples_per_year=(12, count()),
     damage=({"top": 0.1}, DAMAGE),
 )
@@ -969,6 +987,7 @@ use(
 use(
     "studies.Scenario",
     lambda **a: CHAIN.simulate(LATER.temperatures, **studies.Scenario(**a).changes(T)),
+    usual="kind",
     name=("a", texts()),
     damage=({"top": 0.1}, by_key({"top": 0.1}, wrong=(20, 1.0, -15), but=("unknown",))),
     parameters=({"top": 1.02}, by_key({"top": 1.02}, wrong=(0, -1), but=("unknown",))),
@@ -980,6 +999,7 @@ use(
 use(
     "studies.ProgressiveDamage",
     lambda **a: CHAIN.simulate(LATER.temperatures, **studies.ProgressiveDamage(**a).changes(LATER.temperatures)),
+    usual="kind",
     name=("a", texts()),
     damage=({"top": 0.1}, by_key({"top": 0.1}, wrong=(20, 1.0, -15), but=("unknown",))),
     onset=(2, moments() | bad(None)),
@@ -989,6 +1009,7 @@ DRAWS = pd.DataFrame({"top": [0.1, 0.2], "bottom": [0.0, 0.1]})
 use(
     "studies.UncertainDamage",
     lambda **a: CHAIN.simulate(LATER.temperatures, **studies.UncertainDamage(**a).changes(T)),
+    usual="kind",
     name=("a", texts()),
     draws=(DRAWS, table(DRAWS, nan=False, rows=False, fixed=False) | bad(DRAWS * 100)),
 )
@@ -1003,7 +1024,7 @@ method("studies.UncertainDamage.changes", studies.UncertainDamage("a", DRAWS), u
 use(
     "studies.sweep",
     lambda **a: [one.severity for one in studies.sweep(**a)],
-    usual="model",
+    usual="model kind",
     severities=(
         [0.1, 0.2],
         vector([0.1, 0.2], but=("negative inside",)) | bad([10, 20], ".1", [1.0], [0.1, 0.1], 0.1),
@@ -1073,7 +1094,9 @@ method("studies.PODCurve.severity_at", CURVE, usual="confidence", pod=(0.9, numb
 use(
     "studies.identify_damage",
     lambda **a: studies.identify_damage(**a).severities,
-    usual="noise dofs random_state",
+    usual="noise dofs random_state kind",
+    structure=(None, instead()),
+    added_stiffness=({"rope": np.ones(23)}, bad("x", 5.0, {"rope": np.ones(4)})),
     **ARGUMENTS,
     T=(LATER.temperatures, weather(LATER.temperatures, rows=True)),
     F=(LATER.frequencies, frequencies(LATER.frequencies, rows=True)),
@@ -1122,6 +1145,7 @@ use(
     identified=(FOUND, instead() | bad([FOUND])),
     title=("Bridge", texts("empty")),
     structure=(None, instead()),
+    settings=(None, bad(3, True, NAN, ["a"], Path)),
     templates=(None, bad(3, True, NAN, ["a"], Path, "no such folder", str(FOLDER), FOLDER / "report.html")),
 )
 use(
@@ -1556,7 +1580,7 @@ UNTRIED |= {
     "datasets.make_truss_campaign": {"damage_from", "drift"},
     "detection.OutlierDetector": {"block"},
     "fem.AffineModel": {"contents"},
-    "preprocessing.ExponentialMeans": {"half_lives", "sensors"},
+    "preprocessing.ExponentialMeans": {"half_lives", "recorded", "sensors"},
     "preprocessing.check_records": {"unit"},
     "reporting.owner_report": {"detector", "drift_limit", "fdr", "max_false_alarms", "now"},
     "studies.DetectabilityStudy": {"memory", "models", "n_replicates"},

@@ -5,6 +5,7 @@
 
 import importlib
 import inspect
+import pkgutil
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,20 +13,6 @@ from typing import Any
 
 import skthermo
 from tests.bad_input.values import choice, count, flag
-
-ROOMS = (
-    "fem",
-    "preprocessing",
-    "surrogate",
-    "updating",
-    "detection",
-    "metrics",
-    "datasets",
-    "studies",
-    "monitoring",
-    "plotting",
-    "reporting",
-)
 
 FOLDER = Path(tempfile.mkdtemp())
 """Holds the files that examples read and write."""
@@ -62,7 +49,15 @@ def usual_of(of, argument):
     if argument in USUAL:
         return USUAL[argument]
     default = inspect.signature(of).parameters[argument].default
-    return default, {bool: flag, str: choice, int: count}[type(default)]()
+    bad = {bool: flag, str: choice, int: count}.get(type(default))
+    if bad is None:
+        raise LookupError(f"tests/bad_input/examples.py: {argument!r} of {of.__name__} needs a good and bad values")
+    return default, bad()
+
+
+def is_registered(of):
+    """Whether there is an example of a callable."""
+    return any(example.of is of for example in EXAMPLES)
 
 
 def use(name, call=None, /, usual="", **arguments):
@@ -96,8 +91,9 @@ def fitted(cls, X, y=None, after=None, usual="", **arguments):
 
 def public_arguments():
     """Name and argument of every public function and constructor, but for those that are not tried."""
-    for room in (importlib.import_module(f"skthermo.{name}") for name in ROOMS):
-        for name in room.__all__:
+    rooms = [module.name for module in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if module.ispkg]
+    for room in map(importlib.import_module, rooms):
+        for name in getattr(room, "__all__", ()):
             full = f"{room.__name__.split('.')[-1]}.{name}"
             if full in NOT_CALLED:
                 continue

@@ -222,7 +222,8 @@ def test_every_bad_value_of_every_argument_is_refused_or_warned_of():
 @pytest.mark.filterwarnings("ignore")
 def test_every_public_argument_has_bad_values():
     tried = {(example.name, argument) for example in all_examples() for argument in example.bad}
-    assert not sorted(set(registry.public_arguments()) - tried)
+    untried = sorted(set(registry.public_arguments()) - tried)
+    assert not untried, f"tests/bad_input/examples.py: give them a good value and bad ones: {untried}"
 
 
 def complaint(call, kind, message):

@@ -133,6 +133,61 @@ def test_other_values_of_a_known_record_are_refused_alone(bridge, records):
 
 
 @pytest.mark.usefixtures("one_detector")
+def test_a_quiet_night_is_one_line(bridge, records):
+    for row in (FIRST, FIRST + 1):
+        now = write_day(records, bridge, row)
+        done = run("update", bridge, "--now", now)
+    assert done.out == f"state: healthy (newest record {now}); 1 new record, nothing has changed\n"
+    now = write_day(records, bridge, FIRST + 2)
+    assert "expected: " in run("update", bridge, "--now", now, "--verbose").out
+
+
+def test_an_empty_file_and_a_text_without_records_are_named_once(bridge, records):
+    (bridge / "new" / "empty.csv").touch()
+    (bridge / "new" / "readme.txt").write_text("Files of the logger.\n", encoding="utf-8")
+    done = run("update", bridge, "--now", write_day(records, bridge, FIRST))
+    assert done.code == 0
+    assert "empty.csv: the file is empty" in done.out
+    assert "readme.txt: it names no column of the records" in done.out
+    assert "no records in" not in run("update", bridge, "--now", write_day(records, bridge, FIRST + 1)).out
+
+
+def test_a_file_whose_last_bits_have_changed_is_the_same(bridge, records):
+    now = write_day(records, bridge, FIRST, FIRST + 3, name="log.csv")
+    run("update", bridge, "--now", now)
+    write_day(records * (1 + 2e-15), bridge, FIRST, FIRST + 3, name="log.csv")
+    write_day(records * (1 - 1e-14), bridge, FIRST + 1, FIRST + 4)
+    done = run("update", bridge, "--now", str(records.index[FIRST + 3]), "--json")
+    assert (done.code, done.json["bridges"][0]["records"]["new"]) == (0, 1)
+    write_day(records * 1.0001, bridge, FIRST + 1, name="wrong.csv")
+    assert run("update", bridge).code == FAILED
+
+
+@pytest.mark.parametrize("year", ["0001", "1970", "2062", "2300", "9999"])
+def test_a_record_that_is_out_by_years_stops_no_night_after_it(bridge, records, year):
+    write_day(records, bridge, FIRST, FIRST + 3, name="a.csv")
+    edit(bridge / "new" / "a.csv", f"{records.index[FIRST + 1]:%Y-%m-%d}", f"{year}-01-05")
+    first = run("update", bridge, "--now", str(records.index[FIRST + 2]))
+    assert year in first.out + first.err
+    now = write_day(records, bridge, FIRST + 3)
+    done = run("update", bridge, "--now", now)
+    assert "state: healthy" in done.out
+    assert done.code == (HEALTHY if year in ("1970", "2062") else FAILED)  # a file with what is no time is named
+
+
+def test_a_baseline_in_a_workbook_and_nights_in_any_text(tmp_path, records, one_detector):
+    pytest.importorskip("openpyxl")
+    records[:FIRST].to_excel(tmp_path / "years.xlsx", index_label="time")
+    run("init", tmp_path / "years.xlsx", "--into", tmp_path / "bridge")
+    assert run("fit", tmp_path / "bridge").code == 0
+    night = records[FIRST : FIRST + 3]
+    night = night.set_axis(night.index.strftime("%d.%m.%Y %H:%M"))
+    night.to_csv(tmp_path / "bridge" / "new" / "n.csv", sep=";", decimal=",", index_label="Zeit")
+    write_day(records, tmp_path / "bridge", FIRST + 3)
+    done = run("update", tmp_path / "bridge", "--now", str(records.index[FIRST + 3]), "--json")
+    assert done.json["bridges"][0]["records"]["new"] == 4
+
+
 def test_later_records_of_the_baselines_files_are_new_ones(records, tmp_path):
     files = write_pair(records[: FIRST + 10], tmp_path)
     toml = tmp_path / "b" / "monitor.toml"

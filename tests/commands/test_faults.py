@@ -136,6 +136,24 @@ def test_a_line_of_transitions_that_was_cut_off_is_written_again(bridge, after, 
     assert_goes_on(bridge, records, after)
 
 
+def test_a_damaged_line_of_transitions_is_named_by_its_number(bridge, after, records):
+    file = bridge / "transitions.jsonl"
+    file.write_text('{"bridge": "another", "id": 1}\nnonsense\n', encoding="utf-8")
+    done = run("update", bridge, "--now", str(records.index[LAST - 1]))
+    assert "line 2 of" in done.err
+    assert "transitions.jsonl is damaged" in done.err
+    assert done.code == ALARM
+
+
+def test_what_a_killed_run_has_left_of_the_metrics_is_removed(bridge, records):
+    left = [bridge / f".metrics.prom.{name}.unfinished" for name in ("old", "new")]
+    for file in left:
+        file.touch()
+    os.utime(left[0], (0, 0))
+    run("update", bridge, "--now", str(records.index[LAST - 1]))
+    assert [file.exists() for file in left] == [False, True]  # another process may be at work on a new one
+
+
 def test_two_at_once(bridge, before, after, records):
     fcntl = pytest.importorskip("fcntl")
     with open(bridge / ".monitor.joblib.lock", "a+") as lock:

@@ -172,7 +172,8 @@ def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeyp
     done = bridge("update", "--report", tmp_path / "a.html", "--title", "Truss", new=records[FIRST + 10 : FIRST + 12])
     ((monitor, file), named), *others = shown
     assert (done.code, file, others) == (HEALTHY, tmp_path / "a.html", [])
-    assert named == {"title": "Truss", "now": str(records.index[FIRST + 11])}
+    options = {"title": "Truss", "now": str(records.index[FIRST + 11]), "identified": None}
+    assert named == options | {"settings": str(done.file)}
     assert_same_history(monitor, load_monitor(done.file))
 
 

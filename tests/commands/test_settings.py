@@ -13,6 +13,11 @@ from skthermo.preprocessing import ExponentialMeans, HingeFeatures
 from tests.commands.folders import run
 
 
+def whole(old, text):
+    """A text that is to be replaced; a setting with its default, whatever that is."""
+    return re.search(rf"^{re.escape(old)}.*$", text, re.MULTILINE)[0] if old.endswith("=") else old
+
+
 @pytest.fixture(scope="module")
 def proposed(fitted):
     return (fitted / "monitor.toml").read_text(encoding="utf-8")
@@ -23,7 +28,7 @@ def fit(tmp_path, proposed):
     """The command ``fit`` after a change of the proposed settings."""
 
     def fitting(old="", new=""):
-        file = tmp_path / "monitor.toml"
+        file, old = tmp_path / "monitor.toml", whole(old, proposed)
         assert not old or proposed.count(old) == 1
         file.write_text(proposed.replace(old, new) if old else proposed + new, encoding="utf-8")
         return run("fit", file)
@@ -47,12 +52,13 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
     changes = {
         'class = "DirectionalDetector"': 'class = "MahalanobisDetector"',
         "# window = ...": 'window = "5D"',
-        '# regimes = "auto"': 'regimes = "none"',
+        "# regimes =": 'regimes = "none"',
         '[[features]]\nclass = "H': '[[features]]\nclass = "ExponentialMeans"\nhalf_lives = ["2D", "20D"]\n\n'
         '[[features]]\nclass = "H',
-        "# persistence = 3": 'persistence = 5\nmax_delay = "3D"',
+        "# persistence =": 'persistence = 5\nmax_delay = "3D"',
     }
-    for old, new in changes.items():
+    for beginning, new in changes.items():
+        old = whole(beginning, text)
         assert text.count(old) == 1
         text = text.replace(old, new)
     file.write_text(text, encoding="utf-8")
@@ -66,17 +72,17 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("# persistence = 3", "persistance = 3", "did you mean 'persistence'"),
+        ("# persistence =", "persistance = 3", "did you mean 'persistence'"),
         ("[monitor]\n", "[montior]\n", "did you mean 'monitor'"),
-        ("# persistence = 3", "persistence = 0", "persistence"),
-        ("# persistence = 3", 'persistence = "three"', "persistence"),
-        ("# persistence = 3", "persistence = -1", "persistence"),
+        ("# persistence =", "persistence = 0", "persistence"),
+        ("# persistence =", 'persistence = "three"', "persistence"),
+        ("# persistence =", "persistence = -1", "persistence"),
         ("false_alarms_per_year = 1.0", "false_alarms_per_year = -1", "false_alarms_per_year"),
         ('class = "DirectionalDetector"', 'class = "MahalanobisDetecter"', "did you mean 'MahalanobisDetector'"),
         ('class = "sklearn.linear_model.Ridge"', 'class = "sklearn.linear_model.Rigde"', "scikit-learn"),
         ('class = "sklearn.linear_model.Ridge"', 'class = "os.system"', "scikit-learn"),
         ('class = "sklearn.linear_model.Ridge"', "alpha = 2", "class"),
-        ("# n_knots = 4", "n_knots = -4", "n_knots"),
+        ("# n_knots =", "n_knots = -4", "n_knots"),
         ('# separator = ","', "separator = 3", "expected str"),
         ('# stamps = "ISO8601"', "stamps = true", "expected str"),
         ("# time_zone = ...", 'time_zone = "Europe/Brussel"', "Europe/Brussels"),
@@ -89,10 +95,12 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
         ("[compensator]\n", '[compensator]\nestimator = "Ridge"\n', "estimator"),
         ("[[features]]", "[features]", "[[features]]"),
         ("[regression]", "[[regression]]", "[regression], once"),
+        ('# page = "status.html"', 'page = "../status.html"', "in the folder of the settings"),
+        ('# transitions = "transitions.jsonl"', 'transitions = "/tmp/t.jsonl"', "in the folder of the settings"),
     ],
 )  # fmt: skip
 def test_mistakes_are_named_with_their_line(fit, proposed, old, new, expected):
-    done = fit(old, new)
+    done, old = fit(old, new), whole(old, proposed)
     assert (done.code, "monitor.toml" in done.err) == (3, True)
     assert expected in done.err
     first = proposed[: proposed.index(old)].count("\n") + 1

@@ -16,7 +16,7 @@ F = RNG.multivariate_normal([4, 9, 12], 0.01 * COVARIANCE, 400)
 
 
 def test_index_of_gaussian_records_follows_the_chi_distribution():
-    detector = MahalanobisDetector().fit(RNG.multivariate_normal([0, 0, 0], COVARIANCE, 100_000))
+    detector = MahalanobisDetector(0.02).fit(RNG.multivariate_normal([0, 0, 0], COVARIANCE, 100_000))
     assert detector.threshold_ == pytest.approx(chi(3).ppf(0.98), rel=0.01)
 
 
@@ -90,7 +90,7 @@ def test_bad_baselines_are_named(X, message):
 
 @pytest.mark.filterwarnings("ignore:.*few-records")
 def test_few_records_do_with_a_shrunk_covariance():
-    detector = MahalanobisDetector(covariance=LedoitWolf(), threshold="quantile").fit(F[:3])
+    detector = MahalanobisDetector(0.02, covariance=LedoitWolf(), threshold="quantile").fit(F[:3])
     relative = F[:3] / F[:3].mean(axis=0)
     inverse = np.linalg.inv(ledoit_wolf(relative)[0])
     expected = [mahalanobis(row, np.ones(3), inverse) for row in relative]

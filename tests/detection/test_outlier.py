@@ -85,8 +85,8 @@ def test_the_estimators_own_threshold_is_not_used():
 
 
 def test_the_index_of_an_elliptic_envelope_is_the_squared_mahalanobis_distance():
-    envelope = OutlierDetector(EllipticEnvelope(random_state=0), threshold="quantile").fit(F)
-    robust = MahalanobisDetector(covariance=MinCovDet(random_state=0), threshold="quantile").fit(F)
+    envelope = OutlierDetector(EllipticEnvelope(random_state=0), 0.02, threshold="quantile").fit(F)
+    robust = MahalanobisDetector(0.02, covariance=MinCovDet(random_state=0), threshold="quantile").fit(F)
     np.testing.assert_allclose(envelope.damage_index(DAMAGED), robust.damage_index(DAMAGED) ** 2, rtol=1e-12)
     np.testing.assert_array_equal(envelope.predict(F), robust.predict(F))
 

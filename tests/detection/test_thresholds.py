@@ -40,7 +40,7 @@ def test_each_record_is_evaluated_by_records_of_other_blocks_that_it_does_not_re
         train = distance >= max(min(int(n_rows / n_independent), n_rows // 6), 1)
         others = MahalanobisDetector(covariance=covariance, threshold="chi2").fit(rows[train])
         index[folds == fold] = others.damage_index(rows[folds == fold])
-    detector = MahalanobisDetector(covariance=covariance).fit(rows)
+    detector = MahalanobisDetector(0.02, covariance=covariance).fit(rows)
     np.testing.assert_allclose(detector.baseline_index_, index, rtol=1e-9)
     rank = int(np.ceil((n_rows + 1) * 0.98))
     assert detector.threshold_ == pytest.approx(np.sort(index)[rank - 1])
@@ -55,7 +55,7 @@ def test_false_alarms_are_few_however_long_records_remember(detector, n_rows, co
     rates = []
     for seed in range(20):
         baseline, new = np.split(0.01 * autoregressive(n_rows + 1000, correlation, seed, 6), [n_rows])
-        fitted = detector().fit(baseline)
+        fitted = detector(contamination=0.02).fit(baseline)
         rates.append((fitted.damage_index(new) > fitted.threshold_).mean())
         assert fitted.findings_ or fitted.n_independent_ > 15
     assert np.mean(rates) < most
@@ -106,7 +106,7 @@ def test_false_alarms_on_new_records_are_near_what_is_asked_where_the_baseline_i
         random = np.random.default_rng(seed)
         baseline, later = random.normal(size=(80, 5)), random.normal(size=(400, 5))
         for name, found in rates.items():
-            fitted = detector(threshold=name).fit(0.01 * baseline)
+            fitted = detector(contamination=0.02, threshold=name).fit(0.01 * baseline)
             found.append((fitted.damage_index(0.01 * later) > fitted.threshold_).mean())
     error = np.std(rates["conformal"]) / np.sqrt(60)
     assert np.mean(rates["conformal"]) < 0.02 + 3 * error

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, evaluate_modes, load_affine
-from skthermo.fem.external._files import read_named_matrices
+from skthermo.fem.external import read_named_matrices
 from tests.fem.exported_files import (
     DOFS,
     EXPECTED,

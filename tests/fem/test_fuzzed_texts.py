@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from skthermo.fem.external._files import read_named_matrices
+from skthermo.fem.external import read_named_matrices
 from tests.fem.exported_files import TEXTS, TOTAL
 from tests.fem.slow_readers import agrees
 

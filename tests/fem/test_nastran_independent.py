@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import scipy.sparse
 
-from skthermo.fem.external._files import read_named_matrices
+from skthermo.fem.external import read_named_matrices
 from tests.fem.exported_files import DOFS, TOTAL, M
 
 with np.printoptions():  # which pyyeti changes

@@ -268,7 +268,7 @@ def with_station():
     return records.assign(station=station)
 
 
-@pytest.mark.filterwarnings("ignore:.*undetected-changes")
+@pytest.mark.filterwarnings("ignore:.*undetected-changes")  # one thermometer explains the truss badly
 def test_a_reference_finds_the_drift_of_the_only_thermometer_and_fills_its_place():
     records = with_station()
     monitor = Monitor(detector(MODES), reference=["station"]).fit(records[:N_BASELINE])

@@ -54,13 +54,13 @@ def test_events_are_shaded_until_they_end_and_open_ones_to_the_last_day():
     rows = [
         event_row("2025-02-01", "2025-02-08"),
         event_row("2025-03-01", "2025-03-04", acknowledged=True, harmless=True),
-        event_row("2025-06-20", None, kind="measurement or structure"),
+        event_row("2025-06-20", None, kind="fault"),
         event_row("2024-06-01", "2024-06-02"),  # before the first day that is drawn
     ]
     monitor = FakeMonitor(events=rows)
     display = DamageIndexDisplay.from_estimator(monitor)
     labels = [span.get_label() for span in display.event_spans_]
-    assert labels == ["damage event", "event marked as harmless", "measurement or structure event"]
+    assert labels == ["damage event", "event marked as harmless", "fault event"]
     n_days = (monitor.days_.index[-1] - monitor.events_["start"].iloc[2]).days + 1
     assert [span.get_width() for span in display.event_spans_] == [7, 3, n_days]
     assert len({span.get_hatch() for span in display.event_spans_}) == 3  # distinguished without colour

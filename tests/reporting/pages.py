@@ -24,6 +24,7 @@ from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMap
 HOSTILE = "<script>alert(1)</script>"
 QUOTED = "\"onerror='x' & $\\frac{"
 SENSOR, MODES = "<b>air</b>", ["</table><img src=x>", "$x^{", "f3"]
+TEMPLATES = files("skthermo.reporting") / "templates"
 SCRIPT = "\n" + files("skthermo.reporting").joinpath("page.js").read_text(encoding="utf-8")
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 
@@ -62,6 +63,11 @@ def page_text(subject, *, is_drawn=False, **options):
         if not is_drawn:
             patch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
         return owner_report(subject, Path(folder) / "page.html", **options).read_text(encoding="utf-8")
+
+
+def sections_in(template, folder=TEMPLATES):
+    """Names of the sections that a template has, in its order."""
+    return re.findall(r'call section\("([^"]+)"', (folder / template).read_text(encoding="utf-8"))
 
 
 def section_text(text, anchor):

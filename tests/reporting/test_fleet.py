@@ -9,7 +9,7 @@ import pytest
 
 from skthermo.reporting import owner_report
 from tests.reporting.monitors import FakeFleet, FakeMonitor, event_row
-from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain
+from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain, sections_in
 
 LOST = {"standard_error": 0.01, "per_year": -0.03, "per_year_error": 0.005, "significant": True, "p_value": 0.001}
 ENDED = event_row("2025-03-02", "2025-03-20")
@@ -112,7 +112,7 @@ def test_nothing_of_which_nothing_is_known_is_called_healthy(page, file):
 
 def test_the_page_is_sound_and_says_what_failed(page, file, fleet):
     assert page.is_self_contained()
-    assert [tag["id"] for tag in page.all("section")] == ["today", "bridges", "false-alarms", "warnings", "settings"]
+    assert [tag["id"] for tag in page.all("section")] == sections_in("fleet.html.j2")
     assert f"ValueError: {QUOTED}" in page.text
     for what in ("Its model could not be fitted to its records", "Its new records could not be evaluated"):
         assert page.text.count(what) == 2  # as a state, and beside its message

@@ -3,6 +3,7 @@
 import copy
 import re
 from collections import Counter
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -16,12 +17,11 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
 from tests.reporting.monitors import FakeMonitor, event_row, smallest_changes
-from tests.reporting.pages import HOSTILE, QUOTED, Page, page_text, section_of
+from tests.reporting.pages import HOSTILE, QUOTED, Page, page_text, section_of, sections_in
 
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
-SECTIONS = ["today", "events", "index", "drift", "sensors", "not_evaluated", "false_alarms", "detectable", "settings"]
 SPACE = "\xa0"
 
 
@@ -73,8 +73,10 @@ def page(real, tmp_path_factory):
 
 
 def test_it_is_one_sound_page_without_network(page):
-    assert [tag["id"] for tag in page.all("section")] == SECTIONS
-    assert [link[1:] for link in page.links()] == SECTIONS
+    sections = sections_in("monitor.html.j2")
+    assert sections[:2] == ["today", "events"]
+    assert [tag["id"] for tag in page.all("section")] == sections
+    assert [link[1:] for link in page.links()] == sections
     assert page.is_self_contained()
     assert len(page.drawings()) == 2  # the last month and the last year
     assert all(len(image["alt"]) > 20 for image in page.all("img"))
@@ -104,7 +106,9 @@ def test_it_says_what_the_real_monitor_says(page, real):
     event = monitor.events_.iloc[-1]
     start = event["start"]
     assert headline(today_of(monitor)) == f"Alarm since {start.day}{SPACE}{start.month_name()}{SPACE}{start.year}"
-    assert f": {event['modes']}." in page.text
+    first, *_, last = event["modes"].split(", ")
+    assert re.search(f"most changed: {first}.* and {last}.", page.text)
+    assert "monitor.acknowledge(" in page.text
     assert f"Of 76{SPACE}records in service, 4 (5.3{SPACE}%) were not evaluated" in page.text
     assert f"There was no record on 4 of 80{SPACE}days." in page.text
     numbers = [head for head in page.heads if head.isdigit()]
@@ -115,7 +119,7 @@ def test_a_monitor_that_has_evaluated_nothing_is_not_called_healthy(real, tmp_pa
     file = owner_report(real[1], tmp_path / "a.html", now=real[1].last_)
     page = Page(file.read_text(encoding="utf-8"))
     assert state_of(page) == "not-evaluated"
-    assert "Not evaluated: no record since the baseline" in page.text
+    assert "Not evaluated, no record since the baseline" in page.text
     assert "Check the data logger" in page.text
     assert not page.all("img")
 
@@ -182,11 +186,12 @@ def test_values_of_the_baseline_that_were_set_aside_are_listed():
 
 
 def test_a_response_that_was_set_aside_is_named_and_what_to_do():
-    event = event_row("2025-06-20", None, kind="measurement or structure", modes="f2")
+    event = event_row("2025-06-20", None, kind="fault", modes="f2")
     monitor = FakeMonitor(events=[event], n_not_evaluated=9, reason="f2 is left out (implausible since 2025-06-20)")
     page = today_of(monitor)
     assert state_of(page) == "alarm"
-    assert "a response was set aside: its sensor, or the structure, has changed" in part_of(monitor, "events").text
+    assert "A sensor or the structure has changed" in page.text
+    assert "a sensor failed" in part_of(monitor, "events").text
 
 
 def test_a_watch_is_neither_an_alarm_nor_healthy_and_needs_no_explanation():
@@ -196,7 +201,7 @@ def test_a_watch_is_neither_an_alarm_nor_healthy_and_needs_no_explanation():
     monitor = FakeMonitor(events=[ended, opened], watch_per_year=12)
     page = today_of(monitor)
     assert state_of(page) == "watch"
-    assert headline(page) == f"Watch since 25{SPACE}June{SPACE}2025: no alarm, but a raised damage index"
+    assert headline(page) == f"Watch since 25{SPACE}June{SPACE}2025, no alarm"
     assert "12 such events a year" in page.text
     assert "nobody has said" not in page.text
     assert "acknowledge" not in page.text
@@ -205,6 +210,44 @@ def test_a_watch_is_neither_an_alarm_nor_healthy_and_needs_no_explanation():
     assert state_of(today_of(monitor, monitor.last_ + pd.Timedelta("9D"))) == "not-evaluated"
     both = FakeMonitor(events=[opened, event_row("2025-06-26", None)], watch_per_year=12)
     assert state_of(today_of(both)) == "alarm"
+
+
+def test_a_slow_change_and_a_known_damage_have_states_of_their_own():
+    slow = event_row("2025-06-10", None, kind="drift", modes="f2")
+    monitor = FakeMonitor(events=[slow])
+    page = Page(page_text(monitor, title="River", settings="river", now=monitor.last_))
+    assert state_of(page) == "drift"
+    assert f"River: a slow change since 10{SPACE}June{SPACE}2025" in page.text
+    assert 'skthermo acknowledge river 1 --damage --note "what was found"' in page.text
+    known = event_row("2025-06-10", "2025-06-12", acknowledged=True, note="scour")
+    monitor = FakeMonitor(events=[known])
+    monitor.evaluations_["state"] = "known damage"
+    page = today_of(monitor)
+    assert (state_of(page), headline(page)) == (
+        "known-damage",
+        f"Known damage since 10{SPACE}June{SPACE}2025, nothing new",
+    )
+    assert "(scour)" in page.text
+
+
+def test_how_far_modes_fell_is_said_in_percent_without_units_of_columns():
+    stamps = pd.date_range("2025-05-01", "2025-06-29", freq="1D")
+    monitor = FakeMonitor(events=[event_row("2025-06-10", None, modes="f1 [Hz], f2")])
+    rest = pd.DataFrame({"f1 [Hz]": -0.021, "f2": 0.004}, stamps)
+    rest[:"2025-06-09"] = 0.0
+    monitor.corrected_ = monitor.records_ = rest
+    monitor.features_ = monitor.targets_ = list(rest)
+    monitor.detector_ = SimpleNamespace(residuals=lambda records: rest.loc[records.index])
+    text = f"f1 is 2.1{SPACE}% lower and f2 0.40{SPACE}% higher than in the healthy structure in the same weather."
+    assert text in today_of(monitor).text
+
+
+@pytest.mark.parametrize("change", ["2025-03-30", "2025-10-26"])  # clocks go forward, and back
+def test_days_are_those_of_the_calendar_of_the_bridge(change):
+    monitor = FakeMonitor(n_days=10, zone="Europe/Brussels")
+    days = pd.date_range(pd.Timestamp(change) - pd.Timedelta("4D"), periods=10, tz="Europe/Brussels")
+    monitor.days_ = monitor.days_.set_axis(days)
+    assert f"There was a record on each of 10{SPACE}days." in part_of(monitor, "not_evaluated").text
 
 
 def test_the_smallest_change_that_would_be_seen_is_said():
@@ -233,7 +276,7 @@ def test_losses_that_raise_an_alarm_are_listed_and_drawn_on_the_structure():
 def test_parts_that_explain_an_event_are_where_an_engineer_looks_first():
     event = event_row("2025-06-20", None, groups="top, bottom or diagonal")
     today = today_of(FakeMonitor(events=[event]))
-    assert "A loss of stiffness of top, bottom or diagonal explains most of it." in today.text
+    assert "A loss of stiffness in top, bottom or diagonal explains most of it." in today.text
     assert "beginning with top, bottom or diagonal," in today.text
     assert "top, bottom or diagonal" in part_of(FakeMonitor(events=[event]), "events").cells
 

@@ -11,7 +11,7 @@ import pytest
 
 from skthermo.reporting import owner_report
 from tests.reporting.monitors import FakeFleet, FakeMonitor, event_row
-from tests.reporting.pages import HOSTILE, QUOTED, Page
+from tests.reporting.pages import HOSTILE, QUOTED, TEMPLATES, Page, sections_in
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("jinja2")
@@ -64,7 +64,7 @@ def test_a_page_in_another_language_has_the_same_parts_and_facts(monitor, tmp_pa
     ids = [tag["id"] for tag in page.all("section")]
     assert [link.removeprefix("#") for link in page.links()] == ids
     assert set(page.values("aria-labelledby")) <= set(page.values("id"))
-    assert len(ids) == 9
+    assert ids == sections_in("monitor.html.j2", folder or TEMPLATES)
     tags = [tag for tag, _ in page.tags]
     assert all(tags[i + 1] == "caption" for i, tag in enumerate(tags) if tag == "table")
     levels = [int(tag[1]) for tag in tags if re.fullmatch("h[1-6]", tag)]
@@ -73,7 +73,7 @@ def test_a_page_in_another_language_has_the_same_parts_and_facts(monitor, tmp_pa
     assert "state alarm" in [tag.get("class") for tag in page.all("div")]
     assert {"1", "2", "deck", HOSTILE} <= set(page.heads)
     assert {"f1", QUOTED, "3"} <= set(page.cells)
-    assert page.text.count(HOSTILE) == 3  # title, note and reason
+    assert page.text.count(HOSTILE) == 4  # title, headline, note and reason
     assert len(page.tables()) == 3  # the last month, the last year, and drift
     assert any(("10" in text and "2025" in text) for text in page.paragraphs[:3])
 
@@ -120,6 +120,9 @@ def test_a_folder_is_for_pages_of_a_fleet_too(write, tmp_path):
         ('\n{% extends "other.html.j2" %}', 2, "other.html.j2"),
         ("\n{{ standing.state|significant }}", 2, "isfinite"),
         ("{{ 1 + standing.state }}", 1, "unsupported operand"),
+        ("\n{{ monitor.__class__.__mro__ }}", 2, "unsafe"),
+        ("{{ standing.days.to_csv('/tmp/days.csv') }}", 1, "unsafe"),
+        ("{{ monitor.acknowledge(1, harmless=true) }}", 1, "unsafe"),
     ],
 )
 def test_errors_name_the_file_and_the_line(write, tmp_path, text, line, message):

@@ -5,17 +5,12 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import lfilter
 
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.numbers import independent_records
 from skthermo.residuals.regimes import change_of_scatter
 from skthermo.residuals.windows import WindowMeans
-
-
-def autoregressive(n_rows, correlation, seed=0, n_columns=1):
-    noise = np.random.default_rng(seed).normal(size=(n_rows + 500, n_columns))
-    return lfilter([np.sqrt(1 - correlation**2)], [1.0, -correlation], noise, axis=0)[500:]
+from tests.residuals.series import autoregressive
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])

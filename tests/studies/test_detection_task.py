@@ -242,6 +242,7 @@ def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     assert best.threshold_ == expected.threshold_ != search.best_estimator_.threshold_
 
 
+@pytest.mark.filterwarnings("ignore:.*few-records")  # a line leaves residuals that follow the season
 def test_confirmation_evaluates_fresh_noise_and_weather(fem):
     task = task_of(fem, n_repeats=3, n_splits=1)
     grid = {"window": [None, 7]}
@@ -303,6 +304,7 @@ def test_what_is_wrong_is_said(fem, options, message):
         task_of(fem, **options)
 
 
+@pytest.mark.filterwarnings("ignore:.*few-records")  # of temperatures, which are no residuals
 def test_a_scorer_refuses_other_rows_and_what_it_cannot_evaluate(fem, task):
     detector = task.refit(with_memory("5D"))
     with pytest.raises(ValueError, match="365 of 365 rows are no simulated records"):

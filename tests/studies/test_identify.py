@@ -189,6 +189,37 @@ def test_stiffening_parameters_and_mass_are_causes_of_their_own(fem):
         assert found.table.loc[name, "kind"] in ("stiffening", "mass", "parameter")
 
 
+@pytest.mark.parametrize("amount", [0.5, 1.0])
+@pytest.mark.parametrize("stiffness", [1e7, 1e9])  # N/m: as the first mode feels, and nearly rigid
+def test_a_bearing_that_locks_is_the_spring_that_was_named(fem, stiffness, amount):
+    spring = np.zeros(TRUSS.n_dof)
+    spring[list(TRUSS.dofs).index(("7", "x"))] = stiffness
+    options = {"groups": GROUPS, "added_stiffness": {"bearing": spring}, "noise": TINY, "random_state": 0}
+    theta = np.nanmean(fem.predict_parameters(WEATHER), axis=0, keepdims=True)
+    locked = TRUSS.with_added(stiffness=np.diag(amount * spring)).frequencies(theta) / TRUSS.frequencies(theta)
+    found = identify_damage(fem, WEATHER, simulated(fem) * locked, **options)
+    assert found.most_probable == ("bearing",)
+    assert found.probability > 0.7
+    assert found.severities["bearing"] == pytest.approx(amount, rel=0.05)
+    assert found.table.loc["bearing", "kind"] == "spring"
+    for damage in ({"top": 0.05}, {"bottom": 0.1}, {"diagonal": 0.3}):
+        softer = identify_damage(fem, WEATHER, simulated(fem, damage), **options)
+        assert most_probable(softer) == pytest.approx(damage, rel=0.1)
+        assert softer.table.loc["bearing", "probability"] < 0.2
+
+
+def test_what_rises_several_times_is_found_by_the_rise_that_is_likely(fem):
+    theta = np.nanmean(fem.predict_parameters(WEATHER), axis=0, keepdims=True)
+    ratio = TRUSS.frequencies(theta * [1, 1, 4.0, 1]) / TRUSS.frequencies(theta)
+    for name, word in {"parameters": "higher", "stiffening": "stiffer"}.items():
+        options = {"groups": GROUPS, "noise": TINY, "random_state": 0, name: {"diagonal": 2.0}}
+        found = identify_damage(fem, WEATHER, simulated(fem) * ratio, **options)
+        assert found.most_probable == (f"diagonal {word}",)
+        assert abs(found.severities[f"diagonal {word}"]) == pytest.approx(3.0, rel=0.05)
+        with pytest.raises(ValueError, match=r"expected a relative rise above 0"):
+            identify_damage(fem, WEATHER, simulated(fem), **{name: {"diagonal": -1.0}})
+
+
 def test_a_group_is_not_both_weaker_and_stiffer(fem):
     found = identify_damage(fem, WEATHER, simulated(fem, {"top": 0.2}), ["top"], stiffening=True, random_state=0)
     assert found.most_probable == ("top",)

@@ -7,8 +7,6 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from sklearn.base import clone
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV
@@ -16,8 +14,8 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.preprocessing import BlockedKFold, LagFeatures
-from skthermo.residuals.baseline import BaselineResiduals, compared, order_statistic
 from skthermo.surrogate import TemperatureMapper
+from tests.residuals.series import autoregressive, residuals
 from tests.surrogate.chains import F, T, as_measured, inverse, trained
 from tests.surrogate.chains import chain as any_chain
 
@@ -35,156 +33,6 @@ def chain(mapper=PLAIN, **options):
 @cache
 def fitted():
     return chain().fit(T, F)
-
-
-def residuals(weather, values, n_folds=5):
-    folds = np.arange(len(values)) * n_folds // len(values)
-    values = np.reshape(values, (len(values), -1))
-    return BaselineResiduals(np.reshape(weather, (len(values), -1)), values, values, folds)
-
-
-def autoregressive(n_records, rho, seed=0):
-    noise, series = np.random.default_rng(seed).standard_normal(n_records), np.zeros(n_records)
-    for record in range(1, n_records):
-        series[record] = rho * series[record - 1] + np.sqrt(1 - rho**2) * noise[record]
-    return series
-
-
-# Order statistics and correlation times
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.lists(st.floats(0, 10), min_size=1, max_size=60), st.floats(0.05, 0.95))
-def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, confidence):
-    scores = np.array(scores)
-    enough = [score for score in scores if (scores <= score).sum() >= (len(scores) + 1) * confidence]
-    assert order_statistic(scores, confidence) == min(enough, default=np.inf)
-
-
-@pytest.mark.parametrize("share_missing", [0.0, 0.3])
-def test_correlation_time_of_an_autoregressive_series(share_missing):
-    series = autoregressive(20_000, 0.8)
-    series[np.random.default_rng(1).random(len(series)) < share_missing] = np.nan
-    weather = np.random.default_rng(2).uniform(size=len(series))
-    found = residuals(weather, series).correlation_time
-    assert found == pytest.approx((1 + 0.8) / (1 - 0.8), rel=0.2)
-    assert residuals(weather, 7 + 3 * series).correlation_time == pytest.approx(found)
-
-
-def test_correlation_time_of_series_without_memory_is_one():
-    weather, values = np.random.default_rng(0).standard_normal((2, 5000))
-    assert residuals(weather, values).correlation_time == pytest.approx(1, abs=0.1)
-    assert residuals(weather, np.ones(5000)).correlation_time == 1
-
-
-# Spread
-
-
-def test_spread_of_few_records_is_their_root_mean_square():
-    rng = np.random.default_rng(0)
-    weather, values = np.linspace(0, 20, 60), rng.normal(size=(60, 2))
-    values[::3, 1] = np.nan
-    spread = residuals(weather, values).spread(np.array([[0.0], [13.0], [30.0], [-10.0]]))
-    rms = np.sqrt(np.nanmean(values**2, axis=0))
-    np.testing.assert_allclose(spread, np.outer([1, 1, 1.5, 1.5], rms))
-
-
-def test_spread_follows_the_weather():
-    weather = np.random.default_rng(0).uniform(-10, 30, 1500)
-    scale = np.where(weather < 0, 0.02, 0.005)
-    spread = residuals(weather, scale * np.random.default_rng(1).standard_normal(1500)).spread(
-        np.array([[-6.0], [20.0]])
-    )
-    np.testing.assert_allclose(spread[:, 0], [0.02, 0.005], rtol=0.25)
-
-
-def test_spread_of_a_mode_that_is_always_missing_is_infinite():
-    values = np.column_stack([np.ones(50), np.full(50, np.nan)])
-    np.testing.assert_array_equal(residuals(np.arange(50.0), values).spread(np.array([[3.0]])), [[1, np.inf]])
-
-
-def test_quantiles_measure_each_period_by_the_others():
-    """Residuals of one period are twice those of the others, which all have one size."""
-    values = np.ones(50)
-    values[:10] = 2.0
-    found = residuals(np.tile(np.arange(10.0), 5), values)
-    others = np.sqrt((30 + 4 * 10) / 40)
-    np.testing.assert_allclose(found.quantiles(0.5), 1 / others)
-    np.testing.assert_allclose(found.quantiles(0.95), 2.0)
-
-
-# Realistic noise
-
-
-def drawn_records(found, weather, seed=0):
-    """Which record the noise of each row begins with; its gaps are those of that record."""
-    taken = found._taken(found._similar(weather), np.random.RandomState(seed))
-    values = found.draw(weather, np.random.RandomState(seed))
-    np.testing.assert_array_equal(np.isnan(values), np.isnan(found.values[taken]))
-    return taken
-
-
-def test_noise_is_whole_records_gaps_included():
-    rng = np.random.default_rng(0)
-    values = rng.normal(size=(400, 3))
-    values[:, 1:][rng.random((400, 2)) < 0.3] = np.nan
-    found = residuals(rng.uniform(-10, 30, (400, 2)), values)
-    weather = rng.uniform(-10, 30, (500, 2))
-    taken = drawn_records(found, weather)
-    np.testing.assert_array_equal(taken, drawn_records(found, weather))
-    assert (taken != drawn_records(found, weather, seed=1)).mean() > 0.5
-    assert len(set(taken)) > 150
-
-
-def test_noise_comes_from_similar_weather():
-    rng = np.random.default_rng(0)
-    weather, wanted = rng.uniform(-10, 30, 600), rng.uniform(-10, 30, 300)
-    taken = drawn_records(residuals(weather, rng.normal(size=600)), wanted[:, np.newaxis])
-    distance = np.abs(weather[taken] - wanted)
-    assert distance.mean() < 0.1 * np.abs(rng.permutation(weather)[:300] - wanted).mean()
-    assert distance.max() < 4  # a tenth of the weather
-
-
-def test_noise_keeps_the_serial_correlation_of_the_records():
-    weather = 10 + 15 * np.sin(np.arange(1500) * 2 * np.pi / 500)
-    later = weather[:, np.newaxis]
-    for rho, lowest, highest in ((0.8, 0.7, 1.0), (0.0, 0.0, 0.15)):
-        found = residuals(weather, autoregressive(1500, rho))
-        taken = drawn_records(found, later)
-        assert lowest <= (np.diff(taken) == 1).mean() <= highest
-        drawn = found.draw(later, np.random.RandomState(0))[:, 0]
-        assert np.corrcoef(drawn[1:], drawn[:-1])[0, 1] == pytest.approx(rho, abs=0.15)
-
-
-def test_means_of_a_week_scatter_as_those_of_the_records_whatever_the_weather_does():
-    rng = np.random.default_rng(0)
-    weather, later = rng.uniform(-10, 30, (2000, 3)), rng.uniform(-10, 30, (2000, 3))
-    found = residuals(weather, np.column_stack([autoregressive(2000, 0.5, seed) for seed in range(3)]))
-
-    def weeks(noise):
-        return noise[: 7 * (len(noise) // 7)].reshape(-1, 7, 3).mean(axis=1).var()
-
-    drawn = np.mean([weeks(found.draw(later, np.random.RandomState(seed))) for seed in range(10)])
-    assert drawn == pytest.approx(weeks(found.values), rel=0.1)
-
-
-def test_runs_of_noise_are_scaled_to_the_weather_of_the_rows():
-    rng = np.random.default_rng(0)
-    weather, later = rng.uniform(-10, 30, (3000, 1)), rng.uniform(-10, 30, (3000, 1))
-    deviation = 1 + (weather < 0)  # twice as large in frost, whatever the record before
-    found = residuals(weather, deviation * autoregressive(3000, 0.5)[:, np.newaxis])
-    drawn = found.draw(later, np.random.RandomState(0))
-    assert drawn[later < -2].std() == pytest.approx(2.0, rel=0.15)
-    assert drawn[later > 2].std() == pytest.approx(1.0, rel=0.1)
-
-
-def test_noise_is_not_bounded_by_the_largest_residual_and_keeps_its_covariance():
-    rng = np.random.default_rng(0)
-    found = residuals(rng.uniform(-10, 30, (200, 2)), rng.multivariate_normal([0, 0], [[1, 0.8], [0.8, 1]], 200))
-    later = rng.uniform(-10, 30, (20_000, 2))
-    drawn = found.draw(later, np.random.RandomState(0))
-    assert np.abs(drawn).max() > np.abs(found.values).max()
-    np.testing.assert_allclose(np.cov(drawn.T), np.cov(found.values.T), rtol=0.1)
 
 
 @pytest.mark.nightly
@@ -247,7 +95,7 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
 
 
 def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
-    lasting = F * (1 + 0.01 * autoregressive(365, 0.9)[:, np.newaxis])
+    lasting = F * (1 + 0.01 * autoregressive(365, 0.9))
     blocks = [
         np.diff(np.flatnonzero(np.diff(one.recorder_.residuals.folds))) for one in (fitted(), chain().fit(T, lasting))
     ]
@@ -436,51 +284,3 @@ def test_a_day_whose_lags_reach_back_too_far_is_counted():
     message = "rows without any temperature, and rows with lags .*not-evaluated"
     with pytest.warns(UserWarning, match=message):
         assert lagged.predict(day).isna().any(axis=1).sum() == 8
-
-
-# Many records
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 60))
-def test_of_many_records_the_most_complete_one_of_each_part_counts_for_all_modes(seed, n_records, most):
-    random = np.random.default_rng(seed)
-    values = np.where(random.random((n_records, 3)) < 0.3, np.nan, random.normal(size=(n_records, 3)))
-    there, counts = ~np.isnan(values), compared(values, most)
-    assert not (counts & ~there).any()
-    n_there = there.sum(axis=1)
-    rows, chosen = np.flatnonzero(n_there), np.flatnonzero(counts.any(axis=1))
-    assert np.array_equal(counts[chosen], there[chosen])
-    assert len(chosen) == min(most, len(rows))
-    if len(rows) > most:
-        parts = [rows[np.arange(len(rows)) * most // len(rows) == part] for part in range(most)]
-        assert all(one in part and n_there[one] == n_there[part].max() for one, part in zip(chosen, parts, strict=True))
-
-
-def test_few_of_many_records_tell_as_much(monkeypatch):
-    """Neighbours among a part of the records, which bounds their number, give the same means but for chance."""
-    rng = np.random.default_rng(0)
-    weather, wanted = rng.uniform(-10, 30, (6000, 2)), rng.uniform(-8, 28, (200, 2))
-    values = 0.01 * np.column_stack([weather[:, 0] / 10, rng.standard_normal(6000)])
-    found = residuals(weather, values)
-    expected, spread = found.expected(wanted), found.spread(wanted)
-    monkeypatch.setattr("skthermo.residuals.baseline.MOST_PLACES", 2000)
-    monkeypatch.setattr("skthermo.residuals.baseline.MOST_SIMILAR", 200)
-    few = residuals(weather, values)
-    np.testing.assert_allclose(few.expected(wanted), expected, atol=0.003)
-    np.testing.assert_allclose(few.spread(wanted), spread, atol=0.004)
-
-
-@pytest.mark.parametrize("numbers", [1, 700])
-def test_results_do_not_depend_on_how_many_rows_are_held_in_memory(monkeypatch, numbers):
-    rng = np.random.default_rng(0)
-    weather, wanted = rng.uniform(-10, 30, (300, 2)), rng.uniform(-10, 30, (50, 2))
-    values = np.where(rng.random((300, 3)) < 0.2, np.nan, rng.standard_normal((300, 3)))
-    found = residuals(weather, values)
-
-    def results():
-        drawn = found.draw(wanted, np.random.RandomState(0))
-        return np.hstack([found.expected(wanted), found.spread(wanted), drawn])
-
-    whole = results()
-    monkeypatch.setattr("skthermo.residuals.weather.NUMBERS_AT_ONCE", numbers)
-    np.testing.assert_allclose(results(), whole, rtol=1e-12)

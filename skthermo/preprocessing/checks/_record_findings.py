@@ -34,8 +34,8 @@ WARNINGS = {
     "mode-order": "columns do not have one mode of the model each: {}. One mode would be read as another. Track modes "
     "by shape, order columns as the model does, or give it the same modes by with_modes (match_modes finds them)",
     "doubtful-values": "frequencies are far from their neighbours in time and from a regression on the weather: {}. "
-    "Impossible values are set aside, the others widen the spread of a baseline. Put NaN where a value is wrong, as "
-    "HampelFilter does",
+    "Impossible values are set aside, the others make alarms later. Look at these records, and leave a value empty "
+    "where it is wrong",
 }
 """By kind: the finding, with a place for details; its consequence; the remedy."""
 

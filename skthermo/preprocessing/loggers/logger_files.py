@@ -240,18 +240,19 @@ def _one_table(parts: list[pd.DataFrame], file: Path, findings: list[RecordsWarn
 
 
 def once(table: pd.DataFrame) -> pd.DataFrame:
-    """Records that come twice with the same values are one; with other values they are an error."""
+    """Records that come twice with the same values, up to the last bits, are one; others are an error."""
     again = table.index.duplicated()
     if not again.any():
         return table
-    table = table[~table.reset_index().duplicated().to_numpy()]
-    again = table.index.duplicated()
+    first = table[~again]
+    known = first.loc[table.index[again]].to_numpy()
+    again[again] = ~np.isclose(table[again].to_numpy(), known, rtol=1e-9, atol=0.0, equal_nan=True).all(axis=1)
     if again.any():
         raise ValueError(
             f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
             f"{table.index[again][0]}; expected each once. If the clocks go back then, {ZONE_OPTIONS}"
         )
-    return table
+    return first
 
 
 def sections_of(block: Block, form: CsvFormat) -> list[Section]:

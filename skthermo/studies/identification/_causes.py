@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, pairwise
 from typing import Any, Literal
@@ -17,6 +17,7 @@ from skthermo.fem.damage import ALL_GROUPS, LossKind, kind_option, read_groups
 
 SOMETHING_ELSE, NO_DAMAGE = "something else", "no damage"
 MemberLine = list[Hashable]
+LIKELY_ONCE = 5.0  # the scale by which an amount of 1 is one standard deviation of the default prior
 
 
 @dataclass(frozen=True)
@@ -79,17 +80,17 @@ class Cause:
     """Something that may have changed, by one unknown amount between 0 and a bound, which may be negative.
 
     Amounts are severities of damage (below 0 for stiffening), relative changes of a parameter, or how many times a
-    mass pattern was added. ``of`` names the model's groups or the parameter that changes. ``rows`` are the rows of a
-    table in which it counts: its own, those of all groups, or the members of a stretch of ``group``. ``scale`` is the
-    standard deviation of the amount over the prior's severity, and ``share`` the part of its group's prior
-    probability. One that is ``alone`` explains without others. ``place`` says where a stretch is.
+    ``pattern`` of mass or stiffness was added. ``of`` names the model's groups or the parameter that changes. ``rows``
+    are the rows of a table in which it counts: its own, those of all groups, or the members of a stretch of ``group``.
+    ``scale`` is the standard deviation of the amount over the prior's severity, and ``share`` the part of its group's
+    prior probability. One that is ``alone`` explains without others. ``place`` says where a stretch is.
     """
 
     name: str
-    kind: Literal["damage", "stiffening", "parameter", "mass"] = "damage"
+    kind: Literal["damage", "stiffening", "parameter", "mass", "spring"] = "damage"
     bound: float = 0.95
     of: tuple[str, ...] = ()
-    mass: Any = None
+    pattern: Any = None
     scale: float = 1.0
     rows: tuple[Hashable, ...] = ()
     group: str = ""
@@ -111,32 +112,34 @@ class Cause:
 def read_causes(
     model: Any,
     groups: Sequence[str] | Mapping[str, Sequence[str]] | None,
-    stiffening: bool | Sequence[str] | None,
-    parameters: Sequence[str] | None,
+    stiffening: bool | Iterable[str] | None,
+    parameters: Iterable[str] | None,
     added_mass: Mapping[str, MatrixLike] | None,
+    added_stiffness: Mapping[str, MatrixLike] | None,
 ) -> list[Cause]:
     """Causes that are asked for, and an even loss in all groups."""
     members = read_groups(model, groups)
     known = {name: [name] for name in model.groups} | members
     if stiffening is None or isinstance(stiffening, bool | np.bool_):
-        stiffer = list(members) if stiffening else []
-    else:
-        stiffer = check_names([stiffening] if isinstance(stiffening, str) else stiffening, "stiffening", sorted(known))
-    asked = [parameters] if isinstance(parameters, str) else parameters or []
+        stiffening = list(members) if stiffening else []
     causes = [Cause(name, of=tuple(of)) for name, of in members.items()]
-    causes += [Cause(f"{name} stiffer", "stiffening", -1.0, tuple(known[name])) for name in stiffer]
-    for name in check_names(asked, "parameters", model.parameter_names):
-        causes.append(Cause(f"{name} lower", "parameter", -0.95, (name,)))
-        causes.append(Cause(f"{name} higher", "parameter", 1.0, (name,)))
-    for name, mass in _read_masses(model, added_mass).items():
-        lowest = (mass if mass.ndim == 1 else mass.diagonal()).min()  # what takes mass away does so once at most
-        causes.append(Cause(name, "mass", 3.0 if lowest >= 0 else 1.0, mass=mass, scale=5.0))  # once is as likely
+    for name, bound, scale in _rises(stiffening, "stiffening", known):
+        causes.append(Cause(f"{name} stiffer", "stiffening", -bound, tuple(known[name]), scale=scale))
+    for name, bound, scale in _rises(parameters or [], "parameters", model.parameter_names):
+        if not isinstance(parameters, Mapping):
+            causes.append(Cause(f"{name} lower", "parameter", -0.95, (name,)))
+        causes.append(Cause(f"{name} higher", "parameter", bound, (name,), scale=scale))
+    for kind, what, given in (("mass", "mass", added_mass), ("spring", "stiffness", added_stiffness)):
+        for name, pattern in _read_patterns(model, what, given).items():
+            lowest = pattern.diagonal().min()  # what takes away does so once at most
+            bound = 3.0 if lowest >= 0 else 1.0
+            causes.append(Cause(name, kind, bound, pattern=pattern, scale=LIKELY_ONCE))
     names = [cause.name for cause in causes]
     wrong = [name for name in names if name in (SOMETHING_ELSE, NO_DAMAGE, ALL_GROUPS, "") or names.count(name) > 1]
     if wrong:
         raise ValueError(
-            f"causes have the names {wrong}; expected names in groups or added_mass that differ from each other and "
-            f"from {SOMETHING_ELSE!r}, {NO_DAMAGE!r} and {ALL_GROUPS!r}"
+            f"causes have the names {wrong}; expected names in groups or of what was added that differ from each other "
+            f"and from {SOMETHING_ELSE!r}, {NO_DAMAGE!r} and {ALL_GROUPS!r}"
         )
     causes = [replace(cause, rows=(cause.name,), group=cause.name) for cause in causes]
     if len(members) > 1:
@@ -145,22 +148,39 @@ def read_causes(
     return causes
 
 
-def _read_masses(model: Any, added_mass: Any) -> dict[str, Any]:
-    if added_mass is None:
+def _rises(given: Any, what: str, known: Collection[str]) -> Iterator[tuple[str, float, float]]:
+    """Names of what may rise, up to which relative rise, and the scale of the amount: a rise that is given is likely,
+    and three times as much possible."""
+    names = [given] if isinstance(given, str) else list(given)
+    for name in check_names(names, what, sorted(known)):
+        if not isinstance(given, Mapping):
+            yield name, 1.0, 1.0
+            continue
+        size = given[name]
+        if not is_real(size) or not 0 < size < np.inf:
+            raise ValueError(f"{what} has {name!r}: {size!r}; expected a relative rise above 0, such as 4.0")
+        yield name, 3.0 * size, LIKELY_ONCE * size
+
+
+def _read_patterns(model: Any, what: str, given: Any) -> dict[str, Any]:
+    """Matrices of added mass or stiffness; a vector is the diagonal of one."""
+    if given is None:
         return {}
-    if not isinstance(added_mass, Mapping) or not all(isinstance(name, str) for name in added_mass):
-        raise ValueError(f"added_mass is {added_mass!r:.200}; expected a mapping of name to masses in kg")
-    if added_mass and not hasattr(model, "with_added"):
-        raise ValueError(f"added_mass is given, but {model!r} has no method 'with_added'; expected an AffineModel")
+    argument, unit = f"added_{what}", {"mass": "kg", "stiffness": "N/m"}[what]
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        raise ValueError(f"{argument} is {given!r:.200}; expected a mapping of name to {what} in {unit}")
+    if given and not hasattr(model, "with_added"):
+        raise ValueError(f"{argument} is given, but {model!r} has no method 'with_added'; expected an AffineModel")
     found = {}
-    for name, mass in added_mass.items():
+    for name, pattern in given.items():
+        array = pattern if scipy.sparse.issparse(pattern) else np.asarray(pattern, dtype=float)
+        found[name] = scipy.sparse.diags(array, format="csr") if array.ndim == 1 else array
         try:
-            model.with_added(mass=mass)
+            model.with_added(**{what: found[name]})
         except ValueError as error:
-            raise ValueError(f"added_mass {name!r}: {error}") from error
-        found[name] = mass if scipy.sparse.issparse(mass) else np.asarray(mass, dtype=float)
+            raise ValueError(f"{argument} {name!r}: {error}") from error
         if not abs(found[name]).max() > 0:
-            raise ValueError(f"added_mass {name!r} is 0 everywhere; expected kg at some degrees of freedom")
+            raise ValueError(f"{argument} {name!r} is 0 everywhere; expected {unit} at some degrees of freedom")
     return found
 
 
@@ -171,8 +191,8 @@ def changed(
     factors: dict[str, float] = {}
     theta = theta.copy()
     for cause, amount in zip(causes, amounts, strict=True):
-        if cause.kind == "mass":
-            model = model.with_added(mass=amount * cause.mass)
+        if cause.kind in ("mass", "spring"):
+            model = model.with_added(**{"mass" if cause.kind == "mass" else "stiffness": amount * cause.pattern})
         elif cause.kind == "parameter":
             theta[:, list(model.parameter_names).index(cause.of[0])] *= 1 + amount
         else:

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from joblib import delayed
 from numpy.typing import ArrayLike
 
-from skthermo._core.arrays import Array, MatrixLike, RandomState, as_random_state, check_jobs, check_probability
+from skthermo._core.arrays import Array, RandomState, as_random_state, check_jobs, check_probability
 from skthermo._core.parallel import run_jobs
-from skthermo._core.text import SPACE, Sentences, chance_text, counted, listed, percent, probability_text, significant
+from skthermo._core.text import (
+    SPACE,
+    Sentences,
+    chance_text,
+    counted,
+    listed,
+    percent,
+    probability_text,
+    share_text,
+    significant,
+)
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
@@ -46,14 +56,15 @@ def identify_damage(
     *,
     structure: Structure | None = None,
     kind: LossKind = "stiffness",
-    noise: ArrayLike | Literal["fitted"] = "fitted",
+    noise: ArrayLike | str = "fitted",
     prior: DamagePrior | None = None,
-    stiffening: bool | Sequence[str] | None = None,
-    parameters: Sequence[str] | None = None,
-    added_mass: Mapping[str, MatrixLike] | None = None,
+    stiffening: bool | Iterable[str] | None = None,
+    parameters: Iterable[str] = (),
+    added_mass: Mapping[str, Any] | None = None,
+    added_stiffness: Mapping[str, Any] | None = None,
     shapes: tuple[ArrayLike, ArrayLike] | None = None,
     dofs: ArrayLike | None = None,
-    shape_noise: ArrayLike | Literal["fitted"] = 0.01,
+    shape_noise: ArrayLike | str = 0.01,
     models: Sequence[Any] | None = None,
     n_jobs: int | None = None,
     random_state: RandomState = None,
@@ -83,15 +94,21 @@ def identify_damage(
         from mode to mode and from record to record; or independent records with a relative standard deviation.
     prior : DamagePrior, optional
         What is thought of damage before; by default `DamagePrior()`.
-    stiffening : bool or sequence of str, optional
-        Groups that may also have become stiffer, by up to 100 %, such as after a repair or where a bearing is locked;
-        True for all. Each is a cause of its own, named "GROUP stiffer", with a severity below 0.
-    parameters : sequence of str, optional
+    stiffening : bool, sequence of str, or mapping of str to float, optional
+        Groups that may also have become stiffer, by up to 100 %, such as after a repair; True for all. A mapping has
+        the relative gain of each that would be likely, such as 4.0 for a bearing that locks; up to three times as much
+        is possible. Each is a cause of its own, named "GROUP stiffer", with a severity below 0.
+    parameters : sequence of str, or mapping of str to float, optional
         Parameters of the model whose change may explain the shifts, such as the mass of the ballast. Each gives two
-        causes, "NAME lower" and "NAME higher", with relative changes from -95 % to 100 %.
+        causes, "NAME lower" and "NAME higher", with relative changes from -95 % to 100 %. A mapping has parameters that
+        may only rise, with the relative rise that would be likely, as for ``stiffening``.
     added_mass : mapping of str to matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
         Patterns of mass that may have been added, in kg; a vector holds lumped masses. The amount of each is how many
         times it was added, from 0 to 3; give what would be likely if there were any. Negative masses were taken away.
+    added_stiffness : mapping of str to matrix of shape (n_dof, n_dof) or array-like of shape (n_dof,), optional
+        Springs that may act now, in N/m, such as that of a bearing that has locked or of a new strut; a vector holds
+        springs to the ground. Amounts are as those of ``added_mass``. More than what makes a bearing rigid changes
+        nothing.
     shapes : (array-like, array-like), optional
         Measured mode shapes of the healthy and of the changed structure in similar weather, each of shape (n_dofs,
         n_modes) or, of several records, (n_records, n_dofs, n_modes). Scale, sign and phase do not matter, and complex
@@ -173,7 +190,7 @@ def identify_damage(
         raise ValueError(f"structure is {structure!r:.200}; expected the Structure or ImportedStructure of the model")
     check_jobs(n_jobs)
     random = as_random_state(random_state)
-    causes = read_causes(fem.model, groups, stiffening, parameters, added_mass)
+    causes = read_causes(fem.model, groups, stiffening, parameters, added_mass, added_stiffness)
     check_kind(kind)
     measured = {"kind": kind, "shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
     with collected() as findings:
@@ -394,9 +411,9 @@ class IdentifiedDamage(Sentences):
         cover it with a probability of 90 %; ``if_damaged``, its mean where it has changed, and ``highest_if_damaged``,
         which it then does not exceed with a probability of 95 %. Of causes also ``error_alone``, the standard error if
         nothing else could have changed, ``error_together``, if all others may have changed as much as is likely
-        beforehand, and ``kind``: "damage", "stiffening", "parameter" or "mass". Of members also ``group``, ``line``
-        of connected members of the group, ``element``, the number along the line, ``x``, ``y`` and ``z`` of its middle,
-        and ``is_likely``, whether it is among `likely_members`.
+        beforehand, and ``kind``: "damage", "stiffening", "parameter", "mass" or "spring". Of members also ``group``,
+        ``line`` of connected members of the group, ``element``, the number along the line, ``x``, ``y`` and ``z`` of
+        its middle, and ``is_likely``, whether it is among `likely_members`.
     groups : DataFrame
         The same by cause, also with a structure.
     shifts : DataFrame
@@ -462,7 +479,7 @@ class IdentifiedDamage(Sentences):
         rows = {}
         for one in self._listed:
             severities = [self.estimates.loc[(one.name, cause.name), "severity"] for cause in one.causes]
-            texts = [f"{cause.name} {_percent(size)}" for cause, size in zip(one.causes, severities, strict=True)]
+            texts = [f"{cause.name} {_size(cause, size)}" for cause, size in zip(one.causes, severities, strict=True)]
             text = ", ".join(texts + [SOMETHING_ELSE] * one.has_else) or NO_DAMAGE
             rows[one.name] = {"probability": one.probability, "misfit": one.misfit, "text": text}
         return pd.DataFrame.from_dict(rows, orient="index")
@@ -600,18 +617,22 @@ class IdentifiedDamage(Sentences):
     def _phrase(self, cause: Cause) -> str:
         """A cause of the most probable explanation, with its place and the band of its amount."""
         row = self.estimates.loc[(self.explained[0].name, cause.name)]
-        amount, (low, high) = _percent(row["severity"]), (_percent(row[end]) for end in ("ci_low", "ci_high"))
-        text = (
-            f"a loss of {amount} of {self.kind} in {cause.name}" if cause.kind == "damage" else f"{cause.name} {amount}"
-        )
-        return f"{text}{f', {cause.place}' if cause.place else ''} (90{SPACE}% interval {low} to {high})"
+        amount, change = _size(cause, row["severity"]), {"damage": "loss", "stiffening": "gain"}.get(cause.kind)
+        text = f"{cause.name} {amount}"
+        if change:
+            text = f"a {change} of {amount} of {self.kind} in {cause.name.removesuffix(' stiffer')}"
+        text += f", {cause.place}" if cause.place else ""
+        low, high = sorted((row["ci_low"], row["ci_high"]), key=abs)
+        bounds = f"up to {_size(cause, high)}" if abs(low) < 5e-4 else f"{_size(cause, low)} to {_size(cause, high)}"
+        return f"{text} (90{SPACE}% interval {bounds})"
 
     @property
     def _open(self) -> list[str]:
         """What the modes leave open of the answer."""
         likely = set(self.groups.index[self.groups["probability"] >= 0.1])
         pairs = [" and ".join(pair) for pair in self.indistinguishable if likely.intersection(pair)]
-        return [f"which of {pair} has changed" for pair in pairs] + [f"damage of {name}" for name in self.unobservable]
+        left = [f"which of {pair} has changed" for pair in pairs] + [f"damage of {name}" for name in self.unobservable]
+        return left if len(left) <= 3 else [*left[:3], f"{len(left) - 3} other such things"]
 
     def _limits(self) -> Iterator[str]:
         if self._open:
@@ -653,3 +674,10 @@ class IdentifiedDamage(Sentences):
 
 def _percent(size: float) -> str:
     return percent(size, ".2g" if abs(size) < 0.995 else ".0f")
+
+
+def _size(cause: Cause, amount: float) -> str:
+    """An amount without its sign, which the name of its cause says, in percent or times of a pattern."""
+    if cause.kind in ("mass", "spring"):
+        return f"{significant(abs(amount))} times"
+    return share_text(abs(amount))

@@ -1,0 +1,93 @@
+"""What has changed and what to do, in sentences: the same on a page and in a terminal."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from skthermo._core.text import bare, day_text, listed, share_text, significant
+from skthermo._core.warnings import collected
+
+LONGEST = pd.Timedelta("30D")  # records of the state as it is now
+
+
+def _newest(table: pd.DataFrame, since: Any) -> pd.DataFrame:
+    return table[table.index >= max(pd.Timestamp(since), table.index[-1] - LONGEST)]
+
+
+def _measured(monitor: Any) -> pd.DataFrame:
+    """Records as they were measured, without the correction for slow drift, but for values that were left out."""
+    seen = monitor.corrected_[monitor.features_]
+    records = seen.copy()
+    records[monitor.targets_] = monitor.records_.loc[seen.index, monitor.targets_]
+    return records.where(seen.notna())
+
+
+def shifts_of(monitor: Any, since: Any) -> pd.Series:
+    """How far each response is from that of the healthy structure in the same weather, on average since a time.
+
+    Of the last 30 days at most, those that stand out most from their scatter first; relative, or in the unit of a
+    response that may be zero; empty for a detector that has no residuals.
+    """
+    if not len(monitor.corrected_) or not hasattr(monitor.detector_, "residuals"):
+        return pd.Series(dtype=float)
+    records = _measured(monitor)
+    seen_from = max(pd.Timestamp(since), records.index[-1] - LONGEST) - 2 * LONGEST  # windows reach into these records
+    with collected(drop_others=True):  # each record has its reason
+        rest = _newest(monitor.detector_.residuals(records[records.index >= seen_from]), since)
+    mean, scatter = rest.mean(), rest.std().replace(0.0, np.finfo(float).tiny)
+    return mean[(mean / scatter).abs().sort_values(ascending=False, kind="stable").index]
+
+
+def identified_in(monitor: Any, since: Any) -> Any:
+    """What explains the newest records since a time by the monitor's model, of the last 30 days at most."""
+    from skthermo.studies import identify_damage  # jobs without an alarm need no studies
+
+    records, targets = _newest(_measured(monitor), since), monitor.targets_
+    with collected(drop_others=True):
+        return identify_damage(monitor.fem, records.drop(columns=targets), records[targets], random_state=0)
+
+
+def change_text(shifts: Mapping[str, float], names: list[str], units: Mapping[str, str], is_relative: bool) -> str:
+    """How far some responses have moved, such as "f1 is 2.1 %, f2 1.4 % lower"; "" where it is not known."""
+    known = {name: shifts[name] for name in names if np.isfinite(shifts.get(name, np.nan))}
+    ways = ["lower" if shift < 0 else "higher" for shift in known.values()]
+    parts = []
+    for place, (name, shift) in enumerate(known.items()):
+        size = share_text(abs(shift)) if is_relative else f"{significant(abs(shift))} {units.get(name, '')}".strip()
+        is_last = place == len(ways) - 1 or ways[place + 1] != ways[place]
+        parts.append(f"{bare(name)}{'' if place else ' is'} {size}{f' {ways[place]}' if is_last else ''}")
+    return listed(parts)
+
+
+def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = None) -> Iterator[str]:
+    """What an event is, as `MonitorStatus.events` has it: since when, which modes by how much, which parts."""
+    kind, since = event["kind"], event["since"]
+    times = event.get("n_times", 1)
+    begun = f"Event {event['event']} ({kind}) since {day_text(since)}"
+    begun += f", {times} times in alarm" if times > 1 and kind == "damage" else ""
+    if kind == "fault":
+        of = f" of {listed([bare(name) for name in event['modes']])}" if event["modes"] else ""
+        yield f"{begun}: values{of} cannot be those of the structure as it was. A sensor or the structure has changed."
+        return
+    shifts = shifts_of(monitor, since)
+    moved = change_text(shifts, list(shifts.index[:3]), monitor.units_, monitor.smallest_changes_.is_relative)
+    named = f"; most changed: {listed(event['modes'])}" if event["modes"] else ""
+    yield f"{begun}: {moved} than in the healthy structure in the same weather." if moved else f"{begun}{named}."
+    if identified is not None:
+        yield identified.answer()[0]
+    elif event["groups"]:
+        size = event.get("size", np.nan)
+        loss = f"A loss of stiffness{f' of about {share_text(size)}' if pd.notna(size) else ''}"
+        yield f"{loss} in {', '.join(event['groups'])} explains most of it."
+
+
+def acknowledgement(event: int, settings: str | None) -> str:
+    """How to say what an event was: the command or, without settings, the call."""
+    if settings is None:
+        return f'monitor.acknowledge({event}, harmless=False, note="what was found")'
+    return f'skthermo acknowledge {shlex.quote(settings)} {event} --damage --note "what was found"'
