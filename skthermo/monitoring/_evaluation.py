@@ -153,22 +153,31 @@ def joined_names(directional: DirectionalDetector) -> dict[str, str]:
     return {name: " or ".join(names[together == together[name]]) for name in names}
 
 
-def causes(records: pd.DataFrame, place: int, targets: list[Any], temperatures: list[Any], index: Array) -> list[str]:
-    """Why records from a position on have no damage index, or whose index they have; "" for the others.
+def outages_of(times: pd.DatetimeIndex, step: pd.Timedelta, reach: pd.Timedelta) -> list[tuple[pd.Timestamp, Any, Any]]:
+    """First stamp after each outage, the last one of a record that reaches into it, and how long it was."""
+    steps = times[1:] - times[:-1]
+    ends = np.flatnonzero(steps > 3 * step)
+    return [(times[end + 1], times[end + 1] + reach, steps[end]) for end in ends]
 
-    Means of earlier temperatures and windows are not full enough after an outage, which is named.
+
+def causes(
+    new: pd.DataFrame,
+    targets: list[Any],
+    temperatures: list[Any],
+    index: Array,
+    outages: list[tuple[pd.Timestamp, Any, Any]],
+) -> list[str]:
+    """Why new records have no damage index, or whose index they have; "" for the others.
+
+    A record that reaches into an outage names it.
     """
-    new = records.iloc[place:]
     without = {"mode": new[targets].isna().all(axis=1).to_numpy()}
     without["temperature"] = new[temperatures].isna().all(axis=1).to_numpy() if temperatures else without["mode"]
     what = np.select(list(without.values()), [f"no {name} has a value" for name in without], "")
-    times = records.index[records.notna().any(axis=1)]
-    steps = np.diff(times.asi8, prepend=times.asi8[:1])
     unknown = np.where(what == "", "too few values in its window, its lags or among its modes", what).astype(object)
-    for outage in np.flatnonzero(steps > 3 * np.median(steps)):
-        length = times[outage] - times[outage - 1]
-        text = f"too few records for its window or means since the outage of {duration_text(length)}"
-        unknown[(new.index >= times[outage]) & (what == "")] = f"{text} up to {times[outage]:%Y-%m-%d %H:%M}"
+    for end, until, length in outages:
+        text = f"too few records for its window, means or lags since the outage of {duration_text(length)}"
+        unknown[(new.index >= end) & (new.index <= until) & (what == "")] = f"{text} up to {end:%Y-%m-%d %H:%M}"
     others = np.where(what == "", "", np.char.add(what, ": others of its window are evaluated"))
     return np.where(np.isnan(index), unknown, others).tolist()
 

@@ -44,6 +44,7 @@ from skthermo.monitoring._evaluation import (
     group_effects,
     index_of,
     losses_of,
+    outages_of,
     refuse_other_batches,
     residuals,
     rounded,
@@ -576,7 +577,7 @@ class Monitor(SavesFrames, Estimator):
             "extrapolated: temperatures outside those of the baseline": is_outside,
             f"even a fall of all responses by {100 * fall:.2g} % would stay undetected": is_blind,
         }
-        said = [causes(records, place, self.targets_, temperatures, index), notes["note"]]
+        said = [causes(new, self.targets_, temperatures, index, self._outages()), notes["note"]]
         said += [np.where(rows, text, "") for text, rows in remarks.items()]
         reason = ["; ".join(filter(None, parts)) for parts in zip(*said, strict=True)]
         then = self._index_then(records, place, index, drifts)
@@ -589,6 +590,12 @@ class Monitor(SavesFrames, Estimator):
             means = rest.groupby(midnights(rest.index)).mean()
             self.means_ = pd.concat([self.means_[self.means_.index < first], means])
         return self._decisions(new.index, **columns, **notes.drop(columns="note"))
+
+    def _outages(self) -> list[tuple[pd.Timestamp, Any, Any]]:
+        """Outages since the baseline: the first stamp after each, the last that reaches into it, and its length."""
+        step, known = usual_step(self.trained_.index), self.corrected_.notna().any(axis=1)
+        times = self.baseline_.index[-1:].append(self.corrected_.index[known])
+        return outages_of(times, step, self.lookback_.duration(step))
 
     def _index_then(self, records: pd.DataFrame, place: int, index: Array, drifts: pd.DataFrame) -> Array:
         """Damage indices as they were before sensors at fault had been found."""

@@ -176,7 +176,7 @@ def test_reasons_say_why_a_record_is_not_evaluated():
     stamp = ALL.index[N_BASELINE:]
     assert answers.loc[stamp[20], "reason"] == "no mode has a value"
     assert answers.loc[stamp[25], "reason"].startswith("no temperature has a value")
-    assert "its lags" in answers.loc[stamp[64], "reason"]
+    assert "outage of 3.2 days" in answers.loc[stamp[64], "reason"]
     assert "f2 is -999: taken as missing" in answers.loc[stamp[30], "reason"]
     assert "T1 is 285 °C: taken as missing" in answers.loc[stamp[31], "reason"]
     assert "implausible" in answers.loc[stamp[50], "reason"]
