@@ -308,7 +308,8 @@ class Events:
         """How the structure stands at each record by its events, whether it is evaluated or not, and the event.
 
         What the owner has answered of an event holds for later records up to one and a half times the level that it had
-        reached. After damage that is known, nothing is healthy until a new baseline.
+        reached; that of a mean of 30 days goes on to rise for so long after a change. After damage that is known,
+        nothing is healthy until a new baseline.
         """
         states, numbers = np.full(len(self.times), "healthy", dtype=object), np.zeros(len(self.times), dtype=np.int64)
         ranks = np.full(len(self.times), len(STATES))
@@ -322,7 +323,8 @@ class Events:
                 is_calm = np.zeros(len(rows), dtype=bool)
                 if event["acknowledged"]:
                     of_kind = [one for one in runs if one.kind == run.kind]
-                    before = [one.level[self.times[one.first : one.stop] <= event["at"]] for one in of_kind]
+                    reached = event["at"] + 30 * DAY.value * (run.kind == DRIFT)
+                    before = [one.level[self.times[one.first : one.stop] <= reached] for one in of_kind]
                     most = 1.5 * np.fmax.reduce(np.concatenate(before), initial=-np.inf)
                     is_calm = (self.times[rows] >= event["at"]) & ~(run.level > (most if most > 0 else np.inf))
                 rank = STATES.index({DAMAGE: "alarm", DRIFT: "drift", WATCH: "watch"}[run.kind])

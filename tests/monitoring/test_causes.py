@@ -147,3 +147,14 @@ def test_damage_that_comes_and_goes_is_one_event_and_then_known_until_it_grows(f
     assert set(one.update(lowered(0.01)[460:520])["state"]) <= {"known damage", "watch"}
     one.update(lowered(0.04)[520:640])
     assert one.status(one.last_).state in ("drift", "alarm")
+
+
+def test_damage_that_is_known_soon_is_no_drift_while_its_mean_fills(fitted):
+    """The mean of 30 days goes on to rise after an answer that came sooner."""
+    onset, answer = 160, 225
+    changed = pd.concat([SERVICE[:onset], lowered(0.01)[onset:440]])
+    one = served(fitted, changed[:answer])
+    (event,) = one.events_[one.events_["kind"] == "damage"].itertuples()
+    assert changed.index[answer] - event.start < pd.Timedelta("25D")
+    one.acknowledge(event.Index, harmless=False, note="crack")
+    assert set(one.update(changed[answer:])["state"]) <= {"known damage", "watch", "not evaluated"}
