@@ -1,7 +1,6 @@
 """Simulated accelerations have the frequencies, damping and variance of theory; pyOMA-2 finds the modes in them."""
 
-import re
-import textwrap
+import runpy
 
 import numpy as np
 import pytest
@@ -79,27 +78,13 @@ def test_sensors_have_the_variance_and_noise_of_theory(modes, accelerations):
     np.testing.assert_allclose((noisy - clean).std(axis=0), 0.5 * clean.std(axis=0), rtol=0.02)
 
 
-def guide_code():
-    page = (EXAMPLES.parent / "docs" / "guide" / "accelerations.rst").read_text()
-    blocks = re.findall(r"\.\. code-block:: py\n\n((?:    .*\n|\n)+)", page)
-    return [textwrap.dedent(block) for block in blocks]
-
-
 @pytest.mark.filterwarnings("ignore")  # of other packages, on import
 def test_the_guides_code_finds_the_modes_of_a_record(modes, accelerations, monkeypatch):
     monkeypatch.setenv("PYOMA_LOG_LEVEL", "ERROR")
     monkeypatch.setenv("TQDM_DISABLE", "1")
     pytest.importorskip("pyoma2")
-    namespace = {
-        "measured": [accelerations[: len(accelerations) // 2]],
-        "rate": RATE,
-        "model": make_truss(),
-        "sensors": SENSORS,
-    }
-    for block in guide_code():
-        exec(compile(block, "accelerations.rst", "exec"), namespace)
-    for name in ("modes", "of_one_order"):
-        found = namespace[name]
-        np.testing.assert_allclose(found.frequencies.iloc[0], modes[0][:6], rtol=0.003)
-        np.testing.assert_allclose(found.damping.iloc[0], DAMPING, rtol=0.5)
-        assert (found.mac > 0.97).all(axis=None)
+    recipe = runpy.run_path(str(EXAMPLES.parent / "docs" / "guide" / "recipes" / "poles_by_pyoma2.py"))
+    found = recipe["track"]([accelerations[: len(accelerations) // 2]], RATE, make_truss(), SENSORS)
+    np.testing.assert_allclose(found.frequencies.iloc[0], modes[0][:6], rtol=0.003)
+    np.testing.assert_allclose(found.damping.iloc[0], DAMPING, rtol=0.5)
+    assert (found.mac > 0.97).all(axis=None)

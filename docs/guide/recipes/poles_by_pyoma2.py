@@ -1,6 +1,9 @@
+import numpy as np
 from pyoma2.algorithms import SSI
 from pyoma2.algorithms.data.run_params import Clustering, Step1, Step2, Step3
 from pyoma2.setup import SingleSetup
+
+from skthermo.preprocessing import ModeTracker
 
 
 def identify(accelerations, rate):
@@ -13,4 +16,13 @@ def identify(accelerations, rate):
     often = Step3(post_proc=["1xorder", "min_size_pctg"], min_pctg=0.3, select="avg")
     ssi.add_clustering(Clustering(name="modes", steps=(stable, near, often)))
     ssi.run_clustering("modes")
-    return ssi.result, ssi.result.clustering_results["modes"]
+    return ssi.result.clustering_results["modes"]
+
+
+def track(measured, rate, model, sensors):
+    records = []
+    for accelerations in measured:
+        found = identify(accelerations, rate)
+        records.append({"frequencies": found.Fn, "damping": found.Xi, "shapes": found.Phi.T})
+    f, phi = model.modes(np.ones((1, len(model.parameter_names))))
+    return ModeTracker((f[0], phi[0, sensors])).fit_transform(records)
