@@ -645,7 +645,8 @@ def _division(text: str, file: Path) -> tuple[str, str]:
             continue
         width = _usual_width(rows)
         numbers = [_is_number(cell, decimal) for row in rows if len(row) == width for cell in row[1:]]
-        found.append((numbers.count(True) / len(rows), -rank, separator, decimal))
+        share = numbers.count(True) / len(rows)
+        found.append((share / 1.5 if separator == " " else share, -rank, separator, decimal))  # dates have spaces, too
     if not found or max(found)[0] == 0:
         raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {separators} between")
     return max(found)[2:]
