@@ -324,9 +324,11 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
 def labelled_damaged(y: Any, n_rows: int) -> NDArray[np.bool_]:
     """Which rows labels of +1 and -1 tell as damaged; none without such labels."""
     labels = np.ones(n_rows) if y is None else np.asarray(y)
-    return (
-        labels == -1 if labels.shape == (n_rows,) and np.isin(labels, (-1, 1)).all() else np.zeros(n_rows, dtype=bool)
-    )
+    if labels.shape != (n_rows,) or not np.isin(labels, (-1, 1)).all():
+        return np.zeros(n_rows, dtype=bool)
+    if (labels == -1).all():
+        raise ValueError(f"y labels all {n_rows} rows as damaged (-1); expected healthy rows (+1) to learn from")
+    return labels == -1
 
 
 def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:

@@ -154,3 +154,12 @@ def test_who_takes_no_labels_is_named_after_a_search():
     search = GridSearchCV(forest, {"max_samples": [50]}, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
     with pytest.warns(UserWarning, match="search-refits"):
         task.refit(search)
+
+
+@pytest.mark.parametrize(
+    "detector", [MahalanobisDetector(), CompensatedDetector(targets=MODES)], ids=["alone", "whole"]
+)
+def test_labels_that_leave_nothing_healthy_are_refused(detector):
+    records = YEAR.frequencies if isinstance(detector, MahalanobisDetector) else joined(YEAR)
+    with pytest.raises(ValueError, match="365 rows"):
+        detector.fit(records, -np.ones(365))

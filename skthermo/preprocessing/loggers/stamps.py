@@ -270,6 +270,7 @@ def _parts_of_dates(columns: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...
 
 
 def stamp_text(row: Sequence[str], places: Sequence[int]) -> str:
+    """The parts of a row's stamp as one text."""
     return " ".join(row[place] for place in places)
 
 
