@@ -130,12 +130,6 @@ def spread_evenly(rows: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     return rows if len(rows) <= most else rows[np.linspace(0, len(rows) - 1, most).astype(int)]
 
 
-def range_sums(values: NDArray, first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:
-    """Sums of the values over ranges of rows, each from its first row to the one before its stop."""
-    totals = np.concatenate([np.zeros((1, *values.shape[1:])), values.cumsum(axis=0)])
-    return totals[stop] - totals[first]
-
-
 def piecewise_linear(values: Array, knots: Array) -> Array:
     """Columns, then max(column - knot, 0) of all columns for each row of knots."""
     return np.hstack([values, *np.maximum(values - knots[:, np.newaxis], 0.0)])

@@ -69,7 +69,7 @@ class Corrections:
         days = midnights(raw.index)
         bounds = [*np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[0] - 1)), len(raw)]
         if self.sensors is None and self.drift is None:
-            return (replace(begin, day=days[0]), replace(begin, day=days[-1]))[-1:]
+            return (replace(begin, day=days[-1]),)
         states = [replace(begin, day=days[0])]
         for (first, stop), next_day in zip(pairwise(bounds[:-1]), days[bounds[1:-1]], strict=True):
             states.append(replace(self._after(states[-1], raw.iloc[first:stop]), day=next_day))
