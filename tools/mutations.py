@@ -46,15 +46,9 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("damage taken for exchanged modes", "(there < here / 4).all(axis=1)", "(there < 4 * here).all(axis=1)"),
         ("which of two thermometers is wrong", "if len(resolved) == 1:", "if resolved:"),
     ],
-    ("fem/modal/_condensation.py", "fem/test_condensation.py"): [
-        ("certificate against missed modes", "return positive & (np.triu", "return (np.triu"),
-    ],
     ("fem/_factors.py", "fem/test_factors.py"): [
         ("pivots of an indefinite matrix", "(factors.U.diagonal() > 0).all()", "True"),
         ("order of elimination", "solution[order] =", "solution[:] ="),
-    ],
-    ("fem/modal/_sparse.py", "fem/test_factors.py"): [
-        ("convergence of modes from guesses", "(errors[wanted] < tol).all()", "True"),
     ],
     ("fem/modal/_sparse.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),

@@ -901,8 +901,7 @@ class ReducedModel(AffineModel):
     The j-th lowest frequency is never below the full model's j-th (Rayleigh-Ritz). The estimate of a relative error
     [MMO00]_ is r' K_0^-1 r / (2 lambda), with the residual r = K phi - lambda M phi of a mode of unit modal mass and
     the nominal stiffness K_0: within 30 % of K_0, 0.64 to 1.3 times the error. Shapes are given at all degrees of
-    freedom. A damaged model is checked anew, and its basis is enlarged if necessary. Iteration on the basis errs by at
-    most a hundredth of ``tol``, which a bound certifies row by row; LAPACK solves the other rows.
+    freedom. A damaged model is checked anew, and its basis is enlarged if necessary.
 
     Examples
     --------

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.linalg
@@ -13,7 +13,6 @@ from scipy.optimize import linear_sum_assignment
 
 from skthermo._core.arrays import Array, Matrix
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
-from skthermo.fem.modal._condensation import EigenSolver, batch_solver
 from skthermo.fem.modal._modes import REPEATED, LocalModes, linearised_by_row
 from skthermo.fem.modal._sparse import ShiftInvertSolver, count_modes
 
@@ -28,7 +27,7 @@ class NominalModes(NamedTuple):
     repeated: NDArray[np.bool_]  # which modes share a repeated frequency, (n_modes, n_modes)
 
     @classmethod
-    def of_ranks(cls, solver: EigenSolver, mass: AffineTerms, ranks: NDArray[np.intp]) -> "NominalModes":
+    def of_ranks(cls, solver: "Solver", mass: AffineTerms, ranks: NDArray[np.intp]) -> "NominalModes":
         """The modes of some ranks at theta = 1."""
         nominal = np.ones((1, mass.exponents.shape[1]))
         eigenvalues, shapes = solver.modes(nominal, int(ranks.max()) + 1)
@@ -56,16 +55,14 @@ class AffineCore:
 
     stiffness: AffineTerms
     mass: AffineTerms
-    solver: EigenSolver
+    solver: "Solver"
     nominal: NominalModes
     ranks: NDArray[np.intp]
     track: bool
     available: int  # how many modes the mass allows and the solver finds
-    guards: int = GUARD_MODES  # how many modes above the lowest are computed first where columns are followed
     healthy: "AffineCore | None" = None  # whose nominal modes define the columns, if it is another core
     parts: AffineTerms | None = None  # of the mass: those that damage groups lose with their section
     n_lowest: int = field(init=False)  # how many of the lowest modes contain all columns at theta = 1
-    n_solved: int = field(init=False)  # how many of the lowest modes are computed at first
     first_candidates: int = field(init=False)  # how many are examined at first, where columns are followed
     max_candidates: int = field(init=False)  # how many are examined before a mode counts as dissolved
     rows_per_chunk: int = field(init=False)  # rows of theta that are solved together, so that memory stays bounded
@@ -90,7 +87,6 @@ class AffineCore:
         self.n_lowest = int(self.ranks.max()) + 1
         self.max_candidates = min(self.available, 8 * self.n_lowest)  # beyond them a mode counts as dissolved
         self.first_candidates = min(self.n_lowest + GUARD_MODES, self.max_candidates)
-        self.n_solved = min(self.n_lowest + self.guards, self.max_candidates) if self.track else self.n_lowest
         numbers = max(self.stiffness.n_entries, 2 * self.stiffness.n_dof * self.n_lowest)
         self.rows_per_chunk = max(1, min(self.stiffness.max_rows, 2**25 // (8 * numbers)))
 
@@ -191,16 +187,9 @@ class AffineCore:
         stiffness, mass = self.stiffness.projected(basis), self.mass.projected(basis)
         nominal = self.nominal._replace(weighted_shapes=basis.T @ self.nominal.weighted_shapes)
         nominal_row = np.ones((1, stiffness.exponents.shape[1]))
-        lapack = dense_solver(stiffness, mass, nominal_row, widest=1e13 * tol)
-        solver = batch_solver(stiffness, mass, nominal_row, lapack, max(0.02 * tol, 1e-12))
+        solver = dense_solver(stiffness, mass, nominal_row, widest=1e13 * tol)
         available = min(self.max_candidates, basis.shape[1])
-        projected = replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
-        # Few modes swap across the widest gap between nominal eigenvalues: guards up to it are enough.
-        highest = min(projected.n_lowest + GUARD_MODES + 1, available)
-        eigenvalues = solver.eigenvalues(nominal_row, highest)[0, projected.n_lowest - 1 :]
-        ratios = eigenvalues[1:] / eigenvalues[:-1]
-        known = len(ratios) and np.isfinite(ratios).all()
-        return replace(projected, guards=int(ratios.argmax()) if known else GUARD_MODES)
+        return replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
 
     def frequencies(self, theta: Array) -> tuple[Array]:
         """Frequencies in Hz, (n_samples, n_modes)."""
@@ -211,7 +200,7 @@ class AffineCore:
     def modes(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies in Hz and shapes (n_samples, n, n_modes)."""
         if self.track:
-            return self._tracked(theta, self.n_solved)
+            return self._tracked(theta, self.first_candidates)
         eigenvalues, shapes = self.solver.modes(theta, self.n_lowest)
         return np.sqrt(eigenvalues[:, self.ranks]) / (2 * np.pi), shapes[:, :, self.ranks]
 
@@ -279,11 +268,10 @@ class AffineCore:
         order, spread = pair_modes(mac, self.nominal.repeated), self.nominal.mass_spread(theta, self.mass)
         frequencies = np.take_along_axis(np.sqrt(eigenvalues) / (2 * np.pi), order, axis=1)
         shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)
-        is_final = n_candidates >= self.first_candidates  # of the fewer of a basis, any may be assigned
-        doubtful = may_be_missed(mac, order, self.nominal.repeated, spread, is_final=is_final)
-        more = 2 * n_candidates if is_final else self.first_candidates
-        if n_candidates < self.max_candidates and doubtful.any():
-            frequencies[doubtful], shapes[doubtful] = self._tracked(theta[doubtful], min(more, self.max_candidates))
+        missed = may_be_missed(mac, order, self.nominal.repeated, spread)
+        if n_candidates < self.max_candidates and missed.any():
+            more = min(2 * n_candidates, self.max_candidates)
+            frequencies[missed], shapes[missed] = self._tracked(theta[missed], more)
         return frequencies, shapes
 
 
@@ -305,17 +293,9 @@ def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = No
 
 
 def may_be_missed(
-    mac: NDArray[np.float64],
-    order: NDArray[np.intp],
-    repeated: NDArray[np.bool_],
-    spread: ArrayLike = 1.0,
-    *,
-    is_final: bool = True,
+    mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_], spread: ArrayLike = 1.0
 ) -> NDArray[np.bool_]:
     """Samples in which a mode beyond the candidates could have a higher MAC with a reference than the one assigned.
-
-    If the assignment is not final, also samples in which it could be another one with more candidates: where some
-    reference is not assigned its best candidate.
 
     Modes are orthogonal, so the MACs of a reference with all modes add up to 1 (with repeated references, to their
     number). No mode beyond the candidates can have a higher MAC than what the candidates leave of that sum. Where the
@@ -325,8 +305,7 @@ def may_be_missed(
     spans = repeated @ mac
     assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
     left = np.multiply.outer(spread, repeated.sum(axis=1)) - spans.sum(axis=2)
-    least = left if is_final else np.maximum(left, spans.max(axis=2))
-    return (assigned < least).any(axis=1)
+    return (assigned < left).any(axis=1)
 
 
 def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -335,19 +314,18 @@ def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
     return cluster[:, np.newaxis] == cluster
 
 
-def eigen_solver(stiffness: AffineTerms, mass: AffineTerms) -> EigenSolver:
-    """Batches for dense terms, shift-invert for sparse ones."""
-    if isinstance(stiffness, DenseTerms) and isinstance(mass, DenseTerms):
-        return dense_solver(stiffness, mass, np.ones((1, stiffness.exponents.shape[1])))
-    if isinstance(stiffness, SparseTerms) and isinstance(mass, SparseTerms):
-        return ShiftInvertSolver(stiffness, mass)
-    raise TypeError("stiffness and mass must both be dense or both sparse")
-
-
 class DenseSolver(ABC):
     """A solver by LAPACK; at one theta the stiffness is factored when it is first needed."""
 
     _stiffness: DenseTerms
+
+    @abstractmethod
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        """Lowest eigenvalues, (n_samples, n_modes)."""
+
+    @abstractmethod
+    def scaled(self, factors: Array) -> "DenseSolver":
+        """The solver of the same structure with its stiffness terms multiplied."""
 
     @abstractmethod
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
@@ -424,7 +402,19 @@ class FlexibilitySolver(DenseSolver):
         return inverse @ self._mass.assemble(theta) @ transposed, transposed, ones
 
 
-def dense_solver(stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = 1e6) -> EigenSolver:
+Solver: TypeAlias = DenseSolver | ShiftInvertSolver
+
+
+def eigen_solver(stiffness: AffineTerms, mass: AffineTerms) -> Solver:
+    """Batches for dense terms, shift-invert for sparse ones."""
+    if isinstance(stiffness, DenseTerms) and isinstance(mass, DenseTerms):
+        return dense_solver(stiffness, mass, np.ones((1, stiffness.exponents.shape[1])))
+    if isinstance(stiffness, SparseTerms) and isinstance(mass, SparseTerms):
+        return ShiftInvertSolver(stiffness, mass)
+    raise TypeError("stiffness and mass must both be dense or both sparse")
+
+
+def dense_solver(stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = 1e6) -> DenseSolver:
     """The standard form, which is the fastest, where it is accurate enough; else the flexibility form.
 
     Up to the ``widest`` ratio of eigenvalues, the standard form gives the lowest one to 1e-9 of its value.
