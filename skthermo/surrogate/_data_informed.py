@@ -64,7 +64,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
-from skthermo.fem.damage import LossKind
+from skthermo.fem.damage import LossKind, damage_directions
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, check_records
 from skthermo.preprocessing.checks import misplaced_columns
@@ -91,7 +91,6 @@ from skthermo.surrogate._thermal import (
     possible,
     ratio_regressor,
 )
-from skthermo.surrogate.effects import damage_directions
 
 
 class Simulated(TypedDict, total=False):
@@ -626,7 +625,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ValueError
             If a group is unknown, none moves a frequency, or the mass of a group is not known.
         """
-        return damage_directions(self, groups, kind)
+        check_is_fitted(self)
+        theta = np.nanmean(as_floats(self.parameters_), axis=0, keepdims=True)
+        directions = damage_directions(self.model, groups, kind, theta)
+        return (directions * self.thermal_.elasticity(theta)[0]).set_axis(self.mode_names_, axis=1)
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far the inputs of M2 are outside the training range, row by row.

@@ -242,15 +242,18 @@ class ThermalModel(SavesFrames):
         parts = np.split(simulator.frequencies(theta, self.n_jobs), len(draws))
         return [self.measured(part, weather) for part in parts]
 
-    def propagated(self, theta: Array, deviations: Array, *, step: float = 0.01) -> Array:
-        """Relative standard deviations of frequencies in the measured domain, (n_rows, n_modes), given those of theta.
+    def elasticity(self, theta: Array, *, step: float = 0.01) -> Array:
+        """Relative changes of measured frequencies by those of the model's, (n_rows, n_modes), over a relative step;
+        exact for shifts and scales."""
+        frequencies = self.simulator.frequencies(theta, self.n_jobs)
+        lower, higher = (as_floats(self.aligner.inverse_transform(frequencies * (1 + side))) for side in (-step, step))
+        return (higher - lower) / (step * (higher + lower))
 
-        The slope of the aligner is that over a relative ``step`` of the frequencies; exact for shifts and scales.
-        """
-        frequencies, jacobian = self.simulator.linearise(possible(theta)[0], self.n_jobs)
-        sides = [as_floats(self.aligner.inverse_transform(frequencies * (1 + side))) for side in (-step, step)]
-        slopes = np.log(sides[1] / sides[0]) / (2 * step * frequencies)
-        effects = slopes[:, :, np.newaxis] * jacobian * deviations[:, np.newaxis]
+    def propagated(self, theta: Array, deviations: Array) -> Array:
+        """Relative standard deviations of measured frequencies, (n_rows, n_modes), given those of theta."""
+        theta = possible(theta)[0]
+        slopes = self.simulator.linearise(theta, self.n_jobs, relative=True)[1]
+        effects = self.elasticity(theta)[:, :, np.newaxis] * slopes * (deviations / theta)[:, np.newaxis]
         return np.sqrt((effects**2).sum(axis=2))
 
     def known_deviations(self, weather: Weather) -> Array:

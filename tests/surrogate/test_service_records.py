@@ -100,21 +100,6 @@ def test_gaps_are_the_same_whatever_the_noise(in_service):
     assert (in_service.recorder_.gaps(in_service.weather(T), random_state=5)[1] != expected).any()
 
 
-def test_sizes_of_outliers_are_smoothed_run_by_run():
-    outliers = np.full((1000, 2), np.nan)
-    sizes = np.random.default_rng(0).uniform(0.05, 0.2, 20)
-    outliers[50::50, 0][:10], outliers[60::50, 1][:10] = sizes[:10], -sizes[10:]
-    outliers[50:53, 0] = sizes[0]
-    records = ServiceRecords(np.zeros((1000, 3), dtype=bool), outliers, np.zeros((1000, 1)))
-    drawn = np.vstack([records.drawn_outliers(np.arange(1000), np.random.RandomState(seed)) for seed in range(200)])
-    np.testing.assert_array_equal(np.sign(drawn[:1000]), np.sign(outliers))
-    np.testing.assert_allclose(drawn[51:53, 0], drawn[50, 0])
-    logs = np.log(np.abs(drawn[~np.isnan(drawn)]))
-    known = np.log(np.abs(outliers[~np.isnan(outliers)]))
-    assert logs.max() > known.max()
-    assert (logs.mean(), logs.std()) == pytest.approx((known.mean(), known.std()), rel=0.05)
-
-
 def test_outliers_come_as_often_in_the_same_mode_and_in_runs(in_service, spoiled):
     noise = [
         in_service.recorder_.noise(in_service.weather(T), gaps="fitted", outliers="fitted", random_state=seed)
