@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
 from skthermo.exceptions import ModelWarning, SkthermoWarning
-from skthermo.fem._factors import Elimination, elimination
+from skthermo.fem._factors import Factorise, elimination
 
 Key = tuple[str, ...]
 Content = tuple[Hashable, tuple[str, ...]]
@@ -281,8 +281,8 @@ class SparsityPattern:
         return np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
 
     @cached_property
-    def elimination(self) -> Elimination:
-        """The order in which matrices of this pattern are factorised."""
+    def factorise(self) -> Factorise:
+        """What factorises matrices of this pattern."""
         return elimination(self.rows, self.pointers)
 
     def matrix(self, data: Array) -> scipy.sparse.csc_array:
