@@ -180,7 +180,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("poles of tracked modes contested", "counts[inverse] > 1", "counts[inverse] > 2"),
     ],
     ("datasets/_kw51_campaign.py", "datasets/test_kw51_campaign.py"): [
-        ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
+        ("mass of a retrofit", '{"retrofit": retrofit_mass()}', '{"retrofit": retrofit_mass() / 2}'),
     ],
     ("preprocessing/checks/_columns.py", "preprocessing/test_checks.py"): [
         ("stuck sensors beside rounding", "lengths if ((lengths > 1)", "lengths[:0] if ((lengths > 1)"),
