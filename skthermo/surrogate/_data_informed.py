@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import Any, Literal, Self, TypedDict, Unpack, overload
+from typing import Any, Literal, Self, overload
 
 import numpy as np
 import pandas as pd
@@ -91,19 +91,6 @@ from skthermo.surrogate._thermal import (
     possible,
     ratio_regressor,
 )
-
-
-class Simulated(TypedDict, total=False):
-    """Options of `DataInformedFEM.simulate`, for checkers of types."""
-
-    damage: Mapping[str, float | ArrayLike] | None
-    parameters: Mapping[str, float] | None
-    stiffness: MatrixLike | None
-    mass: MatrixLike | None
-    noise: ArrayLike | Literal["fitted"]
-    gaps: float | Literal["fitted"] | None
-    outliers: ArrayLike | Literal["fitted"] | None
-    random_state: int | np.random.RandomState | None
 
 
 class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
@@ -509,9 +496,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return self._as_targets(X, lowest), self._as_targets(X, frequencies * (1 + margin))
 
     @overload
-    def simulate(self, X: pd.DataFrame, **options: Unpack[Simulated]) -> pd.DataFrame: ...
+    def simulate(self, X: pd.DataFrame, **options: Any) -> pd.DataFrame: ...
     @overload
-    def simulate(self, X: ArrayLike, **options: Unpack[Simulated]) -> Array: ...
+    def simulate(self, X: ArrayLike, **options: Any) -> Array: ...
     def simulate(
         self,
         X: ArrayLike,

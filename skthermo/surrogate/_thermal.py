@@ -17,6 +17,7 @@ from skthermo._core.arrays import (
     as_floats,
     as_mapping,
     is_real,
+    mapping_of,
     median,
     patterns,
     real_array,
@@ -300,9 +301,7 @@ def is_impossible(theta: Array) -> NDArray[np.bool_]:
 def factors_of(parameters: Mapping[str, float], names: Sequence[str]) -> Array:
     """The factor of every parameter, 1 where none is given."""
     factors = dict.fromkeys(names, 1.0)
-    parameters = as_mapping(parameters)
-    if not isinstance(parameters, Mapping):
-        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
+    parameters = mapping_of(parameters, "parameters", "a mapping of parameter to factor")
     for name, factor in parameters.items():
         if name not in factors:
             raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
@@ -329,9 +328,7 @@ def split_damage(
     damage: Mapping[str, float | ArrayLike], X: ArrayLike
 ) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
     """Severities that are the same in all rows, and those with a value for each row."""
-    damage = as_mapping(damage)
-    if not isinstance(damage, Mapping):
-        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    damage = mapping_of(damage, "damage", "a mapping of group to severity")
     fixed: dict[str, Any] = {}
     growing: dict[str, NDArray[np.float64]] = {}
     n_rows = np.shape(X)[0]

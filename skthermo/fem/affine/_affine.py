@@ -25,6 +25,7 @@ from skthermo._core.arrays import (
     check_theta,
     integer_row,
     is_label,
+    mapping_of,
     positive_integer,
     real_array,
     shape_array,
@@ -1065,9 +1066,7 @@ def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str,
         groups = {name: [i for i, key in enumerate(keys) if name in key] for name in names}
         return {name: tuple(positions) for name, positions in groups.items() if positions}
     found = {}
-    if not isinstance(groups, Mapping):
-        raise ValueError(f"groups is {groups!r:.200}; expected a mapping of group to the terms that it scales")
-    for group, terms in groups.items():
+    for group, terms in mapping_of(groups, "groups", "a mapping of group to the terms that it scales").items():
         if isinstance(terms, bytes | type) or not isinstance(terms, Iterable):
             raise ValueError(f"group {group!r} is {terms!r:.200}; expected stiffness terms, such as ['E_deck']")
         positions: set[int] = set()
