@@ -14,6 +14,7 @@ import pytest
 
 import skthermo
 from skthermo.datasets import make_truss_campaign
+from tools.mutations import MUTATIONS, is_written_once
 
 ROOT = Path(__file__).parents[1]
 BUILT = {"generated", "gallery", "_build"}
@@ -154,6 +155,23 @@ def test_files_and_names_that_contributors_are_sent_to_are_there():
         if not (invented.search(name) or name in words or (ROOT / name).exists())
     ]
     assert not missing, "\n".join(["name what is there now, in place of:", *missing])
+
+
+def test_a_page_says_what_each_tool_is_for():
+    callers = [ROOT / "docs" / "conf.py", *PAGES]
+    texts = " ".join(path.read_text() for path in callers)
+    unused = [path.name for path in (ROOT / "tools").glob("*.py") if f"tools/{path.name}" not in texts]
+    assert not unused, f"tools/: name on a page who calls it, or remove: {unused}"
+
+
+def test_every_mutation_can_be_made():
+    each = [(file, tests, *mutation) for (file, tests), found in MUTATIONS.items() for mutation in found]
+    gone = [
+        f"{breaks} ({file}; tests/{tests})"
+        for file, tests, breaks, *texts in each
+        if not is_written_once(file, tests, breaks, *texts)
+    ]
+    assert not gone, "\n".join(["tools/mutations.py: write anew what no longer stands in the code once:", *gone])
 
 
 def test_sources_are_listed_and_cited():
