@@ -38,7 +38,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
     ],
     ("fem/modal/_core.py", "fem/test_tracking.py"): [
-        ("doubt about a tracked mode", "assigned < least", "assigned < least / 4"),
+        ("doubt about a tracked mode", "assigned < left", "assigned < left / 4"),
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
         ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
     ],
