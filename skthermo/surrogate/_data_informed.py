@@ -319,7 +319,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 posterior: Any = last_step(inverse)
                 findings += posterior.shape_inputs_.doubts(posterior.model, aligned, found.theta)
         with collected() as of_mapper, stages.stage("temperature mapper", mapper):
-            fit_checked(mapper, filled, named(filled, found.theta, self.parameter_names_), weights)
+            index = filled.index if isinstance(filled, pd.DataFrame) else None
+            targets = pd.DataFrame(found.theta, index, self.parameter_names_, copy=False)  # with the names of outputs
+            fit_checked(mapper, filled, targets, weights)
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
             findings += [*found.findings, *of_mapper, *of_model]
@@ -816,11 +818,6 @@ def imputed(imputer: BaseEstimator, T: Table, F: Table) -> tuple[Table, Table]:
     values = as_floats(imputer.fit_transform(np.hstack([T, F])))
     frequencies = values[:, n_sensors : n_sensors + n_modes]
     return frame_like(T, values[:, :n_sensors]), frame_like(F, frequencies, column_names(F, "f"))
-
-
-def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
-    """Parameters as a mapper learns them: a frame, by whose names a `FleetMapper` knows them."""
-    return pd.DataFrame(theta, T.index if isinstance(T, pd.DataFrame) else None, names, copy=False)
 
 
 def refitted(

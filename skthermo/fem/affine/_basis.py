@@ -25,13 +25,6 @@ class Basis(NamedTuple):
     snapshot_points: Array
 
 
-class Directions(NamedTuple):
-    """Directions (n_dof, n), orthonormal in a stiffness, and the energies (n,) that vectors have along them."""
-
-    vectors: Array
-    energies: Array
-
-
 def grow_basis(
     full: AffineCore, bounds: Array, tol: float, random_state: RandomState, start: Array | None = None
 ) -> Basis:
@@ -51,8 +44,8 @@ def grow_basis(
         start = snapshots_at(full, used)
     known, largest = of_unit_energy(start, stiffness), list[float]()
     for _ in range(40):
-        directions = principal_directions(known, stiffness, 1e-3 * tol)
-        vectors = directions.vectors[:, directions.energies > tol]
+        directions, energies = principal_directions(known, stiffness, 1e-3 * tol)
+        vectors = directions[:, energies > tol]
         core = full.projected(vectors, tol)
         for candidates in drawn(bounds, random, 64)[::-1]:  # errors are largest at corners
             estimates, steps = estimated_errors(full, core, vectors, candidates, solve)
@@ -75,7 +68,7 @@ def grow_basis(
             new = np.hstack([steps[row][:, estimates[row] >= tol / 4] for row in worst])
         else:
             new = of_unit_energy(snapshots_at(full, candidates[worst]), stiffness)
-        known = np.hstack([directions.vectors * np.sqrt(directions.energies), new])
+        known = np.hstack([directions * np.sqrt(energies), new])
     raise RuntimeError(
         f"after {len(largest)} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
         "larger tol, or narrower bounds"
@@ -138,9 +131,9 @@ def of_unit_energy(vectors: Array, stiffness: csc_array) -> Array:
     return vectors / np.sqrt(np.einsum("im,im->m", vectors, stiffness @ vectors))
 
 
-def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> Directions:
-    """Principal directions of vectors in the inner product of a stiffness, without directions of less than some
-    energy."""
+def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> tuple[Array, Array]:
+    """Principal directions of vectors, orthonormal in a stiffness, and the energies of the vectors along them, without
+    directions of less than some energy."""
     energies, turns = scipy.linalg.eigh(vectors.T @ (stiffness @ vectors))
     kept = energies > max(least, 1e-13 * energies[-1])  # less is rounding error
-    return Directions(vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept])
+    return vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept]

@@ -76,12 +76,11 @@ class AffineCore:
         ranks: Sequence[int],
         track: bool,
         available: int,
-        parts: AffineTerms | None = None,
     ) -> "AffineCore":
         """The core whose columns are the modes of these ranks (the lowest is 0) at theta = 1."""
         solver, order = eigen_solver(stiffness, mass), np.asarray(ranks, dtype=np.intp)
         nominal = NominalModes.of_ranks(solver, mass, order)
-        return cls(stiffness, mass, solver, nominal, order, track, available, parts=parts)
+        return cls(stiffness, mass, solver, nominal, order, track, available)
 
     def __post_init__(self) -> None:
         self.n_lowest = int(self.ranks.max()) + 1
