@@ -296,8 +296,6 @@ def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
 
 
 def _read_lags(lags: Any, n_rows: int) -> list[int]:
-    if isinstance(lags, bool | np.bool_):
-        raise ValueError(f"lags is {lags!r}; expected a positive number or different non-negative integers")
     count = lags if isinstance(lags, Integral) else len(lags)
     if count > max(10_000, n_rows):  # a list of 10^9 lags would end the interpreter
         raise ValueError(f"lags are {count} for {n_rows} rows; expected at most 10000, or as many as there are rows")
@@ -513,7 +511,7 @@ def _decayed_sums(ages: NDArray[np.float64], table: NDArray[np.float64]) -> NDAr
 
 
 def _read_half_lives(given: Any, is_timed: bool) -> NDArray[np.int64]:
-    if isinstance(given, str) or not len(given):
+    if not len(given):
         raise ValueError(f"half_lives is {given!r}; expected a sequence, such as ['30D']")
     found = []
     for one in given:
