@@ -1,7 +1,7 @@
 """Modal analysis of affine matrices: eigenproblems by LAPACK, columns that follow modes, and derivatives."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias
@@ -114,11 +114,8 @@ class AffineCore:
 
     def rescaled(self, row: Array) -> "AffineCore":
         """The core whose theta = 1 is this one's theta = row; its columns stay the same nominal modes."""
-        changed: dict[str, Any] = {
-            name: one.with_factors(one.coefficients(row)[0]) for name, one in self._terms.items()
-        }
-        solver = eigen_solver(changed["stiffness"], changed["mass"])
-        return replace(self, **changed, solver=solver, healthy=self.healthy or self)
+        changed = {name: one.with_factors(one.coefficients(row)[0]) for name, one in self._terms.items()}
+        return self._with_terms(changed, self.healthy or self)
 
     def with_modes(self, ranks: NDArray[np.intp]) -> "AffineCore":
         """The core whose columns are other modes of the healthy nominal state."""
@@ -130,15 +127,19 @@ class AffineCore:
     def with_parameters(self, columns: NDArray[np.intp]) -> "AffineCore":
         """The core of fewer parameters, the others being 1."""
         healthy = self.healthy.with_parameters(columns) if self.healthy else None
-        return self._with_exponents({name: one.exponents[:, columns] for name, one in self._terms.items()}, healthy)
+        changed = {name: one.with_factors(one.factors, one.exponents[:, columns]) for name, one in self._terms.items()}
+        return self._with_terms(changed, healthy)
 
     def with_group_factors(self, scaled: NDArray[np.int64]) -> "AffineCore":
         """The core with further parameters that multiply groups of stiffness terms, (n_terms, n_groups)."""
         healthy = self.healthy.with_group_factors(scaled) if self.healthy else None
         further = {name: np.zeros((len(one.factors), scaled.shape[1]), int) for name, one in self._terms.items()}
         further["stiffness"] = scaled[: len(self.stiffness.factors)]  # the healthy core may lack terms that were added
-        exponents = {name: np.hstack([one.exponents, further[name]]) for name, one in self._terms.items()}
-        return self._with_exponents(exponents, healthy)
+        changed = {
+            name: one.with_factors(one.factors, np.hstack([one.exponents, further[name]]))
+            for name, one in self._terms.items()
+        }
+        return self._with_terms(changed, healthy)
 
     def with_mass_factors(self, masses: Sequence[Matrix]) -> "AffineCore":
         """The core with further parameters: 1 + the number of times that each of these masses is added."""
@@ -149,10 +150,7 @@ class AffineCore:
         solver, nominal = eigen_solver(wider.stiffness, heavy), self.nominal.beside(heavy)
         return replace(wider, mass=heavy, solver=solver, nominal=nominal)
 
-    def _with_exponents(self, exponents: Mapping[str, NDArray], healthy: "AffineCore | None") -> "AffineCore":
-        changed: dict[str, Any] = {
-            name: one.with_factors(one.factors, exponents[name]) for name, one in self._terms.items()
-        }
+    def _with_terms(self, changed: dict[str, Any], healthy: "AffineCore | None") -> "AffineCore":
         solver = eigen_solver(changed["stiffness"], changed["mass"])
         return replace(self, **changed, solver=solver, healthy=healthy)
 
