@@ -1,3 +1,3 @@
 """Temperature effects in finite-element models, learned from monitoring data alone."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

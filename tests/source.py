@@ -63,6 +63,49 @@ def classes(tree):
     return [node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
 
 
+def imported(tree):
+    """Modules that a file imports; in place of ``from package import module``, the package."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import(names=names):
+                yield from (alias.name for alias in names)
+            case ast.ImportFrom(module=module, level=level):
+                yield "." * level + (module or "")
+
+
+def packages_imported(package, within=()):
+    """The public packages in a package, or in a folder of it, and those beside it that each of them imports."""
+    folder = package.joinpath(*within)
+    beside = {file.parent.name for file in folder.glob("*/__init__.py") if file.parent.name[0] != "_"}
+    found = {one: set() for one in beside}
+    for one in beside:
+        for file in (folder / one).rglob("*.py"):
+            modules = (module.split(".") for module in imported(ast.parse(file.read_text())))
+            inside = [parts[1:] for parts in modules if parts[: 1 + len(within)] == [package.name, *within]]
+            found[one] |= {parts[len(within)] for parts in inside if len(parts) > len(within)} & beside - {one}
+    return found
+
+
+def below(room, imports):
+    """What a package imports, directly or by what it imports."""
+    return imports[room].union(*(below(one, imports) for one in imports[room]))
+
+
+def built_on(imports):
+    """Of what each package imports, what none of the others imports."""
+    return {room: names - set().union(*(below(one, imports) for one in names)) for room, names in imports.items()}
+
+
+def floors(imports):
+    """Packages in rows from the ground up, each above all that it imports."""
+    rows, placed = [], set()
+    while placed != set(imports):
+        rows.append(sorted(room for room in set(imports) - placed if imports[room] <= placed))
+        assert rows[-1], f"packages import each other in a circle: {sorted(set(imports) - placed)}"
+        placed.update(rows[-1])
+    return rows
+
+
 def private_imports(tree):
     """Private modules of the package, and private names of its modules, that a file imports."""
     for node in ast.walk(tree):

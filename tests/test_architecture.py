@@ -7,66 +7,27 @@ import pkgutil
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import skthermo
 from skthermo.plotting import DamageIndexDisplay
+from tests.source import built_on, floors, imported, packages_imported
+from tools.house import DRAWN, drawing
 
 PACKAGE = Path(skthermo.__file__).parent
-HOUSE = Path(__file__).parents[1] / "docs" / "contributing" / "house.rst"
+ROOT = Path(__file__).parents[1]
+HOUSE = ROOT / "docs" / "contributing" / "house.rst"
 ROOMS = [module.name for module in pkgutil.iter_modules(skthermo.__path__) if module.ispkg and module.name[0] != "_"]
-MAY_IMPORT = {
-    "fem": set(),
-    "preprocessing": set(),
-    "metrics": set(),
-    "residuals": {"preprocessing"},
-    "detection": {"metrics", "preprocessing", "residuals", "surrogate"},  # its default regressor
-    "surrogate": {"fem", "metrics", "preprocessing", "residuals"},
-    "updating": {"fem"},
-    "datasets": {"fem"},
-}
-MAY_IMPORT["studies"] = {*MAY_IMPORT}
-MAY_IMPORT["monitoring"] = {*MAY_IMPORT}
-MAY_IMPORT["plotting"] = {*MAY_IMPORT}  # displays name the results that they draw
-MAY_IMPORT["reporting"] = {*MAY_IMPORT}
-MAY_IMPORT["commands"] = {*MAY_IMPORT}  # on top of all
-WITHIN = {  # what a package within a package may import, beside what its parent may
-    "fem": {"fem.elements", "fem.modal", "fem.affine"},  # its functions and structures use them
-    "fem.elements": set(),
-    "fem.modal": set(),
-    "fem.affine": {"fem.modal"},
-    "fem.external": {"fem.affine"},
-    "residuals": {"preprocessing.checks"},  # a range of weather names implausible temperatures
-    "preprocessing": {"preprocessing.checks", "preprocessing.loggers"},
-    "preprocessing.checks": set(),
-    "preprocessing.loggers": set(),
-    "commands": {"preprocessing.loggers"},
-    "surrogate": {"fem.affine", "preprocessing.checks"},  # polynomials of ln f, periods of records
-    "detection": {"preprocessing.checks"},  # misplaced columns
-    "monitoring": {"preprocessing.checks"},
-    "studies.detectability": {"preprocessing.checks"},  # their records go through the gate
-    "studies.identification": {"preprocessing.checks"},
-}
-CORE = {"numpy", "scipy", "pandas", "sklearn", "joblib", "threadpoolctl", "skthermo"}
 FILES = sorted(PACKAGE.rglob("*.py"))
 PROGRAM = PACKAGE / "__main__.py"  # what users start
 
 
 @functools.cache
-def nodes(path):
-    """All nodes of a file's syntax tree."""
-    return list(ast.walk(ast.parse(path.read_text())))
-
-
 def imported_modules(path):
-    for node in nodes(path):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            yield node.module
+    return list(imported(ast.parse(path.read_text())))
 
 
 def own_imports(path):
@@ -79,47 +40,34 @@ def package_of(path):
     return list(path.relative_to(PACKAGE).parent.parts)
 
 
-def may_import(room):
-    """Packages that files of a package, or of one within a package, may import."""
-    return MAY_IMPORT[room.partition(".")[0]] | WITHIN.get(room, set())
+def test_the_guide_for_contributors_shows_what_each_package_is_built_on():
+    table = HOUSE.read_text().partition(":widths: 15, 55, 30\n\n")[2].partition("\n\n")[0]
+    rows = csv.reader(table.splitlines(), skipinitialspace=True)
+    shown = {room: set(filter(None, below.split(", "))) for room, _, below in rows}
+    found = built_on(packages_imported(PACKAGE))
+    wrong = [
+        f"{room} is built on {sorted(found.get(room, ()))}, the table says {sorted(shown.get(room, ()))}"
+        for room in sorted(found | shown)
+        if found.get(room) != shown.get(room)
+    ]
+    assert not wrong, "\n".join([f"{HOUSE}: change the row and say why, or import less:", *wrong])
 
 
-def test_arrows_point_one_way():
-    against = []
-    for path in FILES:
-        room = ".".join(package_of(path))
-        for module in own_imports(path):
-            package = ".".join(part for i, part in enumerate(module) if (PACKAGE / Path(*module[: i + 1])).is_dir())
-            if module[0].startswith("_") or module == ["exceptions"] or package == room or not room:
-                continue
-            is_front = path.name == "__init__.py" and package.startswith(room + ".")  # a package presents those in it
-            shares_parent = room.startswith(package + ".") and ".".join(module) != package
-            if not (is_front or shares_parent or package in may_import(room)):
-                against.append(f"{path.relative_to(PACKAGE)} may not import {'.'.join(module)}")
-    assert not against
+def test_the_figure_is_drawn_from_the_imports():
+    assert DRAWN.read_text() == drawing(), f"{DRAWN}: python tools/house.py --draw"
+
+
+def test_packages_within_a_package_are_in_no_circle():
+    divided = {path.parent.parent for path in PACKAGE.glob("*/*/__init__.py")}
+    assert divided
+    for folder in divided:
+        assert floors(packages_imported(PACKAGE, folder.relative_to(PACKAGE).parts))  # which names a circle
 
 
 def test_no_module_imports_a_program():
     assert [path for path in FILES if path.name == PROGRAM.name] == [PROGRAM]
     assert own_imports(PROGRAM) == [["commands", "main"]]
     assert not [(path, module) for path in FILES for module in own_imports(path) if module[-1] == "__main__"]
-
-
-def test_every_package_has_its_arrows():
-    packages = {".".join(package_of(path)) for path in FILES if path.name == "__init__.py"}
-    public = {package for package in packages if package and not package.startswith("_")}
-    assert public <= {*MAY_IMPORT, *WITHIN}
-
-
-def test_the_guide_for_contributors_shows_the_arrows():
-    table = HOUSE.read_text().partition(":widths: 15, 55, 30\n\n")[2].partition("\n\n")[0]
-    rows = csv.reader(table.splitlines(), skipinitialspace=True)
-    shown = {room: set(filter(None, imported.split(", "))) for room, _, imported in rows}
-    assert shown == MAY_IMPORT
-    drawn = re.findall(r'y="(\d+)">(\w+)<', (HOUSE.parents[1] / "_static" / "house.svg").read_text())
-    heights = {room: int(height) for height, room in drawn}
-    assert heights.keys() == MAY_IMPORT.keys()
-    assert not [(room, below) for room in heights for below in MAY_IMPORT[room] if heights[below] <= heights[room]]
 
 
 def test_what_every_room_uses_uses_no_room():
@@ -129,15 +77,17 @@ def test_what_every_room_uses_uses_no_room():
 
 
 def test_private_modules_are_for_their_own_package():
+    wrong = []
     for path in FILES:
         package = package_of(path)
         for module in own_imports(path):
             private = next((i for i, part in enumerate(module) if part.startswith("_")), None)
             if private is not None:
-                assert package[:private] == module[:private], f"{path} reaches into {'.'.join(module)}"
                 is_shared = private == 0 and not any(part.startswith("_") for part in module[1:])
                 last = is_shared or private == len(module) - 1 or package[: private + 1] == module[: private + 1]
-                assert last, f"{path} reaches into {'.'.join(module)}"
+                if package[:private] != module[:private] or not last:
+                    wrong.append(f"{path} imports skthermo.{'.'.join(module)}")
+    assert not wrong, "\n".join(["import a public module of the other package, or make one:", *wrong])
 
 
 def test_no_circle_of_modules():
@@ -160,27 +110,29 @@ def test_no_circle_of_modules():
         visit(name)
 
 
-def test_only_core_dependencies_are_imported():
-    allowed = CORE | set(sys.stdlib_module_names)
+def test_only_core_dependencies_are_imported_and_private_scikit_learn_in_one_place():
+    needed = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    core = {re.match(r"[\w-]+", one)[0].replace("scikit-learn", "sklearn") for one in needed}
+    allowed = core | {"threadpoolctl", "skthermo"} | set(sys.stdlib_module_names)  # scikit-learn needs threadpoolctl
+    wrong = []
     for path in FILES:
+        tree = ast.parse(path.read_text())
         for_types = {
-            node.module
-            for branch in nodes(path)
+            node
+            for branch in ast.walk(tree)
             if isinstance(branch, ast.If) and getattr(branch.test, "id", "") == "TYPE_CHECKING"
             for node in ast.walk(branch)
-            if isinstance(node, ast.ImportFrom)
         }
-        others = {one for one in imported_modules(path) if one.split(".")[0] not in allowed and one not in for_types}
-        assert not others, f"{path} imports {others}, which are no core dependencies"
-
-
-def test_private_scikit_learn_is_imported_in_one_place():
-    for path in FILES:
-        for node in nodes(path):
-            if isinstance(node, ast.ImportFrom) and node.module.startswith("sklearn") and path.name != "estimators.py":
-                names = [*node.module.split("."), *(alias.name for alias in node.names)]
-                private = [name for name in names if name.startswith("_")]
-                assert not private, f"{path} imports scikit-learn's {private}"
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Import | ast.ImportFrom) or node in for_types:
+                continue
+            names = " ".join(alias.name for alias in node.names)
+            for name in imported(node):
+                private = name.startswith("sklearn") and re.search(r"[. ]_", f"{name} {names}")
+                if name.split(".")[0] not in allowed or (private and path.name != "estimators.py"):
+                    wrong.append(f"{path}:{node.lineno} imports {name}")
+    remedy = "import optional packages in the function that needs them, scikit-learn's private names in estimators.py:"
+    assert not wrong, "\n".join([remedy, *wrong])
 
 
 def test_import_loads_nothing_optional_or_slow_and_fem_neither_pandas_nor_scikit_learn():

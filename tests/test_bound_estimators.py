@@ -4,7 +4,6 @@ import functools
 import pickle
 from copy import deepcopy
 
-import joblib
 import numpy as np
 import pytest
 from sklearn.base import clone
@@ -114,12 +113,6 @@ class TestLaws:
             array.flags.writeable = False
         result = getattr(clone(estimator).fit(*arrays), method)(arrays[0])
         np.testing.assert_allclose(result, fitted(name)[1], rtol=1e-12)
-
-
-def test_two_processes_give_the_bits_of_one():
-    results = joblib.Parallel(n_jobs=2)(joblib.delayed(output)(name) for name in CASES)
-    for name, result in zip(CASES, results, strict=True):
-        np.testing.assert_array_equal(result, fitted(name)[1], err_msg=name)
 
 
 def test_output_names_of_transformers():

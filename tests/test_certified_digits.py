@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.optimize import brentq
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
-from skthermo.datasets import make_kw51, make_truss
-from skthermo.fem import Bar, Beam, PointMass, Structure
+from skthermo.datasets import make_kw51
+from skthermo.fem import Beam, PointMass, Structure
 from skthermo.preprocessing import HingeFeatures
 
 STEEL = {"E": 200e9, "G": 200e9 / 2.6}
@@ -31,39 +30,6 @@ def frequencies(structure, n_modes):
 
 def beams_along(points, section):
     return {f"beam {i}": Beam(i, i + 1, **section) for i in range(len(points) - 1)}
-
-
-@pytest.mark.parametrize(
-    ("supports", "equation", "first_roots"),
-    [
-        ((CLAMPED, f"y {IN_PLANE}"), lambda b: np.tan(b) - np.tanh(b), [3.9, 7.1, 10.2]),
-        ((CLAMPED, CLAMPED), lambda b: np.cos(b) * np.cosh(b) - 1, [4.7, 7.9, 11.0]),
-        ((CLAMPED, IN_PLANE), lambda b: np.cos(b) * np.cosh(b) + 1, [1.9, 4.7, 7.9]),
-    ],
-    ids=["propped", "clamped", "cantilever"],
-)
-def test_uniform_beams(supports, equation, first_roots):
-    length, section = 4.0, STEEL | {"A": 0.02, "I_yy": 1e-3, "I_zz": 1e-5, "J": 3e-5, "density": 7850.0}
-    roots = np.array([brentq(equation, near - 0.1, near + 0.1, xtol=1e-14) for near in first_roots])
-    points = np.linspace(0, length, 65)
-    structure = Structure(
-        {i: (x, 0, 0) for i, x in enumerate(points)},
-        beams_along(points, section),
-        dict.fromkeys(range(64), IN_PLANE) | {0: supports[0], 64: supports[1]},
-        {"all": [f"beam {i}" for i in range(64)]},
-    )
-    inertia = section["E"] * section["I_zz"] / (section["density"] * section["A"])
-    exact = roots**2 * np.sqrt(inertia) / (2 * np.pi * length**2)
-    assert digits(frequencies(structure, 3), exact).min() > 6
-
-
-def test_a_rod():
-    n, length = 400, 3.0
-    bars = {f"bar {i}": Bar(i, i + 1, 210e9, 0.01, 7850.0) for i in range(n)}
-    supports = {i: "xy" if i == 0 else "y" for i in range(n + 1)}
-    structure = Structure({i: (length * i / n, 0) for i in range(n + 1)}, bars, supports, {"all": list(bars)})
-    exact = np.array([1, 3, 5]) * np.sqrt(210e9 / 7850) / (4 * length)
-    assert digits(frequencies(structure, 3), exact).min() > 4
 
 
 def test_pinned_double_cross():
@@ -102,18 +68,6 @@ def test_cantilever_with_masses_beside_its_axis():
     )
     agreeing = digits(frequencies(structure, 6), [1.723, 1.727, 7.413, 9.972, 18.155, 26.957])
     assert (agreeing > [2.4, 2.4, 2.3, 2.3, 1.9, 1.9]).all()
-
-
-def test_the_truss_of_28_bars():
-    model = make_truss()
-    assert (
-        digits(
-            model.frequencies(np.ones((1, 4)))[0], [7.48477, 27.500374, 37.842078, 62.614472, 67.170412, 95.411833]
-        ).min()
-        > 6
-    )
-    half = model.damaged({"bottom": 0.5}).frequencies(np.ones((1, 4)))[0]
-    assert digits(half, [6.359491, 23.468491, 34.325975, 59.338728, 66.10077, 92.816677]).min() > 6
 
 
 def test_the_railway_bridge_before_updating():

@@ -14,6 +14,7 @@ import pytest
 
 import skthermo
 from skthermo.datasets import make_truss_campaign
+from tools.mutations import MUTATIONS, is_written_once
 
 ROOT = Path(__file__).parents[1]
 BUILT = {"generated", "gallery", "_build"}
@@ -83,9 +84,9 @@ def test_rates_of_readmes_study_are_those_of_true_years():
 
 def test_the_home_page_shows_readmes_code_and_figure():
     assert python_blocks(HOME)[0].strip() == python_blocks(README)[0].strip()
-    figure = re.search(r'src="docs/(.*?)" width="\d+" alt="(.*?)"', README.read_text()).groups()
+    figures = re.findall(r'src="docs/(.*?)" width="\d+" alt="(.*?)"', README.read_text())
     image, text = re.search(r"image:: /(images/\S+)\n\s+:alt: ((?:.+\n)+?)\s+:target:", HOME.read_text()).groups()
-    assert (image, " ".join(text.split())) == figure
+    assert (image, " ".join(text.split())) in figures
 
 
 @pytest.mark.nightly
@@ -136,17 +137,41 @@ def test_reference_and_guide_have_every_package():
     assert sorted(inside) == sorted(ROOMS)
 
 
-def test_files_that_contributors_are_sent_to_are_there():
-    pages = [ROOT / "CONTRIBUTING.md", *(ROOT / "docs" / "contributing").glob("*.rst")]
-    path = re.compile(r"(?<![\w/.])((?:skthermo|tests|docs|examples|tools)/[\w/.]*\w)")
-    named = {page.name: path.findall(page.read_text()) for page in pages}
-    assert len(named["extending.rst"]) > 50
-    invented = re.compile("NAME|PAGE|PART|ROOM|_build")
-    missing = {
-        name: [file for file in files if not invented.search(file) and not (ROOT / file).exists()]
-        for name, files in named.items()
-    }
-    assert not any(missing.values()), missing
+def test_files_and_names_that_contributors_are_sent_to_are_there():
+    """Paths are files, and a word in code stands in the source or is a file's name."""
+    folders = [ROOT / name for name in ("skthermo", "tests", "tools", "docs", "examples")]
+    files = [path for folder in folders for path in folder.rglob("*.*") if not BUILT & set(path.parts)]
+    texts = [path.read_text() for path in files if path.suffix in {".py", ".toml", ".j2"}]
+    words = set(re.findall(r"\w+", " ".join(texts))) | {path.name for path in files}
+    named = re.compile(
+        r"(?<![\w/.])(?:skthermo|tests|docs|examples|tools)/[\w/.]*\w"  # a path
+        r"|(?<=``)(?:\w*[A-Z_]\w*|[\w-]+\.py)(?=``)"  # a name, or a file's
+    )
+    invented = re.compile("NAME|PAGE|PART|ROOM|_build|CODE_OF_CONDUCT|github_url")
+    missing = [
+        f"{page.relative_to(ROOT)}: {name}"
+        for page in [ROOT / "CONTRIBUTING.md", *(ROOT / "docs" / "contributing").glob("*.rst")]
+        for name in named.findall(page.read_text())
+        if not (invented.search(name) or name in words or (ROOT / name).exists())
+    ]
+    assert not missing, "\n".join(["name what is there now, in place of:", *missing])
+
+
+def test_a_page_says_what_each_tool_is_for():
+    callers = [ROOT / "docs" / "conf.py", *PAGES]
+    texts = " ".join(path.read_text() for path in callers)
+    unused = [path.name for path in (ROOT / "tools").glob("*.py") if f"tools/{path.name}" not in texts]
+    assert not unused, f"tools/: name on a page who calls it, or remove: {unused}"
+
+
+def test_every_mutation_can_be_made():
+    each = [(file, tests, *mutation) for (file, tests), found in MUTATIONS.items() for mutation in found]
+    gone = [
+        f"{breaks} ({file}; tests/{tests})"
+        for file, tests, breaks, *texts in each
+        if not is_written_once(file, tests, breaks, *texts)
+    ]
+    assert not gone, "\n".join(["tools/mutations.py: write anew what no longer stands in the code once:", *gone])
 
 
 def test_sources_are_listed_and_cited():

@@ -42,6 +42,7 @@ from skthermo.preprocessing import (
     LagFeatures,
     ModeTracker,
     SensorMeans,
+    check_records,
 )
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, FleetMapper, InverseSurrogate, PosteriorInverse, TemperatureMapper
@@ -93,6 +94,13 @@ def after_fit(*methods):
     return answers
 
 
+def simulated(chain, *tables):
+    fitted = chain.fit(*tables)
+    (mean, std), ends = fitted.predict(tables[0], return_std=True), fitted.predict_interval(tables[0])
+    drawn = fitted.simulate(tables[0], damage={"top": 0.1}, noise="fitted", gaps="fitted", random_state=0)
+    return {"predict": mean, "std": std, "lowest": ends[0], "drawn": drawn, "theta": fitted.parameters_}
+
+
 def parameters(updater, X):
     fitted = updater.fit(X)
     return {"theta": fitted.theta_, "covariance": fitted.covariance_}
@@ -138,7 +146,8 @@ CASES = {
     "mapper": Case(TemperatureMapper(), (T, F / F.mean()), after_fit("predict")),
     "fleet mapper": Case(FleetMapper(), (T, F / F.mean()), after_fit("predict")),
     "updater": Case(ModelUpdater(TRUSS), (MEASURED,), parameters),
-    "chain": Case(CHAIN, (T, ONE_GAP), after_fit("predict", "predict_parameters"), is_slow=True),
+    "chain": Case(CHAIN, (T, ONE_GAP), simulated, is_slow=True),
+    "default chain": Case(DataInformedFEM(TRUSS, random_state=0), (T, ONE_GAP), simulated, is_slow=True),
     "study": Case(STUDY, (T[:40],), rates),
     "Mahalanobis": Case(MahalanobisDetector(), (F,), DETECTED),
     "Mahalanobis, gaps": Case(MahalanobisDetector(), (GAPPED,), DETECTED),
@@ -299,6 +308,15 @@ def test_another_process_gives_equal_results():
     found = pickle.loads(done.stdout)
     for case in CASES:
         assert_same(found[case], of_frames(case))
+
+
+@pytest.mark.parametrize("form", [*FRAMES, "polars"])
+def test_checks_of_equal_records_find_the_same(form):
+    convert = in_polars if form == "polars" else FRAMES[form]
+    found, expected = (check_records(*map(one, (T, GAPPED))) for one in (convert, FRAMES["again"]))
+    pd.testing.assert_frame_equal(found.table, expected.table)
+    np.testing.assert_array_equal(found.outliers, expected.outliers)
+    pd.testing.assert_frame_equal(found.frequencies, expected.frequencies, check_freq=False)
 
 
 # Residuals

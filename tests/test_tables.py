@@ -151,15 +151,6 @@ def test_temperatures_far_from_known_ones_are_implausible(T, counts):
 
 
 @UNRELATED
-@each_estimator
-def test_polars_frames_pass_without_a_warning(estimator):
-    polars = pytest.importorskip("polars")
-    frame = polars.DataFrame({name: RECORDS[name].to_numpy() for name in RECORDS})
-    expected = output(estimator.fit(RECORDS.to_numpy()), RECORDS.to_numpy())
-    np.testing.assert_array_equal(output(estimator.fit(frame), frame), expected)
-
-
-@UNRELATED
 @each_transformer
 def test_polars_frames_come_out_where_they_are_asked_for(estimator):
     polars = pytest.importorskip("polars")

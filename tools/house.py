@@ -1,12 +1,14 @@
 """How large each package is, how many files and functions a call enters, and how plain the source is.
 
     python tools/house.py [--files]
+    python tools/house.py --draw
 
-For each package: its files and their lines, packages within it included, and how many of its files the calls below
-enter, as Python's profiler sees it; then how many functions they enter. Of the source of all rooms and of the ground
-rooms: files, lines, lines of code, constants, constructors called ``of``, kinds of warnings, uses of hidden state. At
-the end, what a user meets: the public names of each package, and the most parameters, fields and methods that one of
-them has, beside the limits of ``tests/test_public_surface.py``.
+With ``--draw``, only writes ``docs/_static/house.svg``: the packages, in rows above those that they import. Else, for
+each package: its files and their lines, packages within it included, and how many of its files the calls below enter,
+as Python's profiler sees it; then how many functions they enter. Of the source of all rooms and of the ground rooms:
+files, lines, lines of code, constants, constructors called ``of``, kinds of warnings, uses of hidden state. At the end,
+what a user meets: the public names of each package, and the most parameters, fields and methods that one of them has,
+beside the limits of ``tests/test_public_surface.py``; and the lines of the tests.
 Reads the skthermo that is imported (``PYTHONPATH`` chooses another tree).
 
 ======== ==========================================================
@@ -22,6 +24,8 @@ whole    ``CompensatedDetector.fit``, where the package has it
 """
 
 import argparse
+import ast
+import re
 import sys
 import threading
 from pathlib import Path
@@ -42,17 +46,22 @@ from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.source import (
     GROUND,
+    built_on,
     constants,
     constructors_called_of,
+    floors,
     hidden_state,
     kinds_of_warnings,
     lines_of_code,
     names_in_two_files,
+    packages_imported,
+    private_imports,
     trees,
 )
 from tests.test_public_surface import LIMITS, by_package, surface
 
 PACKAGE = Path(skthermo.__file__).parent
+DRAWN = Path(__file__).parents[1] / "docs" / "_static" / "house.svg"
 MOST_FUNCTIONS = {"raw fit": 150, "detector": 25, "whole": 120}
 MOST_FRAMES = 6
 
@@ -151,10 +160,48 @@ def plainness(rooms=None):
     }
 
 
+def drawing():
+    """An SVG of the packages in rows above those that they import, each with what it is built on."""
+    width, height, gap = 390, 44, 10
+    imports = packages_imported(PACKAGE)
+    given = built_on(imports) | {"_core": set()}
+    boxes, said = [], []
+    rows = [*reversed(floors(imports)), ["_core"]]
+    for row, rooms in enumerate(rows):
+        labels = {room: ", ".join(sorted(given[room])) for room in rooms}
+        letters = {room: 5 + max(len(room), len(label)) for room, label in labels.items()}
+        x, y = gap, gap + row * (height + gap)
+        for room, label in labels.items():
+            wide = (width - gap * (len(rooms) + 1)) * letters[room] / sum(letters.values())
+            kind, middle = "ours" if given[room] else "given", f"{x + wide / 2:.0f}"
+            boxes.append(f'<rect class="box {kind}" x="{x:.0f}" y="{y}" width="{wide:.0f}" height="{height}" rx="8"/>')
+            boxes.append(f'<text x="{middle}" y="{y + (19 if label else 27)}">{room}</text>')
+            boxes += [f'<text x="{middle}" y="{y + 36}" class="small">{label}</text>'] if label else []
+            said += [f"{room} on {' and '.join(sorted(given[room]))}"] if given[room] else []
+            x += wide + gap
+    high = gap + len(rows) * (height + gap)
+    style = re.search(r"<style>.*?</style>", DRAWN.with_name("method.svg").read_text(), re.DOTALL)[0]
+    return "\n".join(
+        [
+            f'<svg class="method" style="min-width: 0; max-width: 560px" viewBox="0 0 {width} {high}" role="img"'
+            f' aria-label="The packages, each above those that it is built on: {"; ".join(said)}; all use _core"'
+            ' xmlns="http://www.w3.org/2000/svg">',
+            style,
+            f'<rect class="band" width="{width}" height="{high}" rx="10"/>',
+            *boxes,
+            "</svg>\n",
+        ]
+    )
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--files", action="store_true", help="name the files that are entered")
-    by_name = parser.parse_args().files
+    parser.add_argument("--draw", action="store_true", help=f"write docs/_static/{DRAWN.name}, and nothing else")
+    asked = parser.parse_args()
+    if asked.draw:
+        DRAWN.write_text(drawing())
+        return
     files = sorted(path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
     lines = {file: len((PACKAGE / file).read_text().splitlines()) for file in files}
     functions = actions()
@@ -174,7 +221,11 @@ def main():
     found = by_package(surface())
     limits = LIMITS.reindex(found.index).rename(columns="limit of {}".format)
     print("", found.join(limits).to_string(), f"{'all':17}{found['names'].sum():8}", sep="\n")
-    for action, found in by_action.items() if by_name else ():
+    tests = [path.read_text() for path in sorted((Path(__file__).parents[1] / "tests").rglob("*.py"))]
+    inside = sum(any(private_imports(ast.parse(text))) for text in tests)
+    lines_of_tests = sum(len(text.splitlines()) for text in tests)
+    print(f"\ntests: {len(tests)} files, {lines_of_tests} lines, {inside} files with private imports")
+    for action, found in by_action.items() if asked.files else ():
         print(f"\n{action} enters", *(file.as_posix() for file in sorted(found)), sep="\n  ")
 
 

@@ -152,7 +152,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("growth outside the weather", "1 + np.log1p(self.reach", "1 + 0 * np.log1p(self.reach"),
     ],
     ("detection/_base.py", "detection/test_thresholds.py"): [
-        ("blocks longer than the memory", "np.clip(np.median(numbers) / 2, 5, 50)", "50"),
+        ("blocks longer than the memory", "np.clip(number / 4, 5, 50)", "50"),
     ],
     ("residuals/baseline.py", "surrogate/test_uncertainty.py"): [
         ("spread of the same period", "np.where(test[:, np.newaxis], np.nan, self.values)", "self.values"),
@@ -229,8 +229,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weather beside drift", "fit_transform(parts), parts**3])", "fit_transform(0 * parts), 0 * parts])"),
         ("noise that lasts for months", "if n_waves:", "if False:"),
     ],
-    ("fem/modal/_core.py", "fem/test_divide.py"): [
-        ("parts of calibrated terms", "(self.stiffness.factors[origin])", "(np.ones(len(origin)))"),
+    ("fem/_terms.py", "fem/test_divide.py"): [
+        ("parts of calibrated terms", "terms.with_factors(self.factors[origin])", "terms"),
     ],
     ("studies/identification/_evidence.py", "studies/test_identify.py"): [
         ("probability of the bounds", "logs = logs + logsumexp(", "logs = logs + 0 * logsumexp("),

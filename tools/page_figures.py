@@ -1,12 +1,15 @@
-"""Draws figures that pages show in two widths: beside each other for screens, below each other for telephones.
+"""Draws figures of pages: some in two widths, for screens and for telephones; the page of a monitor as a picture.
 
 python tools/page_figures.py quickstart
 python tools/page_figures.py pod_curves
+python tools/page_figures.py status_page
 """
 
 import doctest
 import re
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +53,18 @@ def pod_curves() -> None:
         figure.savefig(IMAGES / "pod_curves_narrow.png", dpi=200)
 
 
+def status_page() -> None:
+    """The page that README's commands write, and the records of the damaged bridge, with Chromium."""
+    text = (ROOT / "README.md").read_text()
+    code = re.findall(r"^skthermo (.*?)(?:#.*)?$|`skthermo (update .*?)`", text, flags=re.MULTILINE)
+    with tempfile.TemporaryDirectory() as folder:
+        for block, sentence in code:
+            subprocess.run([sys.executable, "-m", "skthermo", *(block or sentence).split()], cwd=folder)
+        picture = f"--screenshot={IMAGES / 'status_page.png'}"
+        browser = ["chromium", "--headless", "--no-sandbox", "--hide-scrollbars", "--window-size=900,820"]
+        subprocess.run([*browser, picture, "river/status.html"], cwd=folder, check=True)
+
+
 if __name__ == "__main__":
     name = sys.argv.pop(1)
-    {"quickstart": quickstart, "pod_curves": pod_curves}[name]()
+    {"quickstart": quickstart, "pod_curves": pod_curves, "status_page": status_page}[name]()

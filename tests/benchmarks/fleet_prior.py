@@ -1,13 +1,12 @@
 """What other bridges' mappers give to a new bridge: errors of a later year after 15, 30, 60 and 120 days.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py --members chains
-    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py --members frequencies --starts winter summer
+    OMP_NUM_THREADS=1 python tests/benchmarks/fleet_prior.py --starts winter summer
 
 Bridges of `make_fleet` with gaps, outliers and noise that lasts. In turn each is the new one: groups of bridges are
 left out, the others give a year (2025), the new one its first days from January or from July 2026 on, and its clean
 frequencies of 2027 are predicted. Errors are mean absolute percent over records and modes. Ways to predict:
 
-alone     the library without a fleet: `TemperatureMapper` in the chain, or for frequencies
+alone     the library without a fleet: `TemperatureMapper`
 mean      the mean response to the weather of the other bridges of its kind, at the bridge's own level
 ridge     the bridge's own ridge regression towards that mean, its penalty chosen by what would have predicted the
           others' later records best after as many days from the same date
@@ -15,9 +14,8 @@ fleet     ``FleetMapper(mappers)``, mappers of the bridges of its kind (0.2.0: `
           material, span and latitude, of all kinds)
 own year  alone, with all of 2026
 
-Members are frequencies alone, or chains with the FE models that come with the bridges (``mean`` and ``ridge`` then
-predict ln theta). Then new bridges with thermal laws of their own come to the fleet. For frequencies alone, intervals
-are of the posterior and the scatter of the bridge's own residuals.
+Bridges have no FE models. Then new bridges with thermal laws of their own come to the fleet. Intervals are of the
+posterior and the scatter of the bridge's own residuals.
 
 Targets: the fleet's mean error is below that of alone and no more than 2 % above the better of mean and ridge, at
 each number of days and start; with atypical at most 5 % above alone; 85 to 95 % of the records of the year are in
@@ -36,8 +34,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skthermo.datasets import make_fleet
-from skthermo.preprocessing import BiasAligner, HingeFeatures, SensorMeans
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+from skthermo.preprocessing import HingeFeatures, SensorMeans
+from skthermo.surrogate import TemperatureMapper
 
 try:
     from skthermo.surrogate import FleetMapper
@@ -57,7 +55,7 @@ WAYS = {
     "own year": "a year of its own",
 }
 CLOSE, LOSS, LEAST, MOST = 1.02, 1.05, 0.85, 0.95
-CONFIDENCE, QUANTILE = 0.9, 1.645
+QUANTILE = 1.645  # of intervals of 90 %
 
 
 class Frequencies:
@@ -117,61 +115,6 @@ class Frequencies:
         """Predictions of the evaluated year by a function of (X, logs, X of that year) that predicts logs."""
         X, records = self.year(start, days)
         return np.exp(predict(X.to_numpy(), np.log(records.frequencies.to_numpy()), self.evaluated[0].to_numpy()))
-
-
-class Chain(Frequencies):
-    """A bridge with its FE model: the quantities are the model's parameters."""
-
-    def __init__(self, bridge):
-        super().__init__(bridge)
-        self.alone = {}
-
-    def chain(self, mapper):
-        """The chain, as a user would set it up."""
-        return DataInformedFEM(
-            self.bridge.model,
-            inverse=PosteriorInverse(noise=0.004),
-            mapper=make_pipeline(SensorMeans(self.bridge.roles), mapper),
-            aligner=BiasAligner(method="scale"),
-            random_state=0,
-        )
-
-    def chain_alone(self, start, days):
-        """The chain without a fleet, fitted once."""
-        if (start, days) not in self.alone:
-            records = self.bridge.records(days, start)
-            self.alone[start, days] = self.chain(TemperatureMapper()).fit(records.temperatures, records.frequencies)
-        return self.alone[start, days]
-
-    @cached_property
-    def of_fleet(self):
-        return self.chain_alone("2025-01-01", 365)
-
-    @cached_property
-    def mapper(self):
-        return self.of_fleet.mapper_[-1]
-
-    def pair(self):
-        known = self.of_fleet.records_
-        return np.asarray(known.inputs), np.log(known.targets)
-
-    def fitted(self, mapper, start, days):
-        records, later = self.bridge.records(days, start), self.evaluated[1]
-        if isinstance(mapper, FleetMapper):
-            chain = self.chain(mapper).fit(records.temperatures, records.frequencies)
-        else:
-            chain = self.chain_alone(start, days)
-        lower, upper = (np.asarray(end) for end in chain.predict_interval(later.temperatures, confidence=CONFIDENCE))
-        return np.asarray(chain.predict(later.temperatures)), (lower, upper)
-
-    def by_logs(self, start, days, predict):
-        chain = self.chain_alone(start, days)
-        known = chain.records_
-        logs = predict(np.asarray(known.inputs), np.log(known.targets), self.evaluated[0].to_numpy())
-        complete = ~np.isnan(logs).any(axis=1)
-        F = np.full((len(logs), len(self.bridge.noise)), np.nan)
-        F[complete] = chain.aligner_.inverse_transform(self.bridge.model.frequencies(np.exp(logs[complete])))
-        return F
 
 
 class Competitors:
@@ -306,8 +249,6 @@ def campaign_rows(members, covariates, folds, days_asked, starts, newcomers=None
                         ways |= {"fleet": FleetMapper([mate.mapper for mate in kinds[member.bridge.kind].values()])}
                     found = evaluate(member, name, start, days, ways) + [row | {"days": days} for row in year]
                     rows += [row | {"start": label, "thermal law": member.bridge.atypical_law or ""} for row in found]
-            if hasattr(member, "alone"):
-                member.alone.clear()
     return pd.DataFrame(rows)
 
 
@@ -345,7 +286,7 @@ def main():
         newcomers=(6, "bridges with laws of their own"),
         days=list(DAYS),
         starts=(["winter"], None, list(STARTS)),
-        members=("chains", None, ["chains", "frequencies"]),
+        members=("frequencies", "what is known of the bridges", ["frequencies"]),
         seed=0,
     )
     fleet = make_fleet(options.bridges, random_state=options.seed)
@@ -353,14 +294,10 @@ def main():
     strangers = {
         f"atypical {n}": type(b)(f"atypical {n}", b.kind, b.seed, b.atypical_law) for n, b in strangers.items()
     }
-    member_of, of = {
-        "frequencies": (Frequencies, "without FE models"),
-        "chains": (Chain, "with FE models"),
-    }[options.members]
-    members, newcomers = ({name: member_of(b) for name, b in bridges.items()} for bridges in (fleet, strangers))
+    members, newcomers = ({name: Frequencies(b) for name, b in bridges.items()} for bridges in (fleet, strangers))
     covariates, asked = covariates_of({**fleet, **strangers}), (options.days, options.starts)
     rows = campaign_rows(members, covariates, np.array_split(list(members), options.groups), *asked)
-    settings = f"new bridges {of}, one of {len(fleet)} each, in {options.groups} groups"
+    settings = f"new bridges without FE models, one of {len(fleet)} each, in {options.groups} groups"
     shown_by(f"Error of the frequencies of a later year, %: {settings}", rows)
     missed = missed_targets(rows, False)
     rows = campaign_rows(members, covariates, [list(newcomers)], *asked, newcomers)

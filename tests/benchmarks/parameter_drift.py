@@ -1,7 +1,6 @@
-"""Stiffness that falls over the years: how it is followed by `track_parameters`, by simpler ways and by a monitor.
+"""Stiffness that falls over the years: how it is followed by `track_parameters`, by simpler ways.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py
-    OMP_NUM_THREADS=1 python tests/benchmarks/parameter_drift.py --parts monitor --seeds 8
 
 The truss, daily records with 1 % of noise. Groups take turns over the seeds. ``tracked``: a chain learns from the first
 year; then all four years are followed. The simpler ways:
@@ -13,23 +12,22 @@ year; then all four years are followed. The simpler ways:
   changes of all groups by least squares with the Jacobian; a drift is found where the trends of the modes together are
   beyond chance at 1 %.
 
-``monitor``: five years, of which a monitor learns the first, with windows of a week, with and without ``fem=``.
-Sudden damage of 12 % comes on top in the fifth. The exit code is 1 if a target is missed.
+The exit code is 1 if a target is missed.
 """
 
 import sys
 
 import numpy as np
 import pandas as pd
-from harness import arguments, compensated, is_missed, shown, split
+from harness import arguments, is_missed, shown, split
 from scipy import stats
 from structures import AgeingTruss
 
 from skthermo.detection import TemperatureCompensator
-from skthermo.monitoring import Monitor, track_parameters
+from skthermo.monitoring import track_parameters
 from skthermo.surrogate import TemperatureMapper
 
-YEARS, SMOOTHED, LEVEL, BAND, YEAR = 4, 60, 0.01, 1.96, 365
+YEARS, SMOOTHED, LEVEL, BAND = 4, 60, 0.01, 1.96
 CASES = {
     "none": (0.0, {}),
     "1 % a year": (0.01, {}),
@@ -37,7 +35,6 @@ CASES = {
     "1 %, after a quiet first year": (0.01, {}),
 }
 QUIET = "1 %, after a quiet first year"
-SERVICE, DAMAGE, ONSET = 5, 0.12, pd.Timedelta(days=1570)  # years, loss, days after the first record
 
 
 def truth(times, rate, begin, zero):
@@ -141,47 +138,7 @@ def tracked_table(seeds):
     return missed + is_missed("days in the band, %", own.loc["1 % a year", band], ">= 90")
 
 
-def served(monitor, records, begin):
-    """Share of the records in alarm, and events, from a time on."""
-    answers = monitor.update(records)
-    late = answers[(answers.index >= begin) & ~answers["revised"]]
-    late = late[late["state"] != "not evaluated"]
-    return 100 * (late["state"] == "alarm").mean(), monitor.events_[monitor.events_["start"] >= begin]
-
-
-def monitor_table(seeds):
-    """Alarms of monitors in the fourth and fifth year, and sudden damage."""
-    truss, rows, waited = AgeingTruss(), [], []
-    for seed in range(seeds):
-        group = truss.groups[seed % len(truss.groups)]
-        for text, rate in (("constant", 0.0), ("falls by 1 % a year", 0.01)):
-            records, n_first = truss.campaign(SERVICE, seed, drift={group: rate})
-            T, F = split(records)
-            begin, onset = records.index[0] + pd.DateOffset(years=3), records.index[0] + ONSET
-            fem = truss.chain().fit(T[:n_first], F[:n_first])
-            alarm = compensated(list(F), window="7D")
-
-            def fitted(records=records, alarm=alarm, **options):
-                return Monitor(alarm, sensors=False, random_state=0, **options).fit(records[:YEAR])
-
-            followed, events = served(fitted(fem=fem), records[YEAR:], begin)
-            left, _ = served(fitted(), records[YEAR:], begin)
-            row = {"stiffness": text, "in alarm, drift followed, %": followed, "events a year": len(events) / 2}
-            rows.append(row | {"in alarm, not followed, %": left})
-        changes = {"drift": {group: 0.01}, "damage": {group: DAMAGE}, "damage_from": onset}
-        damaged = truss.campaign(SERVICE, seed, **changes)[0]
-        _, events = served(fitted(records=damaged, fem=fem), damaged[YEAR:], begin)
-        waited.append((events["start"][events["start"] >= onset].min() - onset) / pd.Timedelta("1D"))
-    means = pd.DataFrame(rows).groupby("stiffness", sort=False).mean()
-    shown(f"A monitor of the truss in its fourth and fifth year, {seeds} campaigns", means, 1)
-    found = pd.DataFrame({"cases": [seeds], "found within a week": sum(days <= 7 for days in waited)}, ["12 % at once"])
-    found["most days"] = max(waited)
-    shown("Sudden loss in the fifth year, drift of 1 % a year followed", found.rename_axis("damage"), 1)
-    missed = is_missed("events a year, drift followed", means["events a year"].max(), "<= 1.5")
-    return missed + is_missed("damage found within a week", np.mean(np.array(waited) <= 7), ">= 0.95")
-
-
-PARTS = {"tracked": tracked_table, "monitor": monitor_table}
+PARTS = {"tracked": tracked_table}
 
 
 def main():

@@ -103,9 +103,6 @@ PARTS = {
     "solves-pynite": timing("solves.py --parts pynite"),
     "two-workers": timing("solves.py --parts workers --rounds 3"),
     "speed": timing("speed.py", **FRAME),
-    "speed-records": timing(
-        "speed.py --rows mahalanobis forest chain-records --against 43ba4fa4", "--quick --rounds 1"
-    ),
     "speed-year": timing("speed.py --rows detector-year mapper-year chain-year --against 43ba4fa4"),
     "scaling": timing(
         "scaling.py --rounds 1 --most-samples 100000 --most-full 100 --figure docs/images/scaling.png",

@@ -5,7 +5,6 @@ import os
 import pickle
 import signal
 import time
-import warnings
 
 import joblib
 import numpy as np
@@ -167,21 +166,21 @@ def test_a_function_that_fails_everywhere_is_an_error(folder):
 def test_workers_share_one_folder(folder):
     model = CallableModel(three_modes, NAMES, 3, cache=folder)
     with joblib.parallel_config("loky"):
-        spread = sample(model, 0.3, 1000, n_jobs=2, random_state=0)
+        spread = sample(model, 0.3, 300, n_jobs=2, random_state=0)
     np.testing.assert_array_equal(
-        spread.frequencies, sample(CallableModel(three_modes, NAMES, 3), 0.3, 1000, random_state=0).frequencies
+        spread.frequencies, sample(CallableModel(three_modes, NAMES, 3), 0.3, 300, random_state=0).frequencies
     )
     counted = Counted()
-    again = sample(CallableModel(counted, NAMES, 3, cache=folder), 0.3, 1000, random_state=0)
+    again = sample(CallableModel(counted, NAMES, 3, cache=folder), 0.3, 300, random_state=0)
     np.testing.assert_array_equal(again.frequencies, spread.frequencies)
     assert not counted.rows
 
 
-MANY = np.random.default_rng(1).uniform(0.5, 1.5, (1000, 2))
+MANY = np.random.default_rng(1).uniform(0.5, 1.5, (100, 2))
 PROCESSES = multiprocessing.get_context("fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn")
 
 
-def program(folder, log, start, stop, stall):
+def program(folder, log, stall):
     begun = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
 
     def slow(row):
@@ -189,11 +188,11 @@ def program(folder, log, start, stop, stall):
         time.sleep(60 if os.fstat(begun).st_size == 16 * stall else 0.001)
         return three_modes(row)
 
-    CallableModel(slow, NAMES, 3, cache=folder).frequencies(MANY[start:stop])
+    CallableModel(slow, NAMES, 3, cache=folder).frequencies(MANY)
 
 
-def run_program(folder, log, start, stop, stall=0):
-    process = PROCESSES.Process(target=program, args=(folder, log, start, stop, stall))
+def run_program(folder, log, stall=0):
+    process = PROCESSES.Process(target=program, args=(folder, log, stall))
     process.start()
     return process
 
@@ -209,24 +208,22 @@ def begun(log):
 
 def check_all_solved(folder):
     counted = Counted()
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        result = CallableModel(counted, NAMES, 3, cache=folder).frequencies(MANY)
+    result = CallableModel(counted, NAMES, 3, cache=folder).frequencies(MANY)
     assert not counted.rows
     np.testing.assert_array_equal(result, CallableModel(three_modes, NAMES, 3).frequencies(MANY))
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
-def test_killed_in_the_middle_of_a_thousand_solves(folder, tmp_path):
+def test_killed_in_the_middle_of_solves(folder, tmp_path):
     log = tmp_path / "log"
-    for solved, stall in ((300, 300), (700, 0)):  # first within a solve, then wherever it is
-        process = run_program(folder, log, 0, 1000, stall)
+    for solved, stall in ((30, 30), (70, 0)):  # first within a solve, then wherever it is
+        process = run_program(folder, log, stall)
         while process.is_alive() and len(begun(log)) < solved:
             time.sleep(0.005)
         process.kill()
         assert ended(process) == -signal.SIGKILL or not stall
-    assert ended(run_program(folder, log, 0, 1000)) == 0
-    assert len(np.unique(begun(log), axis=0)) == 1000
-    assert 1000 < len(begun(log)) <= 1002  # again only what was under way
+    assert ended(run_program(folder, log)) == 0
+    assert len(np.unique(begun(log), axis=0)) == 100
+    assert 100 < len(begun(log)) <= 102  # again only what was under way
     check_all_solved(folder)

@@ -8,19 +8,6 @@ from skthermo.fem import CallableModel
 from skthermo.surrogate import DataInformedFEM
 
 TRUSS = make_truss()
-NOMINAL = np.ones((1, 4))
-
-
-def log_frequencies(group, loss):
-    return np.log(TRUSS.damaged({group: loss}).frequencies(NOMINAL)[0])
-
-
-def test_rows_are_slopes_of_log_frequencies():
-    directions = TRUSS.damage_directions(kind="stiffness")
-    assert list(directions.index) == list(TRUSS.groups)
-    for group, row in directions.iterrows():
-        slope = (log_frequencies(group, 1e-4) - log_frequencies(group, -1e-4)) / 2e-4
-        assert row.to_numpy() == pytest.approx(slope, abs=1e-6)
 
 
 def test_a_function_has_the_directions_of_the_model_that_it_calls():

@@ -1,8 +1,5 @@
 """Large models: shift-invert says what dense solvers say."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.io
@@ -116,21 +113,6 @@ def test_a_large_sample_without_modes_is_nan_and_the_others_stay():
         frequencies = model.frequencies([[1.0, 1.0], [1.0, 1.5]])
     assert np.isfinite(frequencies[0]).all()
     assert np.isnan(frequencies[1]).all()
-
-
-def test_the_exported_building_frame_has_its_reference_frequencies():
-    if "SKTHERMO_DATA" not in os.environ:
-        pytest.skip("SKTHERMO_DATA does not name the folder with building_frame/ConcreteBuildingFrame.mat")
-    file = Path(os.environ["SKTHERMO_DATA"]) / "building_frame" / "ConcreteBuildingFrame.mat"
-    content = scipy.io.loadmat(file, spmatrix=False)
-    names = [f"E_{i}" for i in range(1, 13)] + ["Influence_Link", "Influence_Rebar"]
-    model = AffineModel({(name,): content[name] for name in names}, content["M0"])
-    assert (model.n_dof, int((content["M0"].diagonal() == 0).sum())) == (2302, 913)
-    reference = [2.28649, 5.98051, 16.22121, 17.72160, 20.53380, 22.12960]
-    frequencies = model.frequencies(np.ones((1, 14)))[0]
-    np.testing.assert_allclose(frequencies, reference, rtol=0, atol=5e-6)  # the reference's last digit
-    eigenvalues = scipy.sparse.linalg.eigsh(content["K0"], 6, content["M0"], sigma=0, return_eigenvectors=False)
-    np.testing.assert_allclose(frequencies, np.sqrt(np.sort(eigenvalues)) / (2 * np.pi), rtol=1e-8)
 
 
 @pytest.mark.one_case

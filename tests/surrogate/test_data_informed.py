@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.signal import lfilter
-from sklearn import config_context
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import ExtraTreesRegressor
@@ -20,7 +19,7 @@ from skthermo.datasets import make_truss_campaign
 from skthermo.exceptions import WeatherWarning
 from skthermo.fem import AffineModel, CallableModel
 from skthermo.metrics import mape
-from skthermo.preprocessing import BiasAligner, KNNGapImputer
+from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from tests.surrogate.chains import TRUSS, F, T, chain, fitted, inverse, mapper, trained
 
@@ -144,23 +143,6 @@ def test_gaps_flow_through_fit_predict_and_score():
     assert 0.5 < model.score(holed_T, holed_F) < 1
 
 
-@pytest.mark.nightly
-@pytest.mark.filterwarnings(FILLED)
-def test_imputer_completes_temperatures_and_frequencies_in_fit_only():
-    holed_T, holed_F = gappy()
-    with_imputer = chain(imputer=KNNGapImputer(), mapper=mapper(lags=1)).fit(holed_T, holed_F)
-    assert with_imputer.parameters_.notna().all(axis=None)
-    side_by_side = np.hstack([holed_T, holed_F])
-    air, completed = np.split(KNNGapImputer().fit_transform(side_by_side), [3], axis=1)
-    np.testing.assert_array_equal(with_imputer.records_.inputs, air)
-    np.testing.assert_allclose(
-        with_imputer.parameters_,
-        with_imputer.inverse_.transform(with_imputer.aligner_.transform(pd.DataFrame(completed, columns=F.columns))),
-        rtol=1e-12,
-    )
-    assert with_imputer.predict(holed_T).isna().any(axis=None)
-
-
 def test_third_party_models_are_held_by_reference():
     class OwnModel:
         parameter_names = TRUSS.parameter_names
@@ -198,16 +180,6 @@ def test_an_inverse_of_another_models_parameters_is_refused():
     other = CallableModel(TRUSS.frequencies, TRUSS.parameter_names[::-1], 6)
     with pytest.raises(ValueError, match=r"the inverse's model has the parameters \['vertical', "):
         chain(inverse=inverse().set_params(model=other)).fit(T, F)
-
-
-@pytest.mark.nightly
-def test_pandas_output_everywhere_changes_no_value():
-    transformer = make_pipeline(BiasAligner(TRUSS), trained())
-    words = TransformedTargetRegressor(mapper(), transformer=transformer, check_inverse=False)
-    with config_context(transform_output="pandas"):
-        alike = chain(inverse=trained(), discrepancy=None).fit(T, F)
-        np.testing.assert_allclose(words.fit(T, F).predict(T), alike.predict(T), rtol=1e-12)
-        pd.testing.assert_frame_equal(chain().fit(T, F).predict(T), fitted().predict(T))
 
 
 def test_an_inverse_within_a_pipeline_gets_the_model_too():

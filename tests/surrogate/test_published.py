@@ -1,6 +1,5 @@
 """The networks and the chain as published."""
 
-import functools
 import warnings
 
 import numpy as np
@@ -8,13 +7,12 @@ import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.metrics import r2_score
-from sklearn.model_selection import GridSearchCV
 from sklearn.neural_network import MLPRegressor
 from sklearn.utils.estimator_checks import check_estimator
 
-from skthermo.datasets import make_kw51, make_truss, make_truss_campaign
-from skthermo.preprocessing import BiasAligner, BlockedKFold, KNNGapImputer
-from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, paper_chain, paper_network
+from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.preprocessing import BiasAligner, KNNGapImputer
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, paper_chain, paper_network
 
 TRUSS, YEAR, LATER = make_truss(), make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
 T, F = YEAR.temperatures, YEAR.frequencies
@@ -142,41 +140,3 @@ def test_gaps_of_temperatures_and_frequencies_are_filled_together_so_that_all_ro
         pd.DataFrame(filled[:, :3], T.index, T.columns), pd.DataFrame(filled[:, 3:], T.index, F.columns)
     )
     np.testing.assert_allclose(whole.predict(LATER.temperatures), fem.predict(LATER.temperatures), rtol=1e-12)
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(no-earlier-records|uncalibrated-model|outside-bounds|other-weather)")
-@pytest.mark.filterwarnings("ignore:.*(faulty-sensor|not-evaluated)")
-def test_a_search_over_layers_lags_neighbours_and_aligners():
-    grid = {
-        "inverse__regressor__hidden_layer_sizes": [(16,), (32, 16)],
-        "mapper__lagfeatures__lags": [1, 2],
-        "imputer__n_neighbors": [5, 10],
-        "aligner": [BiasAligner("simulations"), BiasAligner(), "auto"],
-    }
-    search = GridSearchCV(quick(lags=2), grid, cv=BlockedKFold(2), error_score="raise")
-    search.fit(gappy(T, 0), gappy(F, 1))
-    assert len(search.cv_results_["params"]) == 24
-    assert np.isfinite(search.cv_results_["mean_test_score"]).all()
-    assert isinstance(search.best_estimator_.inverse_, InverseSurrogate)
-
-
-@functools.cache
-def on_kw51():
-    bridge = make_kw51()
-    random, stamps = np.random.default_rng(0), pd.date_range("2025", periods=200, freq="h")
-    air = pd.DataFrame({"T": 10 + 8 * np.sin(np.arange(200) / 9) + random.standard_normal(200)}, stamps)
-    theta = np.repeat(1 - 0.002 * (air.to_numpy() - 10), 5, axis=1)
-    fast = bridge.reduced(0.3, random_state=0)
-    noise = 1 + 0.001 * random.standard_normal((200, 6))
-    return bridge, air, pd.DataFrame(fast.frequencies(theta) * noise, stamps).add_prefix("f")
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(no-earlier-records|uncalibrated-model|few-records|outside-bounds)")
-def test_a_reduced_model_gives_the_same_in_less_time():
-    bridge, air, measured = on_kw51()
-    chain = paper_chain(bridge, network="kw51", lags=3, n_samples=60, random_state=0)
-    chain.set_params(inverse__regressor__max_iter=50, mapper__temperaturemapper__regressor__max_iter=50)
-    full, reduced = (chain.set_params(reduce=reduce).fit(air, measured).predict(air) for reduce in (False, "auto"))
-    np.testing.assert_allclose(reduced, full, rtol=1e-4)
