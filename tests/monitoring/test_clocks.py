@@ -60,9 +60,7 @@ def assert_same_in_batches(records, cuts):
     assert whole.status(now=records.index[-1]).state == whole.status(whole.last_).state
 
 
-@pytest.mark.parametrize(
-    "start", ["1970-01-01", "1980-01-06", "2000-01-01", "2099-12-31", "1024 weeks later", "the beginning of a year"]
-)
+@pytest.mark.parametrize("start", ["1970-01-01", "1024 weeks later", "the beginning of a year"])
 def test_records_of_a_wrong_clock_are_set_aside_in_fit(start):
     records = campaign()[:N_BASELINE]
     stamps = records.index.to_numpy().copy()
