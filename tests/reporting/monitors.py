@@ -72,7 +72,6 @@ class FakeMonitor(Monitor):
     def __init__(
         self,
         *,
-        freq="1D",
         n_days=180,
         n_not_evaluated=0,
         reason="",
@@ -87,7 +86,7 @@ class FakeMonitor(Monitor):
         real = in_service()
         vars(self).update(vars(real))
         self.false_alarms_per_year, self.watch_per_year, self.sensors = false_alarms_per_year, watch_per_year, sensors
-        stamps = pd.date_range("2025-01-01", periods=n_days, freq=freq, tz=zone)
+        stamps = pd.date_range("2025-01-01", periods=n_days, tz=zone)
         index = 1 + np.abs(np.sin(np.arange(len(stamps))))
         index[len(index) - n_not_evaluated if n_not_evaluated is not None else 0 :] = np.nan
         known = ~np.isnan(index)
