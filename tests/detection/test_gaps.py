@@ -61,7 +61,7 @@ def test_a_distance_in_few_modes_is_as_rare_as_the_index_that_it_becomes(there):
     np.testing.assert_allclose(detector.damage_index(rows)[far], expected[far], rtol=0.05)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 399), st.floats(1.01, 100))
 def test_a_row_farther_away_in_the_same_direction_has_a_higher_index(row, factor):
     detector = MahalanobisDetector().fit(GAPPY)

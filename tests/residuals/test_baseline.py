@@ -11,7 +11,7 @@ from tests.residuals.series import autoregressive, residuals
 # Order statistics and correlation times
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=60), st.floats(0.05, 0.95))
 def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, confidence):
     scores = np.array(scores)
