@@ -29,7 +29,7 @@ AT_MOST = {
     "constructors called of": 0,
     "kinds of warnings": 30,
     "names in two files": 0,
-    "tests with private imports": 10,
+    "tests with private imports": 9,
 }
 
 
