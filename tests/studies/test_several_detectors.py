@@ -99,7 +99,7 @@ class CountedForest(IsolationForest):
 
 
 def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fem, tmp_path):
-    forest = OutlierDetector(CountedForest(n_estimators=10))
+    forest = OutlierDetector(CountedForest(n_estimators=2))
     several = {"raw": forest, "residuals": compensated(forest), "distance": compensated()}
     several["falls"] = compensated(DirectionalDetector())
     without = study_of(fem, several, SCENARIOS)
