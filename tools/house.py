@@ -25,6 +25,7 @@ whole    ``CompensatedDetector.fit``, where the package has it
 
 import argparse
 import ast
+import re
 import sys
 import threading
 from pathlib import Path
@@ -179,11 +180,13 @@ def drawing():
             said += [f"{room} on {' and '.join(sorted(given[room]))}"] if given[room] else []
             x += wide + gap
     high = gap + len(rows) * (height + gap)
+    style = re.search(r"<style>.*?</style>", DRAWN.with_name("method.svg").read_text(), re.DOTALL)[0]
     return "\n".join(
         [
             f'<svg class="method" style="min-width: 0; max-width: 560px" viewBox="0 0 {width} {high}" role="img"'
             f' aria-label="The packages, each above those that it is built on: {"; ".join(said)}; all use _core"'
             ' xmlns="http://www.w3.org/2000/svg">',
+            style,
             f'<rect class="band" width="{width}" height="{high}" rx="10"/>',
             *boxes,
             "</svg>\n",

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from numbers import Integral
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -24,14 +25,32 @@ RANKED_KINDS = (DAMAGE, DRIFT, WATCH, FAULT)
 STATES = ("alarm", "drift", "watch", "known damage")
 
 
-def levels(index: Array, persistence: int) -> Array:
-    """The median index of the last ``2 persistence - 1`` evaluated records; records before the first count as 0.
+Persistence: TypeAlias = int | Sequence[int]
 
-    It exceeds a threshold where ``persistence`` of these records do; NaN for records that are not evaluated.
+
+def rule_of(persistence: Persistence) -> tuple[int, int]:
+    """Number of records above a threshold by which an event opens, and among how many; 3 means 3 of 5."""
+    is_pair = isinstance(persistence, tuple | list) and len(persistence) == 2
+    numbers = persistence if is_pair else [persistence]
+    are_integers = all(isinstance(one, Integral) and not isinstance(one, bool) for one in numbers)
+    if not are_integers or not 1 <= numbers[0] <= numbers[-1]:
+        raise ValueError(
+            f"The 'persistence' parameter of Monitor is {persistence!r:.100}; expected an integer from 1 on, such as 3 "
+            "(3 of 5 records), or two integers (number, among), such as (4, 6), with number from 1 to among"
+        )
+    return int(numbers[0]), int(numbers[1] if is_pair else 2 * numbers[0] - 1)
+
+
+def levels(index: Array, persistence: Persistence) -> Array:
+    """The ``number``-th largest index of the last ``among`` evaluated records; records before the first count as 0.
+
+    It exceeds a threshold where ``number`` of these records do; NaN for records that are not evaluated.
     """
-    level, known, n = np.full(len(index), np.nan), ~np.isnan(index), 2 * (persistence - 1)
+    number, among = rule_of(persistence)
+    level, known = np.full(len(index), np.nan), ~np.isnan(index)
     if known.any():
-        level[known] = np.median(sliding_window_view(np.append(np.zeros(n), index[known]), n + 1), axis=1)
+        last = sliding_window_view(np.append(np.zeros(among - 1), index[known]), among)
+        level[known] = np.partition(last, -number, axis=1)[:, -number]
     return level
 
 
@@ -64,7 +83,7 @@ def runs(is_open: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 
 
 def followed(
-    index: Array, times: NDArray[np.int64], limits: pd.DataFrame, persistence: int, starts: ArrayLike = ()
+    index: Array, times: NDArray[np.int64], limits: pd.DataFrame, persistence: Persistence, starts: ArrayLike = ()
 ) -> tuple[Array, list[tuple[int, int]]]:
     """Levels of a series of indices, and the first and the last position of each of its events.
 
@@ -174,7 +193,7 @@ class Events:
         decisions: pd.DataFrame,
         weeks: pd.DataFrame,
         said: pd.DataFrame,
-        persistence: int,
+        persistence: Persistence,
         starts: ArrayLike = (),
         within: pd.Timedelta = 28 * DAY,
     ):
@@ -199,7 +218,7 @@ class Events:
         table = pd.DataFrame({name: pd.Series(values, dtype=dtype) for name, values, dtype in series})
         self.table = table.set_axis(pd.RangeIndex(1, len(rows) + 1, name="event"))
 
-    def _raised(self, persistence: int) -> Iterator[Run]:
+    def _raised(self, persistence: Persistence) -> Iterator[Run]:
         """Runs of alarms and watches."""
         decisions = self.decisions
         index, is_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy() > 0
@@ -229,7 +248,7 @@ class Events:
                 modes, own = weeks["modes"].iloc[peak], parts(start, end)
                 yield self._run(DRIFT, first, stop, level[of_record[first:stop]], modes, *own, number=end - start)
 
-    def _faults(self, persistence: int) -> Iterator[Run]:
+    def _faults(self, persistence: Persistence) -> Iterator[Run]:
         """Runs of responses that were set aside, and of alarms that rested on values of sensors at fault."""
         decisions, held = self.decisions, self.decisions["n_held"].to_numpy()
         if held.any():
@@ -476,7 +495,7 @@ class EventLevels:
     estimate: FalseAlarmEstimate
 
     @classmethod
-    def learned(cls, index: pd.Series, per_year: float, persistence: int, share: float = 1.0) -> EventLevels:
+    def learned(cls, index: pd.Series, per_year: float, persistence: Persistence, share: float = 1.0) -> EventLevels:
         """The threshold that a healthy structure exceeds in a share of so many events a year; others have the rest.
 
         Three of the baseline's peaks are enough. Events close within the level that it stays within for 95 % of time.
@@ -580,7 +599,7 @@ def crossing(steps: Array, ratios: Array) -> float:
 
 @dataclass(frozen=True)
 class SmallestChanges:
-    """Falls of responses that a threshold sees: half of the records are above it, and an alarm follows ``within`` days.
+    """Falls of responses that raise an alarm: enough of the records are above a threshold, ``within`` a time.
 
     ``common`` is that of all responses by one share, NaN where some are not positive throughout; ``single`` that of
     each alone, a share where ``is_relative``, else in its unit. ``groups`` are losses of stiffness of damage groups, of
@@ -601,10 +620,11 @@ class SmallestChanges:
         names: Sequence[Any],
         threshold: float,
         within: pd.Timedelta,
+        share_above: float,
         losses: pd.DataFrame | None = None,
         steps: Sequence[float] = (0.0, 0.5, 2.0, 5.0),
     ) -> SmallestChanges:
-        """Falls by which the median of the indices, ``index_of`` records in order of time, exceeds a threshold.
+        """Falls by which a share of the indices, ``index_of`` records in order of time, is above a threshold.
 
         ``losses`` are relative changes of the responses, in their order, by the loss of each damage group that moves a
         record by one standard deviation; their column ``"loss"`` is that loss. ``steps`` are in standard deviations.
@@ -626,7 +646,8 @@ class SmallestChanges:
             by_step = ({one: step * fall for one, fall in falls.items()} for step in steps[1:])
             indices = np.array([start, *(index_of(lowered(some, one)) for one in by_step)])
             known = indices[:, ~np.isnan(indices).any(axis=0)]
-            fall = crossing(size * np.array(steps), np.median(known, axis=1) / threshold) if known.size else np.nan
+            reached = np.quantile(known, 1 - share_above, axis=1) if known.size else np.zeros(len(steps))
+            fall = crossing(size * np.array(steps), reached / threshold)
             found[kind][name] = fall if fall < 1 or not (is_relative or kind == "groups") else np.nan
         return cls(found["common"].get("", np.nan), found["single"], is_relative, within, found["groups"])
 

@@ -58,6 +58,7 @@ from skthermo.monitoring._events import (
     event_changes,
     leading,
     lowered,
+    rule_of,
     with_acknowledgements,
 )
 from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
@@ -102,10 +103,10 @@ class Monitor(SavesFrames, Estimator):
     watch_per_year : float, optional
         A second, lower level: events of kind "watch" that a healthy structure has in a year, more than damage events.
         While one is open, and no damage event is, the state is "watch". By default there is no such level.
-    persistence : int, default=3
-        Number of records above the threshold by which an event opens, among the last ``2 persistence - 1`` that were
-        evaluated: three of five. Single outliers raise no alarm, and a change that lasts is found by its third record.
-        1 means that a single record opens an event.
+    persistence : int or (number, among), default=3
+        An event opens where ``number`` of the last ``among`` evaluated records are above the threshold, such as
+        ``(4, 6)``. An integer p means p of 2 p - 1: three of five. Single outliers raise no alarm, and a change that
+        lasts is found by its third record. 1 means that a single record opens an event.
     max_delay : str or timedelta, default="7D"
         How late records may come and still be evaluated as if they had come in time.
     retention : str or timedelta, default="400D"
@@ -132,15 +133,15 @@ class Monitor(SavesFrames, Estimator):
         How the threshold was set, and how many false events to expect: ``expected``, ``lowest`` and ``highest`` in a
         year.
     threshold_ : float
-        A damage event opens with an index above it, of ``persistence`` of the last evaluated records.
+        A damage event opens with an index above it, of ``number`` of the last ``among`` evaluated records.
     clear_threshold_ : float
-        An event closes when, for a day, fewer than ``persistence`` of the last records have been above it.
+        An event closes when, for a day, fewer than ``number`` of the last ``among`` have been above it.
     smallest_changes_ : object
-        By how much responses have to fall until half of the records are above the threshold, in the weather of the
-        baseline: ``common`` (all by one share), ``single`` (each alone, by name), and ``within`` which time an alarm
-        follows. Shares of the mean, or, where not all responses are positive, in their units without a ``common``
-        change. ``groups`` are losses of stiffness by name of the damage group, where the detector has directions of
-        such. NaN where none is seen.
+        By how much responses have to fall until enough records are above the threshold (half of them; 58 % for four of
+        six), in the weather of the baseline: ``common`` (all by one share), ``single`` (each alone, by name), and
+        ``within`` which time an alarm follows. Shares of the mean, or, where not all responses are positive, in their
+        units without a ``common`` change. ``groups`` are losses of stiffness by name of the damage group, where the
+        detector has directions of such. NaN where none is seen.
     watch_threshold_ : float or None
         An event of kind "watch" opens with an index above it, in the same way; None without ``watch_per_year``.
     baseline_peaks_ : Series
@@ -152,7 +153,7 @@ class Monitor(SavesFrames, Estimator):
         A row for each cause, counted from 1 by its first sign: ``kind`` ("damage", "drift": the mean of 30 days has
         moved, "watch", or "fault": responses that were set aside as implausible, and alarms that rested on a sensor
         that had failed), ``start`` (first record in alarm), ``end`` (first record after it, NaT while it is open),
-        ``peak`` (highest index that ``persistence`` of the last records reached; of a drift, the statistic over its
+        ``peak`` (highest index that ``number`` of the last ``among`` reached; of a drift, the statistic over its
         limit; of a fault, that index or the number of responses set aside), ``peak_time``, ``modes`` (at the peak, or
         the columns at fault) and ``groups`` (of all records in alarm together), as in `update`, ``size`` (loss of
         stiffness of the first of ``groups``, on average; NaN without), ``n_alarms`` (records in alarm), ``n_times``
@@ -254,7 +255,7 @@ class Monitor(SavesFrames, Estimator):
         "fem": [HasMethods(["fit", "predict"]), None],
         "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
         "watch_per_year": [Interval(Real, 0, None, closed="neither"), None],
-        "persistence": [Interval(Integral, 1, None, closed="left")],
+        "persistence": "no_validation",  # rule_of does
         "reference": ["array-like", None],
         "max_delay": [str, timedelta, np.timedelta64],
         "retention": [str, timedelta, np.timedelta64],
@@ -273,7 +274,7 @@ class Monitor(SavesFrames, Estimator):
         fem: Any = None,
         false_alarms_per_year: float = 1.0,
         watch_per_year: float | None = None,
-        persistence: int = 3,
+        persistence: int | Sequence[int] = 3,
         max_delay: str | timedelta = "7D",
         retention: str | timedelta = "400D",
         sensors: bool = True,
@@ -294,6 +295,10 @@ class Monitor(SavesFrames, Estimator):
         self.units = units
         self.lookback = lookback
         self.random_state = random_state
+
+    def _validate_params(self) -> None:
+        super()._validate_params()
+        rule_of(self.persistence)
 
     @property
     def last_(self) -> pd.Timestamp:
@@ -480,9 +485,10 @@ class Monitor(SavesFrames, Estimator):
             watch = EventLevels.learned(index, self.watch_per_year, self.persistence)
             self.watch_threshold_ = min(watch.threshold, self.threshold_)
         step = usual_step(trained.index)
-        within = self.lookback_.duration(step) + (2 * self.persistence - 1) * step
+        number, among = rule_of(self.persistence)
+        within, share_above = self.lookback_.duration(step) + among * step, (number - 0.5) / among
         self.smallest_changes_ = SmallestChanges.measured(
-            self._index, trained, self.targets_, self.threshold_, within, losses_of(detector)
+            self._index, trained, self.targets_, self.threshold_, within, share_above, losses_of(detector)
         )
         return list(levels.findings(self.smallest_changes_))
 

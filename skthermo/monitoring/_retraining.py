@@ -11,7 +11,15 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.dummy import DummyRegressor
 from sklearn.utils import check_random_state
 
-from skthermo._core.frames import DAY, YEAR, check_duration, check_stamp, correlation_times, usual_step
+from skthermo._core.frames import (
+    DAY,
+    YEAR,
+    check_duration,
+    check_stamp,
+    correlation_times,
+    midnights_between,
+    usual_step,
+)
 from skthermo._core.text import capital, counted, listed, probability_text
 from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, TemperatureCompensator
@@ -158,7 +166,7 @@ def begun_again(monitor: Any, since: Any, *, until: Any = None) -> Retraining:
     table, moved = at_new_level(monitor, prior, own)
     baseline, left = pd.concat([moved, own]), prior if len(moved) else None
     note = (
-        f"{counted((own.index[-1] - own.index[0]).days + 1, 'day')} and {counted(len(own), 'record')} since "
+        f"{counted(len(midnights_between(*own.index[[0, -1]])), 'day')} and {counted(len(own), 'record')} since "
         f"{since:%Y-%m-%d %H:%M}; {counted(len(moved), 'older record')}, moved to the new level, stand for weather not "
         "met since"
     )

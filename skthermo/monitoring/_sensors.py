@@ -500,7 +500,7 @@ def change_of(rest: pd.Series) -> dict[str, Any]:
     first, size = best % len(at), float(gains[best] * shapes[best, -1])
     kind, shown = "offset", f"{size:+.1f} degrees"
     if is_drift[best]:
-        kind, shown = "drift", f"{size / (at[-1] - at[first] + 1) * YEAR.days / 12:+.2f} degrees a month"
+        kind, shown = "drift", f"{size / (at[-1] - at[first] + 1) * (YEAR / DAY) / 12:+.2f} degrees a month"
     detail = f"{shown} beside the other thermometers; left out"
     since = rest.index[max(first - 1, 0)]  # it may have begun on the day before
     return {"kind": kind, "since": since, "size": size, "detail": detail}

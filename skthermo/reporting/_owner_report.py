@@ -69,7 +69,6 @@ def owner_report(
     templates : str or path, optional
         Folder of templates in Jinja that go before the package's, such as ``monitor.html.j2`` in another language.
         They run in Jinja2's sandbox, which keeps them from files and code; a page is still what they make of it.
-
     settings : str, optional
         Settings of the monitor as they are named in commands, such as "river": the page on a monitor then names the
         commands by which events are acknowledged, in place of calls in Python.
@@ -114,7 +113,8 @@ def owner_report(
     True
     """
     kind = _kind_of(subject)
-    _check_arguments(kind, identified=identified, title=title, structure=structure, detector=detector, now=now)
+    others = {"structure": structure, "detector": detector, "now": now, "settings": settings}
+    _check_arguments(kind, identified=identified, title=title, **others)
     file, folder = check_path(path), check_templates(templates)
     if file.is_dir() or not file.parent.is_dir():
         raise ValueError(f"path is {str(file)!r}; expected a file in a folder that exists, such as 'report.html'")
@@ -151,7 +151,7 @@ def _kind_of(subject: object) -> str:
 
 def _check_arguments(kind: str, **given: Any) -> None:
     """Raise an error for arguments of another type, or that are not for this subject."""
-    types: dict[str, type] = {"title": str, "structure": Structure}
+    types: dict[str, type] = {"title": str, "structure": Structure, "settings": str}
     if given["identified"] is not None:
         from skthermo.studies import IdentifiedDamage
 
@@ -159,7 +159,7 @@ def _check_arguments(kind: str, **given: Any) -> None:
     for name, expected in types.items():
         if given[name] is not None and not isinstance(given[name], expected):
             raise ValueError(f"{name} is {given[name]!r:.200}; expected a {expected.__name__}")
-    of_fleets = ("identified", "structure", "detector")
-    for name in {"Fleet": of_fleets, "Monitor": ("detector",), "DetectabilityStudy": ("now",)}[kind]:
+    of_others = {"Fleet": ("identified", "structure", "detector", "settings"), "Monitor": ("detector",)}
+    for name in of_others.get(kind, ("now", "settings")):
         if given[name] is not None:
             raise ValueError(f"{name} given for a {kind}; expected it for other subjects only")

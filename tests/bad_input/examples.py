@@ -1102,8 +1102,8 @@ use(
     F=(LATER.frequencies, frequencies(LATER.frequencies, rows=True)),
     groups=(["top"], names(["top"]) | bad({"a": ["no"]}, {"a": []})),
     prior=(None, instead({"severity": 0.2}, (0.5, 0.5), studies.DamagePrior)),
-    stiffening=(["top"], names(["top"]) | bad(1)),
-    parameters=(["top"], names(["top"])),
+    stiffening=(["top"], names(["top"]) | bad(0, 1, NAN, b"")),
+    parameters=(["top"], names(["top"]) | bad(0, NAN, b"")),
     added_mass=({"ballast": np.ones(23)}, bad("x", 5.0, {"ballast": np.ones(4)})),
     shapes=(
         (SHAPES, SHAPES * 1.01),

@@ -59,7 +59,7 @@ use(
     fem=(None, {cause: value for cause, value in instead().items() if cause != "None"}),
     false_alarms_per_year=(1.0, number(0, -1)),
     watch_per_year=(12.0, number(0, -1, 1.0, but=("None",))),
-    persistence=(3, number(0, -1, 1.5)),
+    persistence=((4, 6), number(0, -1, 1.5, (0, 3), (4, 3), (4.0, 6), (2, 3, 4), [3])),
     max_delay=("7D", durations("zero")),
     retention=("400D", durations()),
     sensors=(True, flag()),

@@ -55,7 +55,7 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
         "# regimes =": 'regimes = "none"',
         '[[features]]\nclass = "H': '[[features]]\nclass = "ExponentialMeans"\nhalf_lives = ["2D", "20D"]\n\n'
         '[[features]]\nclass = "H',
-        "# persistence =": 'persistence = 5\nmax_delay = "3D"',
+        "# persistence =": 'persistence = [4, 6]\nmax_delay = "3D"',
     }
     for beginning, new in changes.items():
         old = whole(beginning, text)
@@ -65,7 +65,7 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
     done = run("fit", file, "--replace")
     assert done.code == 0, done.err
     steps = ExponentialMeans(half_lives=["2D", "20D"]), HingeFeatures(), Ridge()
-    given = {"compensated": {"window": "5D", "regimes": None}, "persistence": 5, "max_delay": "3D"}
+    given = {"compensated": {"window": "5D", "regimes": None}, "persistence": [4, 6], "max_delay": "3D"}
     assert repr(load_monitor(folder / "monitor.joblib")) == repr(by_python(MahalanobisDetector(), *steps, **given))
 
 
@@ -76,7 +76,7 @@ def test_the_file_makes_what_python_makes(fitted, tmp_path):
         ("[monitor]\n", "[montior]\n", "did you mean 'monitor'"),
         ("# persistence =", "persistence = 0", "persistence"),
         ("# persistence =", 'persistence = "three"', "persistence"),
-        ("# persistence =", "persistence = -1", "persistence"),
+        ("# persistence =", "persistence = [4, 3]", "such as (4, 6)"),
         ("false_alarms_per_year = 1.0", "false_alarms_per_year = -1", "false_alarms_per_year"),
         ('class = "DirectionalDetector"', 'class = "MahalanobisDetecter"', "did you mean 'MahalanobisDetector'"),
         ('class = "sklearn.linear_model.Ridge"', 'class = "sklearn.linear_model.Rigde"', "scikit-learn"),

@@ -69,6 +69,40 @@ def test_three_of_five_records_above_the_threshold_open_an_event_and_two_do_not(
     assert len(monitor.events_) == 1
 
 
+def alarms_by_the_rule(indices, number, among, threshold=3.0, release=2.0, a_day=4):
+    """Whether an event is open after each record, one record after the other."""
+    last, is_open, quiet_since, found = [0.0] * among, False, None, []
+    for at, index in enumerate(indices):
+        if not np.isnan(index):
+            last = [*last[1:], index]
+            is_quiet = sum(one > release for one in last) < number
+            quiet_since = (at if quiet_since is None else quiet_since) if is_quiet else None
+            is_over = is_quiet and at - quiet_since >= a_day
+            is_open = sum(one > threshold for one in last) >= number or (is_open and not is_over)
+        found.append(is_open)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("rule", [(1, 1), (1, 4), (3, 5), (4, 6), (5, 6), (6, 6)])
+def test_an_event_opens_by_a_number_of_the_last_records_that_were_evaluated(rule):
+    rng = np.random.default_rng(6)
+    bursts = np.repeat(rng.uniform(0.5, 4.5, 60), rng.integers(1, 16, 60))
+    indices = np.maximum(bursts + rng.normal(0, 0.7, len(bursts)), 0.0)
+    indices[rng.random(len(indices)) < 0.2] = np.nan
+    _, answers = answers_to(indices, persistence=rule)
+    expected = alarms_by_the_rule(indices, *rule) & ~np.isnan(indices)
+    np.testing.assert_array_equal(answers["state"] == "alarm", expected)
+    assert 0.05 < expected.mean() < 0.8
+
+
+def test_a_number_of_records_is_that_many_of_twice_as_many_less_one():
+    indices = np.random.default_rng(3).uniform(0, 5, 300)
+    (one, answers), (two, same) = (answers_to(indices, persistence=rule) for rule in (3, [3, 5]))
+    pd.testing.assert_frame_equal(answers, same)
+    pd.testing.assert_frame_equal(one.events_, two.events_)
+    assert one.smallest_changes_ == two.smallest_changes_
+
+
 def test_an_event_closes_a_day_after_its_levels_have_come_within_the_release():
     monitor, answers = answers_to([1, 1, 1, 5, 5, 5, *[2.5] * 20, *[1] * 10])
     event = monitor.events_.loc[1]

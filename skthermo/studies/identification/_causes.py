@@ -125,7 +125,7 @@ def read_causes(
     causes = [Cause(name, of=tuple(of)) for name, of in members.items()]
     for name, bound, scale in _rises(stiffening, "stiffening", known):
         causes.append(Cause(f"{name} stiffer", "stiffening", -bound, tuple(known[name]), scale=scale))
-    for name, bound, scale in _rises(parameters or [], "parameters", model.parameter_names):
+    for name, bound, scale in _rises([] if parameters is None else parameters, "parameters", model.parameter_names):
         if not isinstance(parameters, Mapping):
             causes.append(Cause(f"{name} lower", "parameter", -0.95, (name,)))
         causes.append(Cause(f"{name} higher", "parameter", bound, (name,), scale=scale))
@@ -151,8 +151,7 @@ def read_causes(
 def _rises(given: Any, what: str, known: Collection[str]) -> Iterator[tuple[str, float, float]]:
     """Names of what may rise, up to which relative rise, and the scale of the amount: a rise that is given is likely,
     and three times as much possible."""
-    names = [given] if isinstance(given, str) else list(given)
-    for name in check_names(names, what, sorted(known)):
+    for name in check_names([given] if isinstance(given, str) else given, what, sorted(known)):
         if not isinstance(given, Mapping):
             yield name, 1.0, 1.0
             continue
