@@ -16,7 +16,6 @@ from tests.nights import by_day
 
 FUZZ = settings(max_examples=by_day(25, at_night=60))
 NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*read-as:UserWarning")
-HOUR = pd.Timedelta("1h")
 
 
 def check_equal(data, fields):
