@@ -8,6 +8,7 @@ from pandas.testing import assert_frame_equal
 from sklearn.base import clone
 
 from skthermo.surrogate import InverseSurrogate, TemperatureMapper, paper_network
+from tests.examples.frozen_bridge import frozen_bridge
 from tests.examples.pages import recipes
 
 EXAMPLE = recipes("regressors")
@@ -39,6 +40,21 @@ def campaign():
     return EXAMPLE.truss_campaign(0, SIZE)
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["truss", "KW51", "Z24"])
+def test_solving_is_exact_without_noise(models, name):
+    table = EXAMPLE.inverse_results(*models[name], noise=0.0, seed=0, size=SIZE)
+    assert list(table.index) == [*EXAMPLE.STYLES, EXAMPLE.SOLVED]
+    assert table.notna().all(axis=None)
+    assert table.loc[EXAMPLE.SOLVED, "error"] < 1e-3
+
+
+@pytest.mark.nightly
+def test_with_noise_no_regressor_errs_less_than_solving(models):
+    errors = EXAMPLE.inverse_results(*models["Z24"], noise=0.005, seed=0, size=SIZE)["error"]
+    assert errors.idxmin() == EXAMPLE.SOLVED
+
+
 def test_piecewise_linear_regression_is_the_default_of_the_mapper(campaign):
     T, later = campaign.train[0], campaign.test[0]
     lines = EXAMPLE.fitted_chain(campaign, EXAMPLE.regressors("truss")["piecewise-linear"], seed=0)
@@ -61,6 +77,25 @@ def test_trees_stay_at_their_last_value_and_lines_go_on(campaign):
     }
     assert EXAMPLE.beyond(campaign.law, T, -1) > 5
     assert changes["random forest"] < 2 < changes["piecewise-linear"]
+
+
+@pytest.mark.nightly
+def test_mappers_have_complete_tables(models, tmp_path, monkeypatch):
+    """Of all regressors on Z24, of two on KW51."""
+    path = tmp_path / "z24_monitoring.csv"
+    frozen_bridge(n_healthy=100, n_damaged=20).to_csv(path, index=False)
+    assert EXAMPLE.find(tmp_path) == path
+    assert EXAMPLE.find(tmp_path / "elsewhere") is None
+    regressors, few = EXAMPLE.regressors, ["quadratic", "piecewise-linear"]
+    for campaign, names in (
+        (EXAMPLE.z24_campaign(models["Z24"][0], path), list(EXAMPLE.STYLES)),
+        (EXAMPLE.kw51_campaign(models["KW51"][0], 0, EXAMPLE.Size(100, 20, 20)), few),
+    ):
+        table = EXAMPLE.averaged([EXAMPLE.mapper_results(campaign, seed=0)])
+        assert list(table.index) == names
+        monkeypatch.setattr(EXAMPLE, "regressors", lambda network: {name: regressors(network)[name] for name in few})
+        assert np.isfinite(table).all(axis=None)
+        assert (table["± over seeds"] == 0).all()
 
 
 def test_frost_stiffens_the_first_parameter():
