@@ -304,7 +304,7 @@ def verdict(kind, series, folder):
 
 def of_each(kinds):
     """A test of each kind of files and each series; by day one of the series, another one for the next kind."""
-    each = [(kind, series, (place - number) % len(SERIES) == 0)
+    each = [(kind, series, (place + number) % len(SERIES) == 0)
             for place, kind in enumerate(kinds) for number, series in enumerate(SERIES)]  # fmt: skip
     return pytest.mark.parametrize(
         ("kind", "series"), [pytest.param(*one, marks=() if day else pytest.mark.nightly) for *one, day in each]

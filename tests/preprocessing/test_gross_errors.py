@@ -228,7 +228,7 @@ ANYTHING = st.one_of(
 
 
 @given(temperatures=ANYTHING, frequencies=ANYTHING)
-@settings(max_examples=by_day(30, at_night=60))
+@settings(max_examples=by_day(45, at_night=60))
 @pytest.mark.filterwarnings("error")
 def test_nothing_fails_whatever_is_given(temperatures, frequencies):
     found = check_records(temperatures, frequencies)
