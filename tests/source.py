@@ -1,6 +1,7 @@
 """What source files hold: lines of code, constants, names, kinds of warnings, hidden state, private imports."""
 
 import ast
+import functools
 import io
 import re
 import tokenize
@@ -26,11 +27,17 @@ HIDDEN = {  # names by which state is hidden, and what they look at
 OWN = {"self", "cls", "twin"}  # a twin is a copy that a method has just made
 
 
+@functools.cache
+def tree_of(path):
+    """Syntax tree of a file, which nothing changes."""
+    return ast.parse(path.read_text())
+
+
 def trees(package, rooms=None):
     """Syntax tree of each file, of some rooms only or of all, by its path within the package."""
     files = {path.relative_to(package): path for path in sorted(package.rglob("*.py"))}
     inside = {file for file in files if rooms is None or file.parts[0] in rooms}
-    return {file.as_posix(): ast.parse(files[file].read_text()) for file in files if file in inside}
+    return {file.as_posix(): tree_of(files[file]) for file in files if file in inside}
 
 
 def lines_of_code(text):
@@ -96,7 +103,7 @@ def packages_imported(package, within=()):
     found = {one: set() for one in beside}
     for one in beside:
         for file in (folder / one).rglob("*.py"):
-            modules = (module.split(".") for module in imported(ast.parse(file.read_text())))
+            modules = (module.split(".") for module in imported(tree_of(file)))
             inside = [parts[1:] for parts in modules if parts[: 1 + len(within)] == [package.name, *within]]
             found[one] |= {parts[len(within)] for parts in inside if len(parts) > len(within)} & beside - {one}
     return found

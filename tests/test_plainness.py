@@ -16,6 +16,7 @@ from tests.source import (
     kinds_of_warnings,
     names_in_two_files,
     private_imports,
+    tree_of,
     trees,
 )
 
@@ -97,8 +98,6 @@ def test_few_kinds_of_warnings(files):
 
 def test_few_tests_look_inside():
     root = Path(__file__).parents[1]
-    imports = {
-        path.relative_to(root): [*private_imports(ast.parse(path.read_text()))] for path in root.glob("tests/**/*.py")
-    }
+    imports = {path.relative_to(root): [*private_imports(tree_of(path))] for path in root.glob("tests/**/*.py")}
     found = [f"{path}:{each[0][0]}: {', '.join(name for _, name in each)}" for path, each in imports.items() if each]
     assert_at_most(AT_MOST["tests with private imports"], found, "import what a package gives")

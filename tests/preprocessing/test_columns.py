@@ -10,7 +10,7 @@ import pytest
 from skthermo.preprocessing import read_records
 
 SOURCES = tomllib.loads(Path(__file__).with_name("column_names.toml").read_text(encoding="utf-8"))
-N = 24 * 10
+N = 24 * 6
 HOURS = pd.date_range("2025-03-03", periods=N, freq="h", name="stamp")
 RANDOM = np.random.default_rng(0)
 WARM = 10 + 6 * np.sin(2 * np.pi * np.arange(N) / 24) + RANDOM.normal(0, 0.5, N)
