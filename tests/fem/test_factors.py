@@ -110,7 +110,7 @@ def test_modes_near_guesses_are_those_of_lapack(kind):
         assert np.abs(residual).max() < 1e-4 * np.abs(stiffness @ phi).max()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(lacks=st.integers(0, 5), mixed=st.integers(0, 2**32 - 1), tol=st.sampled_from([1e-4, 1e-6, 1e-8]))
 def test_the_error_stays_below_what_is_asked(lacks, mixed, tol):
     """Symmetric structures: guesses of one symmetry hold nothing of the modes of the other."""
@@ -131,7 +131,7 @@ def test_repeated_eigenvalues_are_found_from_guesses_of_one_copy(copies):
     np.testing.assert_allclose(frequencies_near(model, np.ones((1, 1)), one)[0][0], expected, rtol=1e-9)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(share=st.floats(0.03, 0.5), n_modes=st.integers(1, 5), guards=st.integers(0, 3), n=st.sampled_from([120, 300]))
 def test_a_mode_of_a_part_that_neither_guesses_nor_nominal_modes_move_is_found(share, n_modes, guards, n):
     """Two chains that nothing joins; the second is stiff at theta = 1, and soft where modes are sought."""

@@ -65,7 +65,7 @@ def means(values, window, regime=None, share=0.5, index=None):
     return learned, learned(table, regime, is_baseline=True)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(1, 12), st.integers(0, 1000))
 def test_means_are_those_of_the_last_records_without_outliers(window, seed):
     values = np.random.default_rng(seed).uniform(-1, 1, (60, 2))  # within four robust deviations
