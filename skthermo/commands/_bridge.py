@@ -232,16 +232,12 @@ class Bridge:
                 changed = {str(one["event"]) for one in monitor.transitions(n_known)}
                 self.lines = [line for line in self.lines if _is_news(line, changed)]
                 if is_usual and not (changed or self.errors or read):
-                    self.lines = [f"{self.said}; {self._came(evaluated)}, nothing has changed"]
+                    unknown = (evaluated["state"] == "not evaluated").sum()
+                    came = counted(len(evaluated), "new record") + (f" ({unknown} not evaluated)" if unknown else "")
+                    self.lines = [f"{self.said}; {came}, nothing has changed".replace("\N{NO-BREAK SPACE}", " ")]
             taken.state = self.state
             taken.write()
         self.write_page(monitor)
-
-    def _came(self, evaluated: pd.DataFrame) -> str:
-        """How many records came, and how many of these could not be evaluated."""
-        n_unknown = int((evaluated["state"] == "not evaluated").sum())
-        unknown = f" ({n_unknown} not evaluated)" if n_unknown else ""
-        return f"{counted(len(evaluated), 'new record')}{unknown}".replace("\N{NO-BREAK SPACE}", " ")
 
     def _new_files(self, monitor: Monitor, taken: Taken) -> list[NewFile]:
         """Files with rows to take in: those that are named, or those of the folder, and of the baseline's files after
@@ -445,6 +441,9 @@ class Bridge:
             if refused:
                 self.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
             self.append_transitions(monitor)
+            taken = Taken.read(self.taken_file)
+            taken.state = self.state
+            taken.write()
 
 
 def _is_news(line: str, changed: Collection[str]) -> bool:

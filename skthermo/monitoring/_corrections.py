@@ -52,7 +52,7 @@ class Corrections:
         plausible = Plausible.learned(baseline, targets)
         cleaned = baseline.mask(plausible.implausible(baseline.to_numpy()))
         T, F = cleaned.drop(columns=targets), cleaned[targets]
-        watch = SensorWatch.fitted(T, F, reference=reference, units=units) if sensors else None
+        watch = SensorWatch.fitted(T, F, reference, units) if sensors else None
         follower = None if fem is None else DriftFollower.fitted(fem, T.drop(columns=reference), F)
         return cls(list(targets), list(reference), dict(units), plausible, watch, follower)
 

@@ -143,23 +143,28 @@ class Run:
     """Records in a row, ``first`` up to ``stop``, in which a level is open, and what departs in them.
 
     ``level`` is that of each record, NaN where there is none, and ``direction`` the mean departure of the responses.
-    ``effects`` and ``losses`` of damage groups are sums over ``number`` records, or weeks.
+    ``effects`` and ``losses`` of damage groups are sums over its records, or over ``n_weeks`` of means.
     """
 
     kind: str
     first: int
     stop: int
     level: Array
-    direction: Array
     modes: str
+    direction: Array
     effects: Array
     losses: Array
-    number: int
+    n_weeks: int = 0
 
     @property
     def peak(self) -> int:
         """Position of the highest level."""
         return self.first + int(np.nanargmax(self.level))
+
+    @property
+    def n_alarms(self) -> int:
+        """Number of its records that have a level."""
+        return int((~np.isnan(self.level)).sum())
 
 
 class Parts:
@@ -231,7 +236,7 @@ class Events:
             level, spans = followed(shown, self.times, limits, persistence, self.starts)
             for first, stop in spans:
                 peak = decisions["modes"].iloc[first + int(np.nanargmax(level[first:stop]))]
-                yield self._run(kind, first, stop, level[first:stop], peak, *self.parts(first, stop))
+                yield Run(kind, first, stop, level[first:stop], peak, *self.parts(first, stop))
 
     def _drifts(self, weeks: pd.DataFrame) -> Iterator[Run]:
         """Runs of weeks in which the mean of the last days has moved."""
@@ -246,7 +251,7 @@ class Events:
             if first < stop:
                 peak = start + int(np.nanargmax(level[start:end]))
                 modes, own = weeks["modes"].iloc[peak], parts(start, end)
-                yield self._run(DRIFT, first, stop, level[of_record[first:stop]], modes, *own, number=end - start)
+                yield Run(DRIFT, first, stop, level[of_record[first:stop]], modes, *own, n_weeks=end - start)
 
     def _faults(self, persistence: Persistence) -> Iterator[Run]:
         """Runs of responses that were set aside, and of alarms that rested on values of sensors at fault."""
@@ -256,7 +261,7 @@ class Events:
             level, spans = followed(held, self.times, limits, 3, self.starts)
             for first, stop in spans:
                 names = decisions["held"].iloc[first + int(np.nanargmax(level[first:stop]))]
-                yield self._run(FAULT, first, stop, level[first:stop], names, *self.parts(0, 0))
+                yield Run(FAULT, first, stop, level[first:stop], names, *self.parts(0, 0))
         then, index = decisions["index_then"].to_numpy(), decisions["index"].to_numpy()
         differs = ~((then == index) | (np.isnan(then) & np.isnan(index)))
         if not differs.any():
@@ -267,22 +272,7 @@ class Events:
         for first, stop in spans:
             names = decisions["at_fault"][first:stop][differs[first:stop]]
             if (names != "").any() and not any(one < stop and first < end for one, end in real):
-                yield self._run(FAULT, first, stop, level[first:stop], names[names != ""].iloc[0], *self.parts(0, 0))
-
-    def _run(
-        self,
-        kind: str,
-        first: int,
-        stop: int,
-        level: Array,
-        modes: str,
-        direction: Array,
-        effects: Array,
-        losses: Array,
-        number: int = 0,
-    ) -> Run:
-        number = number or int((~np.isnan(level)).sum())
-        return Run(kind, first, stop, level, direction, modes, effects, losses, number)
+                yield Run(FAULT, first, stop, level[first:stop], names[names != ""].iloc[0], *self.parts(0, 0))
 
     def _is_same(self, cause: list[Run], run: Run) -> bool:
         """Whether a run has the cause of earlier ones."""
@@ -306,14 +296,13 @@ class Events:
         stamps, kind = self.decisions.index, min((run.kind for run in runs), key=RANKED_KINDS.index)
         own, stop = [run for run in runs if run.kind == kind], max(run.stop for run in runs)
         highest = max(own, key=lambda run: np.nanmax(run.level))
-        number = sum(run.number for run in own)
+        number = sum(run.n_weeks or run.n_alarms for run in own)
         effects, losses = (sum(getattr(run, name) for run in own) / number for name in ("effects", "losses"))
         means = dict(zip(self.parts.groups, effects, strict=False))
         groups = leading({name: mean for name, mean in means.items() if mean > 2}) if means else ""
         size = losses[self.parts.groups.index(groups.split(", ")[0])] if groups else np.nan
         end, peak = stamps[stop] if stop < len(stamps) else pd.NaT, float(np.nanmax(highest.level))
-        n_alarms = int(sum((~np.isnan(run.level)).sum() for run in own))
-        ends = stamps[own[0].first], end, peak, stamps[highest.peak]
+        ends, n_alarms = (stamps[own[0].first], end, peak, stamps[highest.peak]), sum(run.n_alarms for run in own)
         return kind, *ends, highest.modes, groups, size, n_alarms, len(own), stamps[runs[0].first]
 
     def is_raised(self) -> NDArray[np.bool_]:

@@ -186,11 +186,10 @@ class Lookback(SavesFrames):
         rows, nanoseconds = _reach(detector)
         return cls(rows, pd.Timedelta(nanoseconds, "ns"))
 
-    def start(self, times: NDArray[np.int64], place: int, time: int | None = None) -> int:
-        """Position of the earliest record that is needed for the one at a position, or at a time before it."""
+    def start(self, times: NDArray[np.int64], place: int) -> int:
+        """Position of the earliest record that is needed for the one at a position."""
         first = max(place - self.rows, 0)
-        moment = times[first] if time is None or first < place else time
-        earliest = int(np.searchsorted(times[:place], moment - self.time.value))
+        earliest = int(np.searchsorted(times[:place], times[first] - self.time.value))
         return max(min(first, earliest) - self.rows * bool(self.time), 0)
 
     def duration(self, step: pd.Timedelta) -> pd.Timedelta:

@@ -18,8 +18,6 @@ from skthermo.preprocessing.checks import Plausible, equal_runs
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.gaussian import Gaussian
 
-LEFT_OUT = ("dead", "stuck", "implausible", "offset", "drift")
-
 
 @dataclass(frozen=True)
 class Fault(SavesFrames):
@@ -55,11 +53,7 @@ class WatchState(SavesFrames):
 
     def left_out(self) -> dict[Hashable, Fault]:
         """By column that is left out, the fault for which it is."""
-        return self.lasting(*LEFT_OUT)
-
-    def in_place(self, records: pd.DataFrame) -> pd.DataFrame:
-        """Records with exchanged values back in their columns."""
-        return in_place(records, self.faults)
+        return self.lasting("dead", "stuck", "implausible", "offset", "drift")
 
     def updated(self, changes: Mapping[Fault, Fault], found: Sequence[Fault]) -> WatchState:
         """With faults in place of others, and more."""
@@ -267,12 +261,10 @@ class SensorWatch:
         cls,
         T: pd.DataFrame,
         F: pd.DataFrame,
-        *,
-        reference: Sequence[Hashable] = (),
-        units: Mapping[Hashable, str] | None = None,
+        reference: Sequence[Hashable],
+        units: Mapping[Hashable, str],
     ) -> SensorWatch:
         """Learn from the baseline; ``reference`` names columns of T, ``units`` are texts by column."""
-        T, F, units = T.sort_index(kind="stable"), F.sort_index(kind="stable"), dict(units or {})
         records, days = T.join(F), midnights(T.index)
         per_day = len(days) / max(days.nunique(), 1)
         means, has_values = means_by_day(T, per_day), T.notna().any().all()
@@ -282,12 +274,12 @@ class SensorWatch:
             sensors=list(T),
             reference=[name for name in T if name in reference],
             modes=list(F),
-            units={name: units.get(name, "") for name in records},
+            units={name: units[name] for name in records},
             weather=Plausible.of_weather(T.to_numpy()),
             runs={name: run_limits(filled[name].to_numpy(), per_day) for name in records},
             per_day=per_day,
             thermometers=Thermometers.fitted(means) if can_compare else None,
-            expected=Responses.fitted(T.to_numpy(), F.to_numpy(), days, [units.get(name, "") for name in F]),
+            expected=Responses.fitted(T.to_numpy(), F.to_numpy(), days, [units[name] for name in F]),
             start_=WatchState(records.iloc[:0], means.iloc[:0]),
         )
 
@@ -372,7 +364,7 @@ class SensorWatch:
     def _with_exchanges(self, state: WatchState, today: pd.Timestamp) -> WatchState:
         """Modes that are exchanged from now on, or no longer."""
         begin = max([days_later(today, -4), *(one.detected for one in state.faults if one.kind == "swapped")])
-        recent, lasting = state.in_place(state.records.loc[begin:]), state.lasting("swapped")
+        recent, lasting = in_place(state.records.loc[begin:], state.faults), state.lasting("swapped")
         changes, found = {}, []
         for places, since in self.expected.exchanged(*self._evaluated(recent)[1:], recent.index):
             pair = [self.modes[place] for place in places]
@@ -385,8 +377,8 @@ class SensorWatch:
 
     def _with_runs(self, state: WatchState, today: pd.Timestamp) -> WatchState:
         """Columns that are dead, stuck or implausible from now on, or no longer."""
-        records, out = state.in_place(state.records.dropna(how="all")), state.left_out()  # empty records tell nothing
-        far, changes, found = self._evaluated(records)[0], {}, []
+        records = in_place(state.records.dropna(how="all"), state.faults)  # empty records tell nothing
+        far, out, changes, found = self._evaluated(records)[0], state.left_out(), {}, []
         for name, series in records.items():
             kind, first, value = run_of(series.to_numpy(), far[name].to_numpy(), *self.runs[name])
             fault, size = out.get(name), f"{value:.6g} {self.units[name]}".rstrip()

@@ -121,17 +121,6 @@ def test_a_wrong_file_keeps_no_other_out_and_is_named_until_it_is_mended(bridge,
     assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
 
 
-def test_other_values_of_a_known_record_are_refused_alone(bridge, records):
-    write_day(records, bridge, FIRST, FIRST + 3)
-    run("update", settings(bridge), "--now", str(records.index[FIRST + 2]))
-    write_day(records + 0.5, bridge, FIRST + 2, FIRST + 4, "changed.csv")
-    now = write_day(records, bridge, FIRST + 3, FIRST + 5)
-    done = run("update", settings(bridge), "--now", now)
-    assert done.code == FAILED
-    assert "changed.csv" in done.err
-    assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
-
-
 @pytest.mark.usefixtures("one_detector")
 def test_a_quiet_night_is_one_line(bridge, records):
     for row in (FIRST, FIRST + 1):
@@ -282,18 +271,6 @@ def test_status_by_the_clock_says_what_the_page_says(bridge, records):
     assert (early.code, "state: not evaluated" in early.out) == (NOT_EVALUATED, True)
     edit(settings(bridge), "# max_age = ...", 'max_age = "3650D"')
     assert run("status", settings(bridge), "--now", "2029-01-01").code == HEALTHY
-
-
-@pytest.mark.parametrize("others", [0, 4])
-def test_with_records_of_a_time_to_come_nothing_is_healthy(bridge, records, others):
-    write_day(records, bridge, FIRST, FIRST + 10)
-    run("update", settings(bridge), "--now", str(records.index[FIRST + 9]))
-    new = records[FIRST + 10 : FIRST + 10 + others]
-    ahead = records[FIRST + 20 : FIRST + 21]
-    ahead = ahead.set_axis(ahead.index + pd.Timedelta("3653D"))
-    pd.concat([new, ahead]).to_csv(bridge / "new" / "b.csv", index_label="time")
-    done = run("update", settings(bridge), "--now", str(records.index[FIRST + 9 + others]))
-    assert (done.code, "state: not evaluated" in done.out, "state: healthy" in done.out) == (NOT_EVALUATED, True, False)
 
 
 def test_several_bridges_are_a_fleet(bridge, records, tmp_path):

@@ -208,18 +208,14 @@ def test_a_wrong_clock_of_the_computer_changes_no_evaluation(bridge, after, reco
     assert_goes_on(bridge, records, after)
 
 
-@pytest.mark.parametrize("change", ["renamed", "one more", "one less", "text", "twice", "empty", "no stamps"])
+@pytest.mark.parametrize("change", ["one less", "text", "empty"])
 def test_columns_that_have_changed(bridge, before, after, records, change):
     file = bridge / "new" / f"{records.index[DAMAGED]:%Y-%m-%d}.csv"
     good, table = file.read_text(), records[DAMAGED:LAST]
     texts = {
-        "renamed": table.rename(columns={"f2": "F2"}).to_csv(),
-        "one more": table.assign(f9=1.0).to_csv(),
         "one less": table.drop(columns="f3").to_csv(),
         "text": table.astype(str).assign(f3="fault").to_csv(),
-        "twice": table.join(table["f1"].rename("f1 ")).to_csv().replace("f1 ", "f1"),
         "empty": "\n",
-        "no stamps": table.reset_index(drop=True).to_csv(),
     }
     file.write_text(texts[change])
     done = night(bridge, records, "--json")

@@ -62,14 +62,6 @@ def _text(value, decimal, missing):
     return missing if np.isnan(value) else repr(float(value)).replace(".", decimal)
 
 
-def test_columns_that_measure_nothing_are_left_out_with_a_reason(tmp_path):
-    table = RECORDS.assign(RECORD=range(100, 180), battery=12.5, empty=np.nan)
-    table.to_csv(tmp_path / "a.csv")
-    found = look_at(tmp_path / "a.csv")
-    assert set(found.ignored) == {"RECORD", "battery", "empty"}
-    assert list(found.records) == list(RECORDS)
-
-
 @pytest.mark.usefixtures("one_detector")
 def test_columns_that_are_named_are_used_whatever_they_hold(tmp_path):
     stuck, file, settings = RECORDS.assign(f2=5.0), tmp_path / "records.csv", tmp_path / "bridge"
@@ -107,16 +99,6 @@ def test_python_reads_what_init_reads_and_says_what_it_leaves_out(tmp_path):
         T, F = read_records(file, other)
     assert T.index.equals(F.index)
     assert len(T) == len(RECORDS) - 10
-
-
-@pytest.mark.parametrize(
-    "names",
-    [["Temperatur außen", "1. Eigenfrequenz"], ["Luft", "f_1"], ["air temperature", "Mode 1"], ["T1", "f1 [Hz]"]],
-)
-def test_columns_are_recognised_by_usual_names(names, tmp_path):
-    RECORDS.set_axis(names, axis=1).to_csv(tmp_path / "a.csv", index_label="time")
-    T, F = read_records(tmp_path / "a.csv")
-    assert [*T, *F] == names
 
 
 @pytest.mark.parametrize("zone", ["Mars", "../UTC", "Europe"])

@@ -24,7 +24,7 @@ def weather_rows(seed, n_rows=400, spread=0.08):
     return np.exp(np.c_[T - 8, inside - 8, frost] @ slopes)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 999), st.sampled_from([{}, {"bottom": 0.2}, {"diagonal": 0.1, "top": 0.3}]))
 def test_rows_that_are_served_have_the_exact_frequencies(seed, damage):
     model = TRUSS.damaged(damage)

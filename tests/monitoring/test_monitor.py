@@ -217,29 +217,16 @@ def test_known_records_are_repeated_or_refused():
     assert pickle.dumps(monitor) == saved
 
 
-def shifted_zone(records):
-    return records.tz_localize("UTC")
-
-
-def with_text(records):
-    return records.astype({"f1": object}).assign(f1="5 Hz")
-
-
-def without_stamps(records):
-    return records.reset_index(drop=True)
-
-
-def renamed(records):
-    return records.rename(columns={"T2": "T9"})
-
-
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        (renamed, r"lack the columns \['T2'\] of the baseline, and have \['T9'\]"),
-        (without_stamps, "expected a DatetimeIndex"),
-        (with_text, "5 Hz"),
-        (shifted_zone, "time zone UTC, the baseline None"),
+        (
+            lambda records: records.rename(columns={"T2": "T9"}),
+            r"lack the columns \['T2'\] of the baseline, and have \['T9'\]",
+        ),
+        (lambda records: records.reset_index(drop=True), "expected a DatetimeIndex"),
+        (lambda records: records.astype({"f1": object}).assign(f1="5 Hz"), "5 Hz"),
+        (lambda records: records.tz_localize("UTC"), "time zone UTC, the baseline None"),
         (pd.DataFrame.to_numpy, "of type ndarray; expected a frame"),
     ],
 )

@@ -161,6 +161,9 @@ def test_a_reference_tells_which_thermometer_is_wrong_and_fills_it():
     seen = served.corrected_["T0"][-60:]
     assert (seen - truth.loc[seen.index]).abs().mean() < 1.5
     assert "station" not in served.corrected_
+    assert "station" in served.records_
+    gap = after_service(own, bridge(2).set_axis(list(station), axis=1).assign(T0=np.nan))
+    assert gap.corrected_["T0"].notna().all()
 
 
 def test_one_thermometer_can_still_be_dead_or_stuck():

@@ -37,20 +37,21 @@ def fitted(records, last=None, **options):
 
 
 @cache
-def of_a_year(last=None, **options):
+def of_a_year(last=None, rule=3):
     """Its monitor after a year, to be copied before it is changed."""
-    return fitted(bridge(**options)[:"2025"], last)
+    return fitted(bridge()[:"2025"], last, persistence=rule)
 
 
 @pytest.mark.parametrize(
     "modes", [MODES, ["f3"], *(pytest.param([mode], marks=pytest.mark.nightly) for mode in MODES[:2])], ids=str
 )
+@pytest.mark.parametrize("rule", [3, (4, 6)], ids=str)
 @pytest.mark.parametrize(
     "last",
     [pytest.param(None, id="window", marks=pytest.mark.nightly), pytest.param(MahalanobisDetector(), id="record")],
 )
-def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_records_below(modes, last):
-    monitor = copy.deepcopy(of_a_year(last))
+def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_records_below(modes, last, rule):
+    monitor, share = copy.deepcopy(of_a_year(last, rule)), 0.5 if rule == 3 else 3.5 / 6
     changes = monitor.smallest_changes_
     size = changes.common if len(modes) > 1 else changes.single[modes[0]]
     new = bridge()["2026":"2026-02"].copy()
@@ -59,7 +60,7 @@ def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_r
         fallen = new.copy()
         fallen[modes] *= 1 - factor * size
         above.append((-monitor.detector_.score_samples(fallen)[8:] > monitor.threshold_).mean())
-    assert above[0] < 0.5 < above[1]
+    assert above[0] < share < above[1]
     answers = monitor.update(fallen)
     assert (answers.loc[answers.index[0] + changes.within :, "state"] == "alarm").mean() > 0.9
     assert changes.within < pd.Timedelta("3D")

@@ -78,9 +78,6 @@ def test_silence_is_never_healthy_and_never_ends_an_alarm(monitor, records, dama
     assert early.records.is_ahead
     assert early.state == ("alarm" if damaged else "not evaluated")
     assert monitor.status(monitor.last_ + pd.Timedelta("2h"), max_age="1h").records.is_late
-    for wrong in ({"now": "yesterday"}, {"now": "2026-01-01T00:00+01:00"}, {"max_age": "-1D"}):
-        with pytest.raises(ValueError, match="expected"):
-            monitor.status(**wrong)
 
 
 def replayed(transitions):
@@ -125,6 +122,3 @@ def test_what_an_owner_does_is_a_transition(monitor, records):
     assert [one["what"] for one in found[:3]] == ["acknowledged", "refit", "rebaseline"]
     assert found[0]["detail"] == "a special transport"
     assert "closed" in {one["what"] for one in found[3:]}
-    for wrong in (-1, len(monitor.transitions()) + 1, True, "1"):
-        with pytest.raises(ValueError, match="after"):
-            monitor.transitions(wrong)

@@ -72,7 +72,6 @@ class FakeMonitor(Monitor):
     def __init__(
         self,
         *,
-        freq="1D",
         n_days=180,
         n_not_evaluated=0,
         reason="",
@@ -87,7 +86,7 @@ class FakeMonitor(Monitor):
         real = in_service()
         vars(self).update(vars(real))
         self.false_alarms_per_year, self.watch_per_year, self.sensors = false_alarms_per_year, watch_per_year, sensors
-        stamps = pd.date_range("2025-01-01", periods=n_days, freq=freq, tz=zone)
+        stamps = pd.date_range("2025-01-01", periods=n_days, tz=zone)
         index = 1 + np.abs(np.sin(np.arange(len(stamps))))
         index[len(index) - n_not_evaluated if n_not_evaluated is not None else 0 :] = np.nan
         known = ~np.isnan(index)
@@ -124,7 +123,7 @@ class FakeMonitor(Monitor):
         kinds = set(self.events_["kind"][self.events_["end"].isna()])
         states = {"damage": "alarm", "drift": "drift", "watch": "watch"}
         state = next((state for kind, state in states.items() if kind in kinds), "")
-        return SimpleNamespace(standing=lambda: ([state], None), set_aside=lambda number: ([("fault" in kinds)],))
+        return SimpleNamespace(standing=lambda: ([state], [0]), set_aside=lambda number: ([("fault" in kinds)],))
 
     def get_params(self, deep=True):
         return {name: getattr(self, name) for name in inspect.signature(Monitor).parameters}

@@ -139,3 +139,19 @@ class Page(HTMLParser):
         sources = [image["src"] for image in self.all("img")]
         assert all(source.startswith(kind) for source in sources)
         return [ElementTree.fromstring(base64.b64decode(source[len(kind) :])) for source in sources]
+
+
+def assert_sound(page, sections):
+    """It has these sections and links to them, loads nothing from elsewhere, and can be read without seeing it."""
+    ids, tags = page.values("id"), [tag for tag, _ in page.tags]
+    assert [tag["id"] for tag in page.all("section")] == sections
+    assert page.links() == [f"#{name}" for name in sections]
+    assert len(set(ids)) == len(ids)
+    assert set(page.values("aria-labelledby")) <= set(ids)
+    assert page.is_self_contained()
+    levels = [int(tag[1]) for tag in tags if re.fullmatch("h[1-6]", tag)]
+    assert (levels[0], levels.count(1)) == (1, 1)
+    assert max(np.diff(levels)) <= 1
+    assert all(len(image["alt"]) > 20 for image in page.all("img"))
+    assert all(tags[i + 1] == "caption" for i, tag in enumerate(tags) if tag == "table")
+    assert all(head["scope"] in ("col", "row") for head in page.all("th"))
