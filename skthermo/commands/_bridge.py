@@ -341,8 +341,8 @@ class Bridge:
         self.records |= {"revised": len(evaluated) - len(new), "ahead": ahead, "reasons": reasons}
         self.records |= {name.removeprefix("n_"): counts[name] for name in COUNTS}
         doubt = "records are stamped too far ahead" if n_ahead > 0 else ""
-        if not (doubt or states["healthy"] or states["watch"]):
-            doubt = "no new record could be evaluated"
+        if not doubt and is_unknown.all():
+            doubt = "no new record could be evaluated" if len(new) else "no new record has come"
         self.describe(monitor, doubt, bool((evaluated["state"] == "alarm").any()))
         is_usual = len(new) == len(evaluated) and not (n_ahead or any(counts[name] for name in COUNTS))
         return is_usual and self.state == Taken.read(self.taken_file).state
@@ -605,7 +605,7 @@ def check_layout(table: pd.DataFrame, file: Path, records: RecordSettings, layou
     """Raise an error if a file has not the columns of a file of the baseline, or all columns."""
     known = [records.columns, *layouts]
     if not any(set(table) == set(layout) for layout in known):
-        nearest = max(known, key=lambda layout: len(set(layout) & set(table)))
+        nearest = min(known, key=lambda layout: len(set(layout) ^ set(table)))
         lacking = [name for name in nearest if name not in table]
         raise ValueError(f"{file} lacks the columns {lacking}; expected {nearest}, in any order, as in the baseline")
 

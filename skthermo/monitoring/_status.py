@@ -280,7 +280,8 @@ def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
         parts = [times, f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {', '.join(filter(None, parts))}{note}"
-    yield f"events: {len(events)}, {events['end'].isna().sum()} of them open" if len(events) else "events: none"
+    before = f"; those before the last {most} are on the page and in events_" if len(events) > most else ""
+    yield f"events: {len(events)}, {events['end'].isna().sum()} of them open{before}" if len(events) else "events: none"
     for group, one in () if drift is None else drift[drift["significant"]].iterrows():
         beyond = ", beyond the limit" if one["beyond_limit"] else ""
         yield f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year{beyond}"
