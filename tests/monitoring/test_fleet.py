@@ -269,7 +269,7 @@ def test_monitors_that_were_fitted_one_by_one_are_a_fleet_like_any_other(fleet):
     elsewhere = Fleet.of_monitors(MappingProxyType(single))  # asked for each monitor again
     pd.testing.assert_frame_equal(elsewhere.discoveries().table, made.discoveries().table)
     broken = Fleet.of_monitors(single, {"a": ValueError("no sensor"), "b": OSError("no file"), "d": OSError("lost")})
-    assert broken.table["state"].to_dict() == {"a": "not evaluated", "b": "not evaluated", "c": "healthy", "d": ""}
+    assert broken.table["state"].to_dict() == {"a": "not evaluated", "b": "alarm", "c": "healthy", "d": ""}
     assert set(broken.errors["bridge"]) == {"a", "b", "d"}
     with pytest.raises(ValueError, match="monitors"):
         Fleet.of_monitors({})
