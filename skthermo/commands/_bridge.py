@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import re
+import shutil
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -197,7 +198,7 @@ class Bridge:
                     self.lines.append(f"{counted(monitor.keep_acknowledgements(file), 'acknowledgement')} kept")
                 except ValueError as error:
                     self.lines.append(f"no acknowledgement of the former monitor kept: {error}")
-                file.replace(file.with_name(f"{file.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{file.suffix}"))
+                shutil.copy2(file, file.with_name(f"{file.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{file.suffix}"))
             monitor.save(file)
             fitted = datetime.now(UTC).isoformat(timespec="seconds")
             Taken(self.taken_file, layouts, {}, fitted, settings.of_a_fit).write()

@@ -286,10 +286,13 @@ def imports_from(folder: Path) -> Iterator[None]:
                 del sys.modules[name]
 
 
-def _place_of(error: Exception, file: Path) -> str:
+def _place_of(error: BaseException, file: Path) -> str:
     """File and line of an error in a Python file, or in one beside it: the last line there that was run."""
-    steps, folder = traceback.extract_tb(error.__traceback__), file.resolve().parent
-    own = [(step.filename, step.lineno) for step in steps if Path(step.filename).resolve().parent == folder]
+    folder, own, cause = file.resolve().parent, [], error
+    while cause is not None:
+        steps = traceback.extract_tb(cause.__traceback__)
+        own += [(step.filename, step.lineno) for step in steps if Path(step.filename).resolve().parent == folder]
+        cause = cause.__cause__
     if isinstance(error, SyntaxError):
         own.append((error.filename, error.lineno))
     name, line = own[-1] if own else (str(file), None)

@@ -2,12 +2,14 @@
 
 import json
 import os
+import pickle
 import shutil
 import subprocess
 import sys
 from importlib.resources import files
 from itertools import pairwise
 
+import joblib
 import pandas as pd
 import pytest
 
@@ -211,6 +213,18 @@ def test_a_monitor_is_not_replaced_by_chance_and_the_old_one_is_kept(bridge, rec
     assert_same_history(load_monitor(bridge / "monitor.joblib"), seen)
     lines = [json.loads(line) for line in (bridge / "transitions.jsonl").read_text().splitlines()]
     assert len({one["fitted"] for one in lines}) in (1, 2)  # the second fit may be of the same second
+
+
+def test_a_fit_that_cannot_be_saved_leaves_the_monitor(bridge, monkeypatch):
+    before = (bridge / "monitor.joblib").read_bytes()
+
+    def write(monitor, stream):
+        raise pickle.PicklingError("Can't pickle a function")
+
+    monkeypatch.setattr(joblib, "dump", write)
+    failed = run("fit", bridge, "--replace")
+    assert (failed.code, "cannot be saved" in failed.err, "Traceback" in failed.err) == (FAILED, True, False)
+    assert (bridge / "monitor.joblib").read_bytes() == before
 
 
 def test_a_monitor_of_another_version_is_refused_by_name(bridge, records):
