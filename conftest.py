@@ -9,14 +9,16 @@ import os
 import sys
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-settings.register_profile("fixed", derandomize=True)
-settings.load_profile("fixed")  # ``--hypothesis-profile default`` draws others
+on_any_machine = {"deadline": None, "suppress_health_check": list(HealthCheck)}
+settings.register_profile("fixed", derandomize=True, **on_any_machine)
+settings.register_profile("others", **on_any_machine)  # ``--hypothesis-profile others`` draws other examples
+settings.load_profile("fixed")
 collect_ignore = [f"tests/bad_input/{name}.py" for name in ("examples", "in_service")]  # test_bad_input imports them
 FITTED = {}  # what chains of examples have learned, by all that tells them and their records from others
 gc.set_threshold(50_000)  # by default 700: a fifth of the time in which tests are collected

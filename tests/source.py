@@ -1,13 +1,15 @@
 """What source files hold: lines of code, constants, names, kinds of warnings, hidden state, private imports."""
 
 import ast
+import functools
 import io
 import re
 import tokenize
-from collections import Counter
+from collections import defaultdict
 
 GROUND = ("_core", "fem", "preprocessing", "residuals", "surrogate", "updating", "detection", "metrics", "datasets")
 """Rooms in which equal inputs give equal results, by their source."""
+BUILT = {"generated", "gallery", "_build"}
 
 BESIDE_CODE = {
     *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT),
@@ -25,11 +27,17 @@ HIDDEN = {  # names by which state is hidden, and what they look at
 OWN = {"self", "cls", "twin"}  # a twin is a copy that a method has just made
 
 
+@functools.cache
+def tree_of(path):
+    """Syntax tree of a file, which nothing changes."""
+    return ast.parse(path.read_text())
+
+
 def trees(package, rooms=None):
     """Syntax tree of each file, of some rooms only or of all, by its path within the package."""
     files = {path.relative_to(package): path for path in sorted(package.rglob("*.py"))}
     inside = {file for file in files if rooms is None or file.parts[0] in rooms}
-    return {file.as_posix(): ast.parse(files[file].read_text()) for file in files if file in inside}
+    return {file.as_posix(): tree_of(files[file]) for file in files if file in inside}
 
 
 def lines_of_code(text):
@@ -44,7 +52,7 @@ def lines_of_code(text):
 
 
 def constants(tree, in_tuples=True):
-    """Upper-case names that a module assigns, those of tuples included or not."""
+    """Upper-case names that a module assigns, with their lines, those of tuples included or not."""
     for node in tree.body:
         match node:
             case ast.Assign(targets=targets):
@@ -54,13 +62,28 @@ def constants(tree, in_tuples=True):
             case _:
                 continue
         parts = [part for target in targets for part in (ast.walk(target) if in_tuples else [target])]
-        yield from (
-            part.id for part in parts if isinstance(part, ast.Name) and re.fullmatch(r"_?[A-Z][A-Z0-9_]*", part.id)
-        )
+        names = [part for part in parts if isinstance(part, ast.Name)]
+        yield from ((name.lineno, name.id) for name in names if re.fullmatch(r"_?[A-Z][A-Z0-9_]*", name.id))
 
 
 def classes(tree):
-    return [node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    return [(node.lineno, node.name) for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+
+
+def text_files(root, *names):
+    """Sources and pages of a copy of the project, in files or below folders, without what was built."""
+    below = [path for name in names for path in ((root / name).rglob("*") if (root / name).is_dir() else [root / name])]
+    return [path for path in sorted(below) if path.suffix in {".py", ".rst", ".md"} and not BUILT & set(path.parts)]
+
+
+def lines_with(pattern, root, files):
+    """Lines in which a pattern is found, each behind its file and number."""
+    return [
+        f"{path.relative_to(root)}:{number}: {line.strip()}"
+        for path in files
+        for number, line in enumerate(path.read_text().splitlines(), start=1)
+        if re.search(pattern, line)
+    ]
 
 
 def imported(tree):
@@ -80,7 +103,7 @@ def packages_imported(package, within=()):
     found = {one: set() for one in beside}
     for one in beside:
         for file in (folder / one).rglob("*.py"):
-            modules = (module.split(".") for module in imported(ast.parse(file.read_text())))
+            modules = (module.split(".") for module in imported(tree_of(file)))
             inside = [parts[1:] for parts in modules if parts[: 1 + len(within)] == [package.name, *within]]
             found[one] |= {parts[len(within)] for parts in inside if len(parts) > len(within)} & beside - {one}
     return found
@@ -107,7 +130,7 @@ def floors(imports):
 
 
 def private_imports(tree):
-    """Private modules of the package, and private names of its modules, that a file imports."""
+    """Private modules of the package, and private names of its modules, that a file imports, with their lines."""
     for node in ast.walk(tree):
         match node:
             case ast.Import(names=names):
@@ -117,7 +140,7 @@ def private_imports(tree):
             case _:
                 continue
         ours = [module for module in modules if module.split(".")[0] == "skthermo"]
-        yield from (module for module in ours if re.search(r"\._[^_]", module))
+        yield from ((node.lineno, module) for module in ours if re.search(r"\._[^_]", module))
 
 
 def constructors_called_of(tree):
@@ -126,19 +149,23 @@ def constructors_called_of(tree):
 
 
 def names_in_two_files(trees):
-    """Classes and constants that more than one file defines."""
-    defined = Counter(name for tree in trees.values() for name in {*constants(tree), *classes(tree)})
-    return {name: times for name, times in defined.items() if times > 1}
+    """Classes and constants that more than one file defines, with their places."""
+    defined = defaultdict(dict)
+    for file, tree in trees.items():
+        for line, name in [*constants(tree), *classes(tree)]:
+            defined[name][file] = f"{file}:{line}"
+    return {name: [*places.values()] for name, places in defined.items() if len(places) > 1}
 
 
 def kinds_of_warnings(tree):
-    """Kinds of warnings, each with the category that the source gives it; None in the table of findings' texts."""
+    """Kinds of warnings, each with its line and the category that the source gives it, which is None in the table of
+    findings' texts."""
     for node in ast.walk(tree):
         match node:
             case ast.Call(func=ast.Name(id=name), args=[_, ast.Constant(value=kind)]) if name.endswith("Warning"):
-                yield kind, name
+                yield node.lineno, kind, name
             case ast.Assign(targets=[ast.Name(id="WARNINGS")], value=ast.Dict(keys=keys)):
-                yield from ((key.value, None) for key in keys)
+                yield from ((key.lineno, key.value, None) for key in keys)
 
 
 def hidden_state(tree):

@@ -14,7 +14,7 @@ import pytest
 
 import skthermo
 from skthermo.plotting import DamageIndexDisplay
-from tests.source import built_on, floors, imported, packages_imported
+from tests.source import built_on, floors, imported, packages_imported, tree_of
 from tools.house import DRAWN, drawing
 
 PACKAGE = Path(skthermo.__file__).parent
@@ -27,7 +27,7 @@ PROGRAM = PACKAGE / "__main__.py"  # what users start
 
 @functools.cache
 def imported_modules(path):
-    return list(imported(ast.parse(path.read_text())))
+    return list(imported(tree_of(path)))
 
 
 def own_imports(path):
@@ -116,7 +116,7 @@ def test_only_core_dependencies_are_imported_and_private_scikit_learn_in_one_pla
     allowed = core | {"threadpoolctl", "skthermo"} | set(sys.stdlib_module_names)  # scikit-learn needs threadpoolctl
     wrong = []
     for path in FILES:
-        tree = ast.parse(path.read_text())
+        tree = tree_of(path)
         for_types = {
             node
             for branch in ast.walk(tree)

@@ -33,6 +33,10 @@ def public():
     return {getattr(module, name) for module in modules for name in module.__all__ if callable(getattr(module, name))}
 
 
+def place(thing):
+    return f"skthermo/{Path(inspect.getsourcefile(thing)).relative_to(PACKAGE)}:{inspect.getsourcelines(thing)[1]}"
+
+
 def assert_none(wrong, instead):
     assert not wrong, f"{instead}\n" + "\n".join(sorted(wrong))
 
@@ -42,14 +46,17 @@ def test_no_private_class_has_one_child():
     children = Counter(base for thing in ours for base in thing.__bases__ if base in ours - public())
     single = {base for base, number in children.items() if number == 1}
     chains = [
-        f"{thing.__qualname__}({base.__qualname__})" for thing in ours for base in thing.__bases__ if base in single
+        f"{place(thing)}: {thing.__qualname__}({base.__qualname__})"
+        for thing in ours
+        for base in thing.__bases__
+        if base in single
     ]
     assert_none(chains, "expected one class, or an object that it holds:")
 
 
 def test_a_folder_can_be_overlooked():
     beside = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in FILES if path.name != "__init__.py")
-    full = [f"{folder} has {number} files" for folder, number in beside.items() if number > MOST_SIDE_BY_SIDE]
+    full = [f"skthermo/{folder} has {number} files" for folder, number in beside.items() if number > MOST_SIDE_BY_SIDE]
     assert_none(full, f"expected {MOST_SIDE_BY_SIDE} beside __init__.py, or a package within:")
 
 
@@ -63,4 +70,6 @@ def test_short_files_have_a_reason():
 def test_the_guide_for_contributors_lists_what_all_packages_share():
     section = HOUSE.read_text().partition("What every package may use: ``_core``\n")[2].partition("\nDependencies\n")[0]
     listed = set(re.findall(r"``(\w+)\.py``", section)) - {"exceptions"}
-    assert listed == {path.stem for path in (PACKAGE / "_core").glob("[a-z]*.py")}
+    there = {path.stem for path in (PACKAGE / "_core").glob("[a-z]*.py")}
+    assert_none(there - listed, f"{HOUSE}: say what is in")
+    assert_none(listed - there, f"{HOUSE}: remove")

@@ -6,6 +6,7 @@ import inspect
 import pkgutil
 import re
 import typing
+from pathlib import Path
 
 import pandas as pd
 from numpydoc.docscrape import ClassDoc, FunctionDoc
@@ -14,6 +15,7 @@ from numpydoc.validate import Validator, validate
 import skthermo
 import skthermo.fem
 
+ROOT = Path(__file__).parents[1]
 ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
 
 # Parts of numpydoc's standard that are not asked for.
@@ -72,12 +74,21 @@ def own_parameters(function):
     return [p for p in inspect.signature(function).parameters.values() if p.name not in ("self", "cls")]
 
 
-def assert_none(wrong):
-    assert not wrong, "\n" + "\n".join(map(str, wrong))
+def place(name):
+    """File and line of a public name, or of a method of one."""
+    thing = inspect.unwrap(Validator._load_obj(name))
+    thing = getattr(thing, "fget", None) or getattr(thing, "func", thing)  # of a property
+    return f"{Path(inspect.getsourcefile(thing)).relative_to(ROOT)}:{inspect.getsourcelines(thing)[1]}"
+
+
+def assert_none(wrong, remedy):
+    """Each of what is wrong begins with a public name."""
+    places = [f"{place(re.match('[A-Za-z0-9_.]+', one)[0])}: {one}" for one in wrong]
+    assert not wrong, "\n".join([f"{remedy}:", *places])
 
 
 def test_everything_public_has_a_docstring():
-    assert_none([name for name, _, documented in CALLABLES if not inspect.getdoc(documented)])
+    assert_none([name for name, _, documented in CALLABLES if not inspect.getdoc(documented)], "write a docstring")
 
 
 def test_documented_parameters_are_the_signatures():
@@ -88,7 +99,7 @@ def test_documented_parameters_are_the_signatures():
         names = [part.strip() for p in FunctionDoc(documented)["Parameters"] for part in p.name.split(",")]
         if names != expected:
             wrong.append(f"{name}: documented {names}, expected {expected}")
-    assert_none(wrong)
+    assert_none(wrong, "document the parameters of the signature, in its order")
 
 
 def test_documented_defaults_are_the_signatures():
@@ -101,7 +112,7 @@ def test_documented_defaults_are_the_signatures():
                 shown = "numpy.nan" if repr(default) == "nan" else repr(default).replace("'", '"')
                 if stated != shown.replace("e-0", "e-"):
                     wrong.append(f"{name}: {parameter} has default={stated}, expected {shown}")
-    assert_none(wrong)
+    assert_none(wrong, "state the default of the signature")
 
 
 def test_every_public_callable_is_typed():
@@ -116,8 +127,8 @@ def test_every_public_callable_is_typed():
         expected = {p.name for p in own_parameters(function)} | (
             {"return"} if function.__name__ != "__init__" else set()
         )
-        wrong += [f"{name}: {missing}" for missing in expected - set(hints)]
-    assert_none(wrong)
+        wrong += [f"{name}: {missing}" for missing in sorted(expected - set(hints))]
+    assert_none(wrong, "annotate")
 
 
 def test_signatures_are_readable():
@@ -126,7 +137,7 @@ def test_signatures_are_readable():
         printed = str(inspect.signature(function))
         if len(printed) > LONGEST_SIGNATURE or "_SupportsArray" in printed:
             wrong.append(f"{name} prints {len(printed)} characters")
-    assert_none(wrong)
+    assert_none(wrong, "shorten the signature, or name its types")
 
 
 def faults(name):
@@ -139,12 +150,15 @@ def faults(name):
 def test_docstrings_follow_numpydoc():
     methods = {name for name, _, _ in DOCUMENTED if name.count(".") > 2}
     objects = {name for name, _ in OBJECTS} - PROTOCOLS
-    assert_none([fault for name in sorted(objects | methods) for fault in faults(name)])
+    assert_none([fault for name in sorted(objects | methods) for fault in faults(name)], "write it as numpydoc asks")
 
 
 def test_protocols_list_their_attributes_and_all_else_shows_an_example_that_runs():
     expected = {name: "Attributes" if name in PROTOCOLS else ">>>" for name, _ in OBJECTS}
-    assert_none([name for name, thing in OBJECTS if expected[name] not in inspect.getdoc(thing)])
+    assert_none(
+        [name for name, thing in OBJECTS if expected[name] not in inspect.getdoc(thing)],
+        "show attributes, or an example",
+    )
 
 
 def test_every_public_property_has_a_summary():
@@ -154,7 +168,7 @@ def test_every_public_property_has_a_summary():
             if isinstance(member, property | functools.cached_property):
                 summary = (inspect.getdoc(member) or "").partition("\n")[0]
                 wrong += [] if summary.endswith(".") else [f"{name}.{attribute}"]
-    assert_none(wrong)
+    assert_none(wrong, "write a summary that ends with a full stop")
 
 
 ASSIGNED = re.compile(r"self\.([a-z]\w*_)\b(?=[^=\n]*=[^=])")  # self.a_, self.b_ = ...
@@ -167,5 +181,5 @@ def test_every_fitted_attribute_is_documented():
         sources = [re.sub(r" +(>>>|\.\.\.) .*", "", inspect.getsource(base)) for base in ours]  # without examples
         fitted = {attribute for source in sources for attribute in ASSIGNED.findall(source)}
         documented = {part.strip() for entry in ClassDoc(thing)["Attributes"] for part in entry.name.split(",")}
-        wrong += [f"{name}.{attribute}" for attribute in fitted - documented]
-    assert_none(wrong)
+        wrong += [f"{name}: {attribute}" for attribute in sorted(fitted - documented)]
+    assert_none(wrong, "list it in Attributes")

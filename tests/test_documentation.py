@@ -14,10 +14,10 @@ import pytest
 
 import skthermo
 from skthermo.datasets import make_truss_campaign
+from tests.source import BUILT, lines_with, text_files
 from tools.mutations import MUTATIONS, is_written_once
 
 ROOT = Path(__file__).parents[1]
-BUILT = {"generated", "gallery", "_build"}
 PAGES = [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.rst") if not BUILT & set(p.parts))]
 API = ROOT / "docs" / "reference" / "api"
 PACKAGES = [m.name for m in pkgutil.iter_modules(skthermo.__path__) if not m.name.startswith("_")]
@@ -104,18 +104,21 @@ def test_a_pages_examples_print_what_it_shows(page):
 
 
 def test_pages_import_nothing_private():
-    private = {page.name: re.findall(r"(?:from|import) skthermo[\w.]*\._.*", page.read_text()) for page in PAGES}
-    assert not {page: imports for page, imports in private.items() if imports}
+    found = lines_with(r"(?:from|import) skthermo[\w.]*\._", ROOT, PAGES)
+    assert not found, "\n".join(["import what a package gives:", *found])
 
 
 def test_the_users_pages_have_at_most_30000_words():
     others = {"measured", "reference", "contributing", "_templates"}
     pages = [page for page in PAGES if page != README and not others & set(page.relative_to(ROOT / "docs").parts)]
-    assert sum(len(page.read_text().split()) for page in pages) <= 30_000
+    words = pd.Series({page.relative_to(ROOT): len(page.read_text().split()) for page in pages})
+    assert words.sum() <= 30_000, f"shorten by {words.sum() - 30_000} words; the longest pages:\n{words.nlargest(8)}"
 
 
 def test_the_guide_shows_code():
     assert sum(len(python_blocks(page)) for page in PAGES) >= 5
+    gone = LONG - {page.name for page in PAGES}
+    assert not gone, f"{__file__}: remove from LONG what is no page: {gone}"
 
 
 @pytest.mark.parametrize("room", ROOMS)
@@ -133,8 +136,10 @@ def test_the_reference_lists_every_public_name(room):
 def test_reference_and_guide_have_every_package():
     toctree = re.search(r"toctree::\n   :hidden:\n\n((?:   \w+\n)+)", (API / "index.rst").read_text())[1].split()
     inside = re.findall(r"</reference/api/(?!index)(\w+)>", (ROOT / "docs/guide/method.rst").read_text())
-    assert sorted(toctree) == sorted(ROOMS) == sorted(page.stem for page in API.glob("*.rst") if page.stem != "index")
-    assert sorted(inside) == sorted(ROOMS)
+    pages = [page.stem for page in API.glob("*.rst") if page.stem != "index"]
+    listed = {f"{API}/": pages, f"{API}/index.rst, toctree": toctree, "docs/guide/method.rst, packages": inside}
+    wrong = [f"{place}: {sorted(names)}" for place, names in listed.items() if sorted(names) != sorted(ROOMS)]
+    assert not wrong, "\n".join([f"list each package with public names once, {ROOMS}, in place of:", *wrong])
 
 
 def test_files_and_names_that_contributors_are_sent_to_are_there():
@@ -178,7 +183,9 @@ def test_sources_are_listed_and_cited():
     citing = [*(ROOT / "skthermo").rglob("*.py"), *PAGES]
     cited = {label for path in citing for label in re.findall(r"\[([A-Z]\w*\d\d)\]_", path.read_text())}
     listed = re.findall(r"^\.\. \[(\w+)\] ", (ROOT / "docs/reference/bibliography.rst").read_text(), flags=re.MULTILINE)
-    assert sorted(cited) == sorted(listed)
+    assert len(listed) == len({*listed}), "docs/reference/bibliography.rst: a source stands there twice"
+    assert not cited - {*listed}, f"docs/reference/bibliography.rst: add {cited - {*listed}}"
+    assert not {*listed} - cited, f"docs/reference/bibliography.rst: remove, or cite, { ({*listed} - cited) }"
 
 
 def test_images_and_links_of_readme_are_files_of_any_copy():
@@ -187,7 +194,8 @@ def test_images_and_links_of_readme_are_files_of_any_copy():
     assert images
     assert links
     below = {"#" + title.lower().replace(" ", "-") for title in re.findall(r"^## ([\w ]+)", text, flags=re.MULTILINE)}
-    assert not [target for target in images + links if target not in below and not (ROOT / target).is_file()]
+    gone = [target for target in images + links if target not in below and not (ROOT / target).is_file()]
+    assert not gone, f"README.md: name a file of the project, or one of {sorted(below)}, in place of {gone}"
 
 
 def test_no_file_names_an_address_of_the_project_that_does_not_exist():
@@ -198,7 +206,8 @@ def test_no_file_names_an_address_of_the_project_that_does_not_exist():
     files = [path for path in [*ROOT.iterdir(), *below] if path.is_file()]
     found = {str(path.relative_to(ROOT)): address.findall(path.read_bytes()) for path in files}
     assert {"README.md", "pyproject.toml", "CITATION.cff", "docs/conf.py"} < set(found)
-    assert not {name: addresses for name, addresses in found.items() if addresses}
+    wrong = {name: addresses for name, addresses in found.items() if addresses}
+    assert not wrong, f"name the project without an address in {wrong}"
 
 
 def test_the_citation_is_of_this_version():
@@ -216,14 +225,8 @@ LISTS_OF_THEM = {ROOT / "docs/contributing/words.rst", Path(__file__).resolve()}
 
 @pytest.mark.parametrize("folder", ["README.md", "docs", "examples", "skthermo", "tests", "tools"])
 def test_text_and_names_are_in_the_fields_words(folder):
-    below = (ROOT / folder).rglob("*") if (ROOT / folder).is_dir() else [ROOT / folder]
-    files = [path for path in below if path.suffix in {".py", ".rst", ".md"} and not BUILT & set(path.parts)]
+    files = text_files(ROOT, folder)
     assert files
-    found = [
-        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
-        for path in files
-        if path not in LISTS_OF_THEM
-        for number, line in enumerate([path.stem, *path.read_text().splitlines()])
-        if NOT_OURS.search(line)
-    ]
-    assert not found, "\n".join(found)
+    named = [f"{path.relative_to(ROOT)}: its name" for path in files if NOT_OURS.search(path.stem)]
+    found = [*named, *lines_with(NOT_OURS, ROOT, [path for path in files if path not in LISTS_OF_THEM])]
+    assert not found, "\n".join(["write the field's word, docs/contributing/words.rst, in:", *found])

@@ -11,22 +11,20 @@ from pathlib import Path
 
 import pytest
 
+from tests.source import lines_with
+
 ROOT = Path(__file__).parents[1]
 DOCS, MEASURED = ROOT / "docs", ROOT / "docs" / "measured"
 RESULTS = sorted((MEASURED / "results").glob("*.json"))
-# Settings of the measurements, not results, by page.
-CHOSEN = {
+INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
+PAGES = sorted(DOCS.glob("accuracy*.rst"))
+CHOSEN = {  # settings of the measurements, not results, by page
     "accuracy": "7.5",
-    "accuracy_regressors": "",
     "accuracy_costs": "30",
     "accuracy_detection": "0.3 0.95 2 20 40 50",
     "accuracy_studies": "2 5 10 20 30 90 95",
-    "accuracy_monitoring": "",
-    "accuracy_identification": "",
     "accuracy_kw51": "15",
-    "accuracy_paper": "",
 }
-INCLUDE = re.compile(r"^\.\. include:: measured/([\w-]+)\.rst$", re.MULTILINE)
 NUMBER = r"-?\d*\.?\d+(?:e-?\d+)?"
 LIST = rf"{NUMBER}(?:(?:,| and| to| or|,? and|;) {NUMBER})*"
 UNITS = r"%|percent|points|seconds|minutes|times|[smµ]?s\b|[MG]B"
@@ -81,24 +79,33 @@ def release():
 @pytest.mark.parametrize("file", RESULTS, ids=lambda path: path.stem)
 def test_a_table_is_what_its_command_printed(file, release):
     found = json.loads(file.read_text())
-    assert found["command"] == release.PARTS[file.stem].command
-    assert found["exit code"] in (0, 1)
-    assert found["tables"]
-    assert (MEASURED / f"{file.stem}.rst").read_text() == release.page(found)
+    again = f"python tests/benchmarks/release.py --again --only {file.stem}"
+    part = release.PARTS.get(file.stem)
+    assert part, f"docs/measured: remove {file.name} and {file.stem}.rst, which no part of release.py gives"
+    assert found["command"] == part.command, f"{file.name} is of another command; {again}"
+    assert found["exit code"] in (0, 1), f"{file.name} is of a run that failed; {again}"
+    assert found["tables"], f"{file.name} has no tables; {again}"
+    assert (MEASURED / f"{file.stem}.rst").read_text() == release.page(found), f"{file.stem}.rst was changed; {again}"
 
 
 def test_no_table_was_written_by_hand():
-    assert {path.stem for path in MEASURED.glob("*.rst")} == {path.stem for path in RESULTS} | {"summary"}
-    for page in CHOSEN:
-        text = (DOCS / f"{page}.rst").read_text()
-        assert not re.findall(r"^ *(?:\.\. (?:list-|csv-)?table::|=+ +=)", text, re.MULTILINE)
+    others = {path.stem for path in MEASURED.glob("*.rst")} ^ ({path.stem for path in RESULTS} | {"summary"})
+    assert not others, f"docs/measured: a page and a result of each part, and none alone: {sorted(others)}"
+    found = lines_with(r"^ *(?:\.\. (?:list-|csv-)?table::|=+ +=)", ROOT, PAGES)
+    assert not found, "\n".join(["include a table of docs/measured in place of:", *found])
 
 
-@pytest.mark.parametrize("page", CHOSEN)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_numbers_of_the_prose_are_in_the_tables(page):
-    text = (DOCS / f"{page}.rst").read_text()
-    assert INCLUDE.search(text)
-    assert not unknown(text, INCLUDE.findall(text), CHOSEN[page])
+    text = page.read_text()
+    assert INCLUDE.search(text), f"docs/{page.name}: include a table of docs/measured"
+    found = unknown(text, INCLUDE.findall(text), CHOSEN.get(page.stem, ""))
+    assert not found, f"docs/{page.name}: write what its tables say, or name a setting in CHOSEN: {found}"
+
+
+def test_settings_are_of_pages_that_are_there():
+    gone = set(CHOSEN) - {page.stem for page in PAGES}
+    assert not gone, f"{__file__}: remove from CHOSEN {gone}"
 
 
 def rows_of_the_summary():
@@ -109,8 +116,9 @@ def rows_of_the_summary():
 def test_a_row_of_the_summary_is_what_its_parts_printed(row):
     *said, parts = row.split("     - ")
     names = re.findall(r"``([\w-]+)``", parts)
-    assert names
-    assert not unknown("\n".join(said), names)
+    assert names, f"docs/measured/summary.rst: name the parts of {row}"
+    found = unknown("\n".join(said), names)
+    assert not found, f"docs/measured/summary.rst: write what {names} say: {found}"
 
 
 def test_readme_and_home_say_what_the_summary_says():
@@ -118,6 +126,8 @@ def test_readme_and_home_say_what_the_summary_says():
     cards = home.partition(":class-container: measured")[2].partition(":class-container:")[0]
     assert stated(cards)
     assert stated(readme)
-    assert not unknown(cards, ["summary"])
+    found = unknown(cards, ["summary"])
+    assert not found, f"docs/index.rst: write what docs/measured/summary.rst says: {found}"
     prose = re.sub(r"```.*?```|<img[^>]*>", "", readme, flags=re.DOTALL)
-    assert not unknown(prose, ["summary", "readme-study"], "3.11")
+    found = unknown(prose, ["summary", "readme-study"], "3.11")
+    assert not found, f"README.md: write what docs/measured/summary.rst says: {found}"

@@ -17,13 +17,17 @@ def entries(page):
 
 
 def test_every_warning_has_an_entry_and_every_entry_a_warning():
-    given = {*kinds_of_warnings(ast.parse(SOURCE))}
-    assert Counter(entries("warnings")) == Counter({kind for kind, _ in given})
+    given = {(kind, category) for _, kind, category in kinds_of_warnings(ast.parse(SOURCE))}
+    listed, kinds = entries("warnings"), {kind for kind, _ in given}
+    remedy = "docs/guide/warnings.rst: one entry for each kind of warning, and none for others:"
+    assert Counter(listed) == Counter(kinds), f"{remedy} {sorted({*listed} ^ kinds) or 'one stands there twice'}"
     of_category = Counter(kind for kind, category in given if category)
-    assert {kind for kind, times in of_category.items() if times > 1} == set()
+    twice = {kind for kind, times in of_category.items() if times > 1}
+    assert not twice, f"one category for each kind of warning: {twice}"
 
 
 def test_every_entry_is_part_of_a_sentence_of_the_source():
     said = re.sub(r'"\s*\n\s*[rf]*"', "", SOURCE) + " ".join(TEMPLATES.split())
     assert len(entries("errors")) > 20
-    assert [one for one in entries("errors") if not all(part.strip() in said for part in one.split("…"))] == []
+    unsaid = [one for one in entries("errors") if not all(part.strip() in said for part in one.split("…"))]
+    assert not unsaid, "\n".join(["docs/guide/errors.rst: quote what the source says now, in place of:", *unsaid])

@@ -155,7 +155,7 @@ def plainness(rooms=None):
         ),
         "constructors called of": sum(len(constructors_called_of(tree)) for tree in found.values()),
         "names of classes and constants in two files": len(names_in_two_files(found)),
-        "kinds of warnings": len({kind for tree in found.values() for kind, _ in kinds_of_warnings(tree)}),
+        "kinds of warnings": len({kind for tree in found.values() for _, kind, _ in kinds_of_warnings(tree)}),
         "uses of hidden state": sum(len(hidden_state(tree)) for tree in found.values()),
     }
 

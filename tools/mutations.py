@@ -38,7 +38,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("repeated modes", "REPEATED = 1e-6", "REPEATED = 0.0"),
     ],
     ("fem/modal/_core.py", "fem/test_tracking.py"): [
-        ("doubt about a tracked mode", "assigned < least", "assigned < least / 4"),
+        ("doubt about a tracked mode", "assigned < left", "assigned < left / 4"),
         ("two modes paired with one", "np.flatnonzero(~distinct)", "np.flatnonzero(~distinct)[:0]"),
         ("order within repeated modes", "np.sort(best[:, cluster], axis=1)", "best[:, cluster]"),
     ],
@@ -46,15 +46,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("damage taken for exchanged modes", "(there < here / 4).all(axis=1)", "(there < 4 * here).all(axis=1)"),
         ("which of two thermometers is wrong", "if len(resolved) == 1:", "if resolved:"),
     ],
-    ("fem/modal/_condensation.py", "fem/test_condensation.py"): [
-        ("certificate against missed modes", "return positive & (np.triu", "return (np.triu"),
-    ],
     ("fem/_factors.py", "fem/test_factors.py"): [
         ("pivots of an indefinite matrix", "(factors.U.diagonal() > 0).all()", "True"),
-        ("order of elimination", "solution[order] =", "solution[:] ="),
-    ],
-    ("fem/modal/_sparse.py", "fem/test_factors.py"): [
-        ("convergence of modes from guesses", "(errors[wanted] < tol).all()", "True"),
     ],
     ("fem/modal/_sparse.py", "fem/test_sparse.py"): [
         ("guard vectors of an iteration", "GUARD_VECTORS = 2", "GUARD_VECTORS = 0"),
@@ -187,7 +180,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("poles of tracked modes contested", "counts[inverse] > 1", "counts[inverse] > 2"),
     ],
     ("datasets/_kw51_campaign.py", "datasets/test_kw51_campaign.py"): [
-        ("mass of a retrofit", "mass=mass * retrofit_mass()", "mass=retrofit_mass() / 2"),
+        ("mass of a retrofit", '{"retrofit": retrofit_mass()}', '{"retrofit": retrofit_mass() / 2}'),
     ],
     ("preprocessing/checks/_columns.py", "preprocessing/test_checks.py"): [
         ("stuck sensors beside rounding", "lengths if ((lengths > 1)", "lengths[:0] if ((lengths > 1)"),

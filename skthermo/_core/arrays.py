@@ -569,6 +569,14 @@ def as_mapping(values: Any) -> Any:
     return dict(values.items()) if is_labelled(values) and values.index.is_unique else values
 
 
+def mapping_of(values: Any, what: str, expected: str) -> Mapping[Any, Any]:
+    """A mapping, or a Series with different labels as one; an error for anything else."""
+    mapping = as_mapping(values)
+    if not isinstance(mapping, Mapping):
+        raise ValueError(f"{what} is {values!r:.200}; expected {expected}")
+    return mapping
+
+
 def tolerance(model: Any, reduce: Reduce, n_solves: int = 0) -> float | None:
     """Relative error allowed in the frequencies of a reduced model, read from ``reduce``; None without reduction.
 

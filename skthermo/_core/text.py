@@ -31,13 +31,6 @@ def share_text(share: float) -> str:
     return f"{significant(value)}{SPACE}%" if np.isfinite(share) else "not known"
 
 
-def bounds_text(lowest: float, highest: float) -> str:
-    """Bounds of a share in percent, on one line; a tiny lower one is none."""
-    if 0 < lowest < 0.0005:
-        return f"up{SPACE}to{SPACE}{share_text(highest)}"
-    return f"{share_text(lowest)}{SPACE}to{SPACE}{share_text(highest)}"
-
-
 def significant(value: float, digits: int = 2) -> str:
     """A number with so many significant digits; those before the point are all kept."""
     if value == 0 or not np.isfinite(value):

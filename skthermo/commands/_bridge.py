@@ -442,6 +442,9 @@ class Bridge:
             if refused:
                 self.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
             self.append_transitions(monitor)
+            taken = Taken.read(self.taken_file)
+            taken.state = self.state
+            taken.write()
 
 
 def _is_news(line: str, changed: Collection[str]) -> bool:

@@ -16,7 +16,7 @@ from skthermo.datasets._kw51_file import state_of
 from skthermo.datasets._kw51_model import N_BAYS, N_PANELS, kw51_sensors, kw51_structure, updated_model
 from skthermo.datasets._results import KW51Campaign
 from skthermo.datasets._truss import Stamp, stiffness_factors
-from skthermo.fem import AffineModel, Element, PointMass, ReducedModel, Spring, Structure
+from skthermo.fem import AffineModel, Element, ReducedModel, Spring, Structure
 
 KW51_TRUTH = {
     "E_gir": "deck_beams",
@@ -141,10 +141,9 @@ def thermal_multipliers(weather: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def truth_structure(added: Mapping[Hashable, Element] | None = None) -> Structure:
-    """KW51 with bearings that resist sliding and rocking, and with members that are added as the group "added"."""
-    bridge, added = kw51_structure(), added or {}
-    ends, lines = (0, N_BAYS), (0, N_PANELS)
+def truth_structure() -> Structure:
+    """KW51 with bearings that resist sliding and rocking."""
+    bridge, ends, lines = kw51_structure(), (0, N_BAYS), (0, N_PANELS)
     bearings: dict[Hashable, Element] = {
         ("bearing", end, "x"): Spring(("deck", end, N_PANELS), "x", 1e7) for end in ends
     }
@@ -152,12 +151,7 @@ def truth_structure(added: Mapping[Hashable, Element] | None = None) -> Structur
     groups = bridge.groups
     groups["deck_beams"] = groups["girders"] | groups["transverse_beams"] | groups["stiffeners"]
     groups["bearings"] = frozenset(bearings)
-    return Structure(
-        nodes=bridge.nodes,
-        members={**bridge.members, **bearings, **added},
-        supports=bridge.supports,
-        groups=groups | ({"added": frozenset(added)} if added else {}),
-    )
+    return Structure(bridge.nodes, bridge.members | bearings, bridge.supports, groups)
 
 
 def truth_model() -> AffineModel:
@@ -165,14 +159,8 @@ def truth_model() -> AffineModel:
     return updated_model(truth_structure(), KW51_TRUTH, 6)
 
 
-def joint_masses() -> dict[Hashable, PointMass]:
-    """A point mass at every joint."""
-    joints = [node for node in kw51_structure().nodes if node[0] == "joint"]
-    return {("mass", node): PointMass(node, ADDED_MASSES[node[-1]]) for node in joints}
-
-
 def retrofit_mass() -> Array:
-    """The same, in kg at each degree of freedom."""
+    """Mass at the joints, in kg at each degree of freedom."""
     return np.array(
         [ADDED_MASSES[node[-1]] if node[0] == "joint" and d in "xyz" else 0.0 for node, d in kw51_structure().dofs]
     )
@@ -194,68 +182,37 @@ def simulate(
     """Frequencies (n, 6) in Hz and, at ``dofs``, mode shapes (n, 6, n_dofs).
 
     ``mass`` is the share of the retrofit's mass, and ``factors`` multiply the stiffness of the groups that are its
-    columns. A state that lasts has a model of its own, which is smaller than one of all states.
+    columns. The bridge as it was has a model of its own, which is smaller than one of all changes.
     """
     factors = factors.loc[:, (factors != 1).any()]
-    changes = np.column_stack([mass, factors])
-    states, state, counts = np.unique(changes, axis=0, return_inverse=True, return_counts=True)
-    state = state.ravel()
-    lasting = (counts >= 500) | (states == [0.0, *np.ones(factors.shape[1])]).all(axis=1)
+    is_changed = ((mass > 0) | (factors != 1).any(axis=1)).to_numpy()
     frequencies = np.empty((len(theta), 6))
     shapes = None if dofs is None else np.empty((len(theta), 6, len(dofs)))
-    for number in [*np.flatnonzero(lasting), -1]:
-        rows = ~lasting[state] if number < 0 else state == number
-        if not rows.any():
-            continue
-        values = theta[rows].to_numpy()
-        if number < 0:
-            model, values = _varying(values, changes[rows], tuple(factors.columns))
-        else:
-            share, *fixed = states[number]
-            changed = zip(factors.columns, fixed, strict=True)
-            model = fixed_truth(truth, share, {group: factor for group, factor in changed if factor != 1})
-        if shapes is None or dofs is None:
-            frequencies[rows] = model.frequencies(values)
-        else:
-            frequencies[rows], shapes[rows] = _modes_at(model, values, dofs)
+    for rows, changes in ((~is_changed, (0 * mass, factors.iloc[:, :0])), (is_changed, (mass, factors))):
+        if rows.any():
+            model, values = with_changes(truth, theta[rows], *(one[rows] for one in changes))
+            if shapes is None or dofs is None:
+                frequencies[rows] = model.frequencies(values)
+            else:
+                frequencies[rows], shapes[rows] = _modes_at(model, values, dofs)
     return frequencies, shapes
 
 
-def reduced_truth(model: AffineModel, further: Mapping[str, tuple[float, float]] | None = None) -> ReducedModel:
-    """A reduced model for parameters as the weather changes them, and for bounds of further ones; errors are below
-    1e-5."""
-    return model.reduced(WEATHER_BOX | (further or {}), tol=1e-4, random_state=0)
-
-
-def fixed_truth(truth: AffineModel, mass: float, factors: Mapping[str, float]) -> ReducedModel:
-    """The bridge with a share of the retrofit's mass and with groups whose stiffness is multiplied."""
-    model = truth.damaged({group: 1 - factor for group, factor in factors.items()})
-    return reduced_truth(model.with_added(mass=mass * retrofit_mass()) if mass > 0 else model)
-
-
-def varying_truth(has_mass: bool, bounds: Mapping[str, tuple[float, float]], least: float) -> ReducedModel:
-    """The bridge with these as further parameters, within bounds."""
-    structure = truth_structure(joint_masses() if has_mass else None)
-    parameters = KW51_TRUTH | ({"added": ("mass", "added")} if has_mass else {})
-    model = updated_model(structure, parameters, 6).with_damage_parameters(list(bounds))
-    further = {"added": (least, 1.0)} if has_mass else {}
-    return reduced_truth(model, further | {f"1 - {group}": ends for group, ends in bounds.items()})
-
-
-def _varying(theta: Array, changes: Array, groups: tuple[str, ...]) -> tuple[ReducedModel, Array]:
-    """The model whose parameters are the changes, too, and its theta."""
-    least = 1e-9  # multipliers are positive
-    mass, factors = np.maximum(changes[:, :1], least), changes[:, 1:]
-    has_mass = bool((mass > least).any())
-    lowest, highest = _floor(factors.min(axis=0)), -_floor(-factors.max(axis=0))
-    bounds = dict(zip(groups, zip(lowest.tolist(), highest.tolist(), strict=True), strict=True))
-    model = varying_truth(has_mass, bounds, least)
-    return model, np.hstack([theta, mass, factors] if has_mass else [theta, factors])
-
-
-def _floor(values: Array) -> Array:
-    """Rounded down to three digits."""
-    return np.floor(1000 * values - 1e-6) / 1000
+def with_changes(
+    truth: AffineModel, theta: pd.DataFrame, mass: pd.Series, factors: pd.DataFrame
+) -> tuple[ReducedModel, Array]:
+    """A reduced model whose parameters are those of the weather and the changes, with errors below 1e-5, and its
+    theta."""
+    model, values, box = truth, np.column_stack([theta, 1 + mass, factors]), dict(WEATHER_BOX)
+    if mass.any():
+        model, box = model.with_mass_parameters({"retrofit": retrofit_mass()}), box | {"1 + retrofit": (1.0, 2.0)}
+    else:
+        values = np.delete(values, theta.shape[1], axis=1)
+    if factors.shape[1]:
+        model = model.with_damage_parameters(list(factors))
+        ends = zip(factors.min() - 0.001, factors.max() + 0.001, strict=True)
+        box |= dict(zip([f"1 - {group}" for group in factors], ends, strict=True))
+    return model.reduced(box, tol=1e-4, random_state=0), values
 
 
 def _modes_at(model: ReducedModel, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array]:

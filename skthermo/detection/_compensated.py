@@ -57,7 +57,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         Names of the response columns in a frame, or their positions counted from 0.
     window : int or duration, optional
         Residuals are trailing means over that many records or that time, such as "1D". A single record cannot dominate
-        a mean: residuals count as no farther from the median than four robust standard deviations.
+        a mean: residuals count as no farther from the median than four robust standard deviations, and what more than
+        half of the window lies beyond that is added.
     regimes : "auto", None or tuple, default="auto"
         Whether records are divided in two where, at one value of one input, the scatter of residuals changes, as when
         bearings freeze. Each regime has a detector of its own, and means are taken within a regime.

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable
 from functools import partial
 from types import ModuleType
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse.linalg
@@ -16,81 +16,37 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
 
-SYMMETRIC_MODE = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-
 Solve: TypeAlias = Callable[[Array], Array]
 """Gives the solution x of K x = b by the factors of a positive definite K, for one vector b or several side by side."""
 
 
-class Elimination(Protocol):
-    """Factorises matrices of one sparsity pattern, whose order of elimination is computed once."""
-
-    def factorise(self, matrix: scipy.sparse.csc_array) -> Solve | None:
-        """Solves with a matrix of the pattern; None where it is not positive definite."""
+Factorise: TypeAlias = Callable[[scipy.sparse.csc_array], Solve | None]
+"""Gives solves with a matrix; None where it is not positive definite."""
 
 
-def elimination(rows: NDArray[np.int32], pointers: NDArray[np.int32]) -> Elimination:
-    """The elimination of a pattern, given as compressed sparse columns with sorted rows, by the chosen solver."""
-    eliminations: dict[str, Callable[..., Elimination]] = {"superlu": SuperLUElimination, "rslab": RslabElimination}
-    name = chosen_solver()
-    if name not in eliminations:
-        raise ValueError(f"SKTHERMO_SOLVER is {name!r}; expected one of {list(eliminations)}")
-    return eliminations[name](rows, pointers)
-
-
-def chosen_solver() -> str:
-    """The solver that the environment names."""
-    return os.environ.get("SKTHERMO_SOLVER", "superlu")
+def elimination(rows: NDArray[np.int32], pointers: NDArray[np.int32]) -> Factorise:
+    """What factorises matrices of a pattern, given as compressed sparse columns with sorted rows, by the solver that
+    the environment names."""
+    name = os.environ.get("SKTHERMO_SOLVER", "superlu")
+    if name not in ("superlu", "rslab"):
+        raise ValueError(f"SKTHERMO_SOLVER is {name!r}; expected one of {['superlu', 'rslab']}")
+    return superlu if name == "superlu" else RslabElimination(rows, pointers).factorise
 
 
 def factorise(matrix: scipy.sparse.csc_array) -> Solve | None:
     """Solves with a single matrix; None where it is not positive definite."""
-    if chosen_solver() == "superlu":
-        factors = superlu(matrix, "MMD_AT_PLUS_A")
-        return None if factors is None else factors.solve
     matrix = matrix.sorted_indices()
-    return elimination(matrix.indices, matrix.indptr).factorise(matrix)
+    return elimination(matrix.indices, matrix.indptr)(matrix)
 
 
-class SuperLUElimination:
-    """Minimum degree, and L U without pivoting."""
-
-    def __init__(self, rows: NDArray[np.int32], pointers: NDArray[np.int32]):
-        n_dof, n_entries = len(pointers) - 1, len(rows)
-        pattern = scipy.sparse.csc_array((np.ones(n_entries), rows, pointers), shape=(n_dof, n_dof))
-        dominant = pattern + scipy.sparse.diags_array(np.diff(pointers) + 1.0, format="csc")
-        # With all that may be dropped dropped, an incomplete factorisation costs little more than its order.
-        incomplete = scipy.sparse.linalg.spilu(
-            dominant, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", **SYMMETRIC_MODE
-        )
-        self._order = np.argsort(incomplete.perm_c)
-        places = scipy.sparse.csc_array((np.arange(1, n_entries + 1), rows, pointers), shape=(n_dof, n_dof))
-        ordered = places[self._order][:, self._order]
-        ordered.sort_indices()
-        self._places, self._rows, self._pointers = ordered.data - 1, ordered.indices, ordered.indptr
-
-    def factorise(self, matrix: scipy.sparse.csc_array) -> Solve | None:
-        """Solves with a matrix of the pattern; None where it is not positive definite."""
-        entries = matrix.data[self._places], self._rows, self._pointers
-        ordered = scipy.sparse.csc_array(entries, shape=matrix.shape)
-        factors = superlu(ordered, "NATURAL", panel_size=1, relax=1)
-        return None if factors is None else partial(solve_reordered, factors, self._order)
-
-
-def solve_reordered(factors: scipy.sparse.linalg.SuperLU, order: NDArray[np.intp], columns: Array) -> Array:
-    """Solve with the factors of a matrix whose rows and columns were put in another order."""
-    solution = np.empty_like(columns)
-    solution[order] = factors.solve(columns[order])
-    return solution
-
-
-def superlu(matrix: scipy.sparse.csc_array, order: str, **options: int) -> scipy.sparse.linalg.SuperLU | None:
-    """L U without pivoting, or None where a pivot is not positive: the matrix is not positive definite."""
+def superlu(matrix: scipy.sparse.csc_array) -> Solve | None:
+    """By minimum degree and L U without pivoting: a pivot that is not positive tells of an indefinite matrix."""
+    options = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     try:
-        factors = scipy.sparse.linalg.splu(matrix, permc_spec=order, **SYMMETRIC_MODE, **options)
+        factors = scipy.sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", **options)
     except RuntimeError:  # exactly singular
         return None
-    return factors if (factors.U.diagonal() > 0).all() else None
+    return factors.solve if (factors.U.diagonal() > 0).all() else None
 
 
 class RslabElimination:

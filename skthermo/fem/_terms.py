@@ -12,9 +12,9 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, Matrix, as_dense, as_mapping, is_real, real_array
+from skthermo._core.arrays import Array, Matrix, as_dense, is_real, mapping_of, real_array
 from skthermo.exceptions import ModelWarning, SkthermoWarning
-from skthermo.fem._factors import Elimination, elimination
+from skthermo.fem._factors import Factorise, elimination
 
 Key = tuple[str, ...]
 Content = tuple[Hashable, tuple[str, ...]]
@@ -76,9 +76,7 @@ def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
 
 def check_severities(damage: Mapping[str, float], groups, *, lowest: float = -10.0) -> Mapping[str, float]:
     """Check that groups are known, and severities leave some stiffness and are no percentages."""
-    damage = as_mapping(damage)
-    if not isinstance(damage, Mapping):
-        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    damage = mapping_of(damage, "damage", "a mapping of group to severity")
     for group, severity in damage.items():
         if group not in groups:
             raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
@@ -281,8 +279,8 @@ class SparsityPattern:
         return np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
 
     @cached_property
-    def elimination(self) -> Elimination:
-        """The order in which matrices of this pattern are factorised."""
+    def factorise(self) -> Factorise:
+        """What factorises matrices of this pattern."""
         return elimination(self.rows, self.pointers)
 
     def matrix(self, data: Array) -> scipy.sparse.csc_array:

@@ -69,23 +69,27 @@ def direction_name(group: str, kind: LossKind) -> str:
     return group if kind == "stiffness" else f"{group}, section"
 
 
-def damage_directions(model: Any, groups: Sequence[str] | None = None, kind: LossKind | None = None) -> pd.DataFrame:
-    """Directions of a model at its nominal state, exact where the model can have parameters for damage."""
+def damage_directions(
+    model: Any, groups: Sequence[str] | None = None, kind: LossKind | None = None, theta: Array | None = None
+) -> pd.DataFrame:
+    """Directions of a model at theta (1, n_parameters), by default its nominal state, exact where the model can have
+    parameters for damage."""
+    theta = np.ones((1, len(model.parameter_names))) if theta is None else theta
     slopes, names = [], []
     for one, own in losses(model, groups, kind).items():
         names += [direction_name(group, one) for group in own]
         if hasattr(model, "with_damage_parameters"):
             changed = model.with_damage_parameters(own, **kind_option(model, one))
-            theta = np.ones((1, len(changed.parameter_names)))
-            slopes += [*-changed.jacobian(theta)[0][:, -len(own) :].T / changed.frequencies(theta)[0]]
+            rows = np.hstack([theta, np.ones((1, len(own)))])
+            slopes += [*-changed.jacobian(rows)[0][:, -len(own) :].T / changed.frequencies(rows)[0]]
         else:
-            slopes += [_difference(model, group, one) for group in own]
+            slopes += [_difference(model, group, one, theta) for group in own]
     return as_directions(np.array(slopes), names, range(model.n_modes))
 
 
 def losses(model: Any, groups: Sequence[str] | None, kind: LossKind | None) -> dict[LossKind, list[str]]:
     """Damage groups of each kind of loss; by default those that have mass are of both."""
-    names = names_of_groups(model, groups)
+    names = list(read_groups(model, None if groups is None else check_names(groups, "groups")))
     if kind is not None:
         check_kind(kind)
         return {kind: names}
@@ -94,16 +98,10 @@ def losses(model: Any, groups: Sequence[str] | None, kind: LossKind | None) -> d
     return {"stiffness": names, "section": heavy} if heavy else {"stiffness": names}
 
 
-def names_of_groups(model: Any, groups: Sequence[str] | None) -> list[str]:
-    """The damage groups that a user names, or those that no others make up."""
-    return list(read_groups(model, None if groups is None else check_names(groups, "groups")))
-
-
-def _difference(model: Any, group: str, kind: LossKind, step: float = 1e-3) -> Array:
+def _difference(model: Any, group: str, kind: LossKind, theta: Array, step: float = 1e-3) -> Array:
     """Central difference of the logarithms of the frequencies by the severity of a group."""
-    nominal = np.ones((1, len(model.parameter_names)))
     changed = (model.damaged({group: loss}, **kind_option(model, kind)) for loss in (step, -step))
-    above, below = (np.log(as_floats(one.frequencies(nominal)))[0] for one in changed)
+    above, below = (np.log(as_floats(one.frequencies(theta)))[0] for one in changed)
     return (above - below) / (2 * step)
 
 

@@ -122,7 +122,8 @@ class MonitorStatus:
         ``watch_per_year`` and ``smallest_change``.
     events : tuple of dict
         Events that are open: ``event`` (the number in ``events_``), ``kind``, ``since``, and ``peak``, ``modes``,
-        ``groups``, ``size``, ``n_times``, ``acknowledged`` and ``harmless`` of its row.
+        ``groups``, ``size``, ``n_times``, ``acknowledged`` and ``harmless`` of its row. An event that has grown far
+        beyond what it was is not acknowledged any longer.
     faults : tuple of dict
         Sensors that have failed and still do: ``column``, ``kind``, ``since`` and ``detail``.
     transition : int
@@ -239,6 +240,9 @@ def status_of(monitor: Any) -> MonitorStatus:
     for name in ("modes", "groups"):
         opened[name] = pd.Series([[one for one in text.split(", ") if one] for text in opened[name]], dtype=object)
     opened["size"] = opened["size"].astype(object).where(opened["size"].notna(), None)
+    if len(evaluations):
+        standing, number = monitor._events().standing()
+        opened["acknowledged"] &= (opened["event"] != number[-1]) | (standing[-1] not in ("alarm", "drift"))
     shown = ["event", "kind", "since", "peak", "modes", "groups", "size", "n_times", "acknowledged", "harmless"]
     failed = faults[faults["until"].isna()].astype({"column": str})
     levels = ("threshold_", "clear_threshold_", "watch_threshold_", "false_alarms_per_year", "watch_per_year")

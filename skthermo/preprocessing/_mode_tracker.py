@@ -161,8 +161,6 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         UserWarning
             If two reference modes are so near to each other, in frequency and shape, that they cannot be distinguished.
         """
-        if isinstance(self.follow, bool):
-            raise ValueError(f"follow is {self.follow}; expected a number of records, a duration or None")
         modes = read_reference(self.reference)
         self.frequencies_, self.shapes_, self.mode_names_, self.sensors_ = modes
         self.findings_ = modes.similar(self.max_shift, self.min_mac)

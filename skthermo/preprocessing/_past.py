@@ -203,9 +203,11 @@ class LagFeatures(PastFeatures):
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
 
     def _features(self, values: Array, stamps: pd.DatetimeIndex | None) -> tuple[Array, list[FewRecordsWarning]]:
-        if stamps is None:
-            return self._by_row(values, self.lags_), self._doubts_of_first_rows(values)
-        return self._by_time(stamps, values)
+        if stamps is not None:
+            return self._by_time(stamps, values)
+        rows, first = np.arange(len(values)), 0 if self.padding == "edge" else -1
+        sources = [np.where(rows < lag, first, rows - lag) for lag in self.lags_]
+        return _rows_by_lag(values, sources), self._doubts_of_first_rows(values)
 
     @property
     def lookback_(self) -> int | np.timedelta64:
@@ -258,36 +260,22 @@ class LagFeatures(PastFeatures):
             earlier = earlier.tz_localize(self.time_zone_, ambiguous=is_summer, nonexistent="shift_forward")
         return earlier.as_unit("ns").asi8
 
-    def _by_row(self, values: NDArray, lags: Sequence[int]) -> NDArray:
-        n_rows, sensors = len(values), np.ascontiguousarray(values.T)
-        lagged = np.empty((len(sensors), len(lags), n_rows), dtype=values.dtype)
-        for k, lag in enumerate(lags):
-            before = min(lag, n_rows)
-            lagged[:, k, before:] = sensors[:, : n_rows - before]
-            lagged[:, k, :before] = sensors[:, :1] if self.padding == "edge" else np.nan
-        return lagged.reshape(-1, n_rows).T
-
     def _by_time(self, stamps: pd.DatetimeIndex, values: Array) -> tuple[Array, list[FewRecordsWarning]]:
         own, old = stamps.as_unit("ns").asi8, self.stamps_.view(np.int64)
         freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
-        rows_per_lag = _rows_per_step(own, freq)
         calendar = self._calendar()
-        if rows_per_lag and np.array_equal(own, old) and calendar is None:
-            return self._by_row(values, [lag * rows_per_lag for lag in self.lags_]), []
         found = self._found(own, max(self.lags_) * freq + tolerance)
         found[old.argmin()] = True  # the padding of what is before the first record of all
         known, records = self._joined(found, own, values)
         order = np.argsort(known)
-        ascending = known[order]
+        ascending, first = pd.Index(known[order]), order[0] if self.padding == "edge" else -1
         sources, unknown = [], np.zeros(len(own), dtype=bool)
         for lag in self.lags_:
             wanted = own - lag * freq if calendar is None else self._steps_back(stamps, lag, calendar)
-            at = np.searchsorted(ascending, wanted, side="right") - 1
-            stale = wanted - ascending[at] > tolerance
-            before = at < 0
-            unknown |= (stale | before) & (wanted < own.min())
-            source = np.where(stale & ~before, -1, order[np.maximum(at, 0)])
-            sources.append(np.where(before & (self.padding == "nan"), -1, source))
+            at = ascending.get_indexer(wanted, method="ffill", tolerance=tolerance)
+            unknown |= (at < 0) & (wanted < own.min())
+            source = np.where(at < 0, -1, order[at])
+            sources.append(np.where(wanted < ascending[0], first, source))
         are_of_fit = np.isin(own, old[found]).all()
         return _rows_by_lag(records, sources), [] if are_of_fit else self._doubts_of_history(unknown)
 
@@ -303,25 +291,11 @@ def _step_of_calendar(freq: Any) -> pd.offsets.BaseOffset | None:
 
 def _rows_by_lag(values: NDArray, sources: list[NDArray[np.intp]]) -> NDArray:
     """Values of the source rows of every lag, NaN for -1, one block of columns for each sensor."""
-    sensors = np.ascontiguousarray(values.T)
-    lagged = np.empty((len(sensors), len(sources), len(sources[0])), dtype=values.dtype)
-    for k, source in enumerate(sources):
-        for sensor, column in zip(sensors, lagged[:, k], strict=True):
-            np.take(sensor, source, out=column, mode="clip")
-        lagged[:, k, source == -1] = np.nan
-    return lagged.reshape(-1, len(sources[0])).T
-
-
-def _rows_per_step(stamps: NDArray[np.int64], step: int) -> int | None:
-    """Number of rows in a step, if stamps are equally spaced and the step is a multiple of their spacing."""
-    steps = np.diff(stamps)
-    even = steps.size and steps[0] > 0 and step % steps[0] == 0 and (steps == steps[0]).all()
-    return int(step // steps[0]) if even else None
+    sensors = np.vstack([values, np.full(values.shape[1], np.nan)]).T
+    return np.ascontiguousarray(sensors).take(sources, axis=1).reshape(-1, len(sources[0])).T
 
 
 def _read_lags(lags: Any, n_rows: int) -> list[int]:
-    if isinstance(lags, bool | np.bool_):
-        raise ValueError(f"lags is {lags!r}; expected a positive number or different non-negative integers")
     count = lags if isinstance(lags, Integral) else len(lags)
     if count > max(10_000, n_rows):  # a list of 10^9 lags would end the interpreter
         raise ValueError(f"lags are {count} for {n_rows} rows; expected at most 10000, or as many as there are rows")
@@ -537,7 +511,7 @@ def _decayed_sums(ages: NDArray[np.float64], table: NDArray[np.float64]) -> NDAr
 
 
 def _read_half_lives(given: Any, is_timed: bool) -> NDArray[np.int64]:
-    if isinstance(given, str) or not len(given):
+    if not len(given):
         raise ValueError(f"half_lives is {given!r}; expected a sequence, such as ['30D']")
     found = []
     for one in given:

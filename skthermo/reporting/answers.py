@@ -28,19 +28,21 @@ def _measured(monitor: Any) -> pd.DataFrame:
 
 
 def shifts_of(monitor: Any, since: Any) -> pd.Series:
-    """How far each response is from that of the healthy structure in the same weather, on average since a time.
+    """How far each response is from that of the healthy structure in the same weather, in the median since a time.
 
     Of the last 30 days at most, those that stand out most from their scatter first; relative, or in the unit of a
     response that may be zero; empty for a detector that has no residuals.
     """
     if not len(monitor.corrected_) or not hasattr(monitor.detector_, "residuals"):
         return pd.Series(dtype=float)
+    alone = getattr(monitor.detector_, "compensator_", None)  # residuals of records, not of a window
+    residuals = monitor.detector_.residuals if alone is None else alone.transform
     records = _measured(monitor)
     seen_from = max(pd.Timestamp(since), records.index[-1] - LONGEST) - 2 * LONGEST  # windows reach into these records
     with collected(drop_others=True):  # each record has its reason
-        rest = _newest(monitor.detector_.residuals(records[records.index >= seen_from]), since)
-    mean, scatter = rest.mean(), rest.std().replace(0.0, np.finfo(float).tiny)
-    return mean[(mean / scatter).abs().sort_values(ascending=False, kind="stable").index]
+        rest = _newest(residuals(records[records.index >= seen_from]), since)
+    middle, scatter = rest.median(), rest.std().replace(0.0, np.finfo(float).tiny)
+    return middle[(middle / scatter).abs().sort_values(ascending=False, kind="stable").index]
 
 
 def identified_in(monitor: Any, since: Any) -> Any:
@@ -70,6 +72,8 @@ def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = No
     times = event.get("n_times", 1)
     begun = f"Event {event['event']} ({kind}) since {day_text(since)}"
     begun += f", {times} times in alarm" if times > 1 and kind == "damage" else ""
+    has_grown = not event["acknowledged"] and monitor.events_.loc[event["event"], "acknowledged"]
+    begun += ", which has grown since it was acknowledged" if has_grown else ""
     if kind == "fault":
         of = f" of {listed([bare(name) for name in event['modes']])}" if event["modes"] else ""
         yield f"{begun}: values{of} cannot be those of the structure as it was. A sensor or the structure has changed."

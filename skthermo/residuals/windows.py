@@ -45,7 +45,8 @@ class WindowMeans:
         """Learn from the residuals of a baseline in order of time.
 
         A residual counts as no farther from the median of its regime than so many robust standard deviations, so that
-        an outlier does not dominate a mean.
+        an outlier does not dominate a mean. What more than half of a window lies beyond that is added: a change that
+        lasts counts in full.
         """
         window = int(window) if isinstance(window, Integral) else check_duration(window, "window", may_be_zero=False)
         values, numbers = residuals.to_numpy(), range(regime.max() + 1)
@@ -82,12 +83,16 @@ class WindowMeans:
 def means_by_regime(
     values: Array, regime: Regimes, index: pd.Index, window: Any, limits: Array
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Means of the clipped values within the window that ends with each row and in its regime, and their numbers."""
+    """Means of the clipped values within the window that ends with each row and in its regime, moved by as far as more
+    than half of the values lie beyond the limits, and their numbers."""
     means, counts = np.full(values.shape, np.nan), np.zeros(values.shape, dtype=np.intp)
     for number, (lowest, highest) in enumerate(limits):
         own = regime == number
-        rows = np.where(own[:, np.newaxis], np.clip(values, lowest, highest), np.nan)
-        rolling = pd.DataFrame(rows, None if isinstance(window, int) else index).rolling(window, min_periods=1)
-        means[own] = rolling.mean().to_numpy()[own]
-        counts[own] = np.nan_to_num(rolling.count().to_numpy())[own]
+        rows = pd.DataFrame(np.where(own[:, np.newaxis], values, np.nan), None if isinstance(window, int) else index)
+        within = rows.clip(lowest, highest, axis=1).rolling(window, min_periods=1)
+        around = rows.rolling(window, min_periods=1)
+        above = np.maximum(around.quantile(0.5, interpolation="lower") - highest, 0.0)
+        below = np.minimum(around.quantile(0.5, interpolation="higher") - lowest, 0.0)
+        means[own] = (within.mean() + above + below).to_numpy()[own]
+        counts[own] = np.nan_to_num(within.count().to_numpy())[own]
     return means, counts

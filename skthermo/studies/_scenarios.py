@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from skthermo._core.arrays import HUGE, as_mapping, check_names, is_real, real_array
+from skthermo._core.arrays import HUGE, as_mapping, check_names, is_real, mapping_of, real_array
 from skthermo._core.estimators import check_is_fitted
 from skthermo._core.frames import Table, row_times, time_of
 from skthermo.fem import FEModel
@@ -117,7 +117,7 @@ def check_name(name: Any, kind: LossKind) -> None:
 
 def severities_of(damage: Any, name: str) -> dict[str, float]:
     """Severity by group as floats."""
-    damage = mapping_of(damage, f"damage of scenario {name!r}", "{group: severity}")
+    damage = mapping_of({} if damage is None else damage, f"damage of scenario {name!r}", "{group: severity}")
     for group, severity in damage.items():
         if not isinstance(group, str):
             raise ValueError(f"scenario {name!r} has the damage group {group!r:.100}; expected a text")
@@ -139,14 +139,6 @@ def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
             f"scenario {name!r} has severities of {group!r} such as {wrong[0]:g}; expected finite shares of the "
             f"stiffness below 1, not percent (0.2 means 20 %), and not below {LOWEST_SEVERITY:g}"
         )
-
-
-def mapping_of(values: object, what: str, expected: str) -> Mapping[str, Any]:
-    """A mapping, or a Series with names as one; None becomes an empty one."""
-    mapping = {} if values is None else as_mapping(values)
-    if not isinstance(mapping, Mapping):
-        raise ValueError(f"{what} is {values!r:.200}; expected {expected}")
-    return mapping
 
 
 def only_group(damage: Mapping[str, float], kind: LossKind) -> tuple[str | None, float]:
@@ -209,7 +201,11 @@ class Scenario(BaseScenario):
     def __post_init__(self) -> None:
         check_name(self.name, self.kind)
         damage = severities_of(self.damage, self.name)
-        given = mapping_of(self.parameters, f"parameters of scenario {self.name!r}", "{parameter: factor}")
+        given = mapping_of(
+            {} if self.parameters is None else self.parameters,
+            f"parameters of scenario {self.name!r}",
+            "{parameter: factor}",
+        )
         wrong = [f for f in given.values() if not is_real(f) or not 0 < f < HUGE]
         if wrong:
             raise ValueError(

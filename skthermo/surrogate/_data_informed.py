@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import Any, Literal, Self, TypedDict, Unpack, overload
+from typing import Any, Literal, Self, overload
 
 import numpy as np
 import pandas as pd
@@ -64,7 +64,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
-from skthermo.fem.damage import LossKind
+from skthermo.fem.damage import LossKind, damage_directions
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import BiasAligner, check_records
 from skthermo.preprocessing.checks import misplaced_columns
@@ -91,20 +91,6 @@ from skthermo.surrogate._thermal import (
     possible,
     ratio_regressor,
 )
-from skthermo.surrogate.effects import damage_directions
-
-
-class Simulated(TypedDict, total=False):
-    """Options of `DataInformedFEM.simulate`, for checkers of types."""
-
-    damage: Mapping[str, float | ArrayLike] | None
-    parameters: Mapping[str, float] | None
-    stiffness: MatrixLike | None
-    mass: MatrixLike | None
-    noise: ArrayLike | Literal["fitted"]
-    gaps: float | Literal["fitted"] | None
-    outliers: ArrayLike | Literal["fitted"] | None
-    random_state: int | np.random.RandomState | None
 
 
 class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
@@ -333,7 +319,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
                 posterior: Any = last_step(inverse)
                 findings += posterior.shape_inputs_.doubts(posterior.model, aligned, found.theta)
         with collected() as of_mapper, stages.stage("temperature mapper", mapper):
-            fit_checked(mapper, filled, named(filled, found.theta, self.parameter_names_), weights)
+            index = filled.index if isinstance(filled, pd.DataFrame) else None
+            targets = pd.DataFrame(found.theta, index, self.parameter_names_, copy=False)  # with the names of outputs
+            fit_checked(mapper, filled, targets, weights)
         with collected() as of_model, stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
             findings += [*found.findings, *of_mapper, *of_model]
@@ -510,9 +498,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return self._as_targets(X, lowest), self._as_targets(X, frequencies * (1 + margin))
 
     @overload
-    def simulate(self, X: pd.DataFrame, **options: Unpack[Simulated]) -> pd.DataFrame: ...
+    def simulate(self, X: pd.DataFrame, **options: Any) -> pd.DataFrame: ...
     @overload
-    def simulate(self, X: ArrayLike, **options: Unpack[Simulated]) -> Array: ...
+    def simulate(self, X: ArrayLike, **options: Any) -> Array: ...
     def simulate(
         self,
         X: ArrayLike,
@@ -626,7 +614,10 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ValueError
             If a group is unknown, none moves a frequency, or the mass of a group is not known.
         """
-        return damage_directions(self, groups, kind)
+        check_is_fitted(self)
+        theta = np.nanmean(as_floats(self.parameters_), axis=0, keepdims=True)
+        directions = damage_directions(self.model, groups, kind, theta)
+        return (directions * self.thermal_.elasticity(theta)[0]).set_axis(self.mode_names_, axis=1)
 
     def extrapolation_distance(self, X: ArrayLike) -> pd.DataFrame:
         """How far the inputs of M2 are outside the training range, row by row.
@@ -827,11 +818,6 @@ def imputed(imputer: BaseEstimator, T: Table, F: Table) -> tuple[Table, Table]:
     values = as_floats(imputer.fit_transform(np.hstack([T, F])))
     frequencies = values[:, n_sensors : n_sensors + n_modes]
     return frame_like(T, values[:, :n_sensors]), frame_like(F, frequencies, column_names(F, "f"))
-
-
-def named(T: Table, theta: Array, names: Sequence[str]) -> pd.DataFrame:
-    """Parameters as a mapper learns them: a frame, by whose names a `FleetMapper` knows them."""
-    return pd.DataFrame(theta, T.index if isinstance(T, pd.DataFrame) else None, names, copy=False)
 
 
 def refitted(

@@ -273,19 +273,6 @@ class ServiceRecords:
             taken[row] = record
         return taken
 
-    def drawn_outliers(self, taken: NDArray[np.intp], random_state: np.random.RandomState) -> Array:
-        """Outliers of the records that rows took, (n_rows, n_modes), NaN where a value is none; sizes are smoothed
-        run by run, with the bandwidth of Silverman's rule on logarithms."""
-        drawn, logs = self.outliers[taken], np.log(np.abs(self.outliers))
-        n_runs = _begins(self.outliers).sum()
-        if n_runs < 2:
-            return drawn
-        mean, deviation, bandwidth = np.nanmean(logs), np.nanstd(logs), (4 / (3 * n_runs)) ** 0.2
-        run = np.cumsum(_begins(drawn), axis=0)
-        normal = np.take_along_axis(random_state.standard_normal((run.max() + 1, run.shape[1])), run, axis=0)
-        smoothed = (np.log(np.abs(drawn)) - mean + bandwidth * deviation * normal) / np.hypot(1, bandwidth)
-        return np.sign(drawn) * np.exp(mean + smoothed)
-
     @cached_property
     def _joints(self) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
         """From 1 on, the number of the faults of records at which others may take over, 0 for the rest; and the records
@@ -295,12 +282,6 @@ class ServiceRecords:
         joint_of = np.where(begins | (of_row == np.bincount(of_row).argmax()), of_row + 1, 0)
         rows = np.split(np.argsort(joint_of, kind="stable"), np.cumsum(np.bincount(joint_of))[:-1])
         return joint_of, [np.arange(len(self.places)), *rows[1:]]
-
-
-def _begins(outliers: Array) -> NDArray[np.bool_]:
-    """Where a run of outliers of a mode begins."""
-    is_outlier = ~np.isnan(outliers)
-    return is_outlier & ~np.vstack([np.zeros((1, outliers.shape[1]), dtype=bool), is_outlier[:-1]])
 
 
 def places_of(residuals: BaselineResiduals, weather: Array) -> Array:
@@ -372,7 +353,7 @@ class RecordSimulator(SavesFrames):
         if are_drawn(gaps) or are_drawn(outliers):
             service, taken = self._taken(weather, outliers, streams[0])
         if are_drawn(outliers):
-            drawn = service.drawn_outliers(taken, streams[2])
+            drawn = service.outliers[taken]
             values = np.where(np.isnan(drawn), values, drawn)
         elif outliers is not None:
             values = values * np.where(streams[2].uniform(size=shape) < outliers, 10.0, 1.0)

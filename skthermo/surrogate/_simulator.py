@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -109,20 +109,6 @@ class Simulator:
             return replace(changed, usual=None)
         factors = np.tile([1 - severities[1], 1 - severities[0]], (len(groups), 1))
         return Simulator(changed.model, changed.reduced, np.vstack([self.box, factors]), self.tol)
-
-    def with_columns(
-        self, groups: Sequence[str], masses: Mapping[str, Any], box: Array | None, kind: LossKind = "stiffness"
-    ) -> Simulator:
-        """The simulator whose rows of theta end with 1 - severity of each group and 1 + amount of each mass.
-
-        Within the box, (n_columns, 2), a reduced model is used, if there is a box.
-        """
-        model: Any = getattr(self.model, "full", self.model)
-        model = model.with_damage_parameters(groups, **kind_option(model, kind)) if groups else model
-        model = model.with_mass_parameters(masses) if masses else model
-        if box is None:
-            return Simulator(model)
-        return Simulator(model, model.reduced(box, tol=self.tol, random_state=0), box, self.tol)
 
     def frequencies(self, theta: Array, n_jobs: int | None = None) -> Array:
         """Frequencies in Hz, (n_samples, n_modes); NaN in rows with NaN."""

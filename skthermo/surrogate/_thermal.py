@@ -17,6 +17,7 @@ from skthermo._core.arrays import (
     as_floats,
     as_mapping,
     is_real,
+    mapping_of,
     median,
     patterns,
     real_array,
@@ -242,15 +243,18 @@ class ThermalModel(SavesFrames):
         parts = np.split(simulator.frequencies(theta, self.n_jobs), len(draws))
         return [self.measured(part, weather) for part in parts]
 
-    def propagated(self, theta: Array, deviations: Array, *, step: float = 0.01) -> Array:
-        """Relative standard deviations of frequencies in the measured domain, (n_rows, n_modes), given those of theta.
+    def elasticity(self, theta: Array, *, step: float = 0.01) -> Array:
+        """Relative changes of measured frequencies by those of the model's, (n_rows, n_modes), over a relative step;
+        exact for shifts and scales."""
+        frequencies = self.simulator.frequencies(theta, self.n_jobs)
+        lower, higher = (as_floats(self.aligner.inverse_transform(frequencies * (1 + side))) for side in (-step, step))
+        return (higher - lower) / (step * (higher + lower))
 
-        The slope of the aligner is that over a relative ``step`` of the frequencies; exact for shifts and scales.
-        """
-        frequencies, jacobian = self.simulator.linearise(possible(theta)[0], self.n_jobs)
-        sides = [as_floats(self.aligner.inverse_transform(frequencies * (1 + side))) for side in (-step, step)]
-        slopes = np.log(sides[1] / sides[0]) / (2 * step * frequencies)
-        effects = slopes[:, :, np.newaxis] * jacobian * deviations[:, np.newaxis]
+    def propagated(self, theta: Array, deviations: Array) -> Array:
+        """Relative standard deviations of measured frequencies, (n_rows, n_modes), given those of theta."""
+        theta = possible(theta)[0]
+        slopes = self.simulator.linearise(theta, self.n_jobs, relative=True)[1]
+        effects = self.elasticity(theta)[:, :, np.newaxis] * slopes * (deviations / theta)[:, np.newaxis]
         return np.sqrt((effects**2).sum(axis=2))
 
     def known_deviations(self, weather: Weather) -> Array:
@@ -297,9 +301,7 @@ def is_impossible(theta: Array) -> NDArray[np.bool_]:
 def factors_of(parameters: Mapping[str, float], names: Sequence[str]) -> Array:
     """The factor of every parameter, 1 where none is given."""
     factors = dict.fromkeys(names, 1.0)
-    parameters = as_mapping(parameters)
-    if not isinstance(parameters, Mapping):
-        raise ValueError(f"parameters is {parameters!r:.200}; expected a mapping of parameter to factor")
+    parameters = mapping_of(parameters, "parameters", "a mapping of parameter to factor")
     for name, factor in parameters.items():
         if name not in factors:
             raise ValueError(f"parameter {name!r} is unknown; expected some of {names}")
@@ -326,9 +328,7 @@ def split_damage(
     damage: Mapping[str, float | ArrayLike], X: ArrayLike
 ) -> tuple[dict[str, float], dict[str, NDArray[np.float64]]]:
     """Severities that are the same in all rows, and those with a value for each row."""
-    damage = as_mapping(damage)
-    if not isinstance(damage, Mapping):
-        raise ValueError(f"damage is {damage!r}; expected a mapping of group to severity")
+    damage = mapping_of(damage, "damage", "a mapping of group to severity")
     fixed: dict[str, Any] = {}
     growing: dict[str, NDArray[np.float64]] = {}
     n_rows = np.shape(X)[0]

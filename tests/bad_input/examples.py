@@ -343,7 +343,6 @@ TARGETS = names(["rafters"]) | {
 ALONE = {name: [name] for name in BARS}
 EXPORTED = fem.Structure(NODES, BARS, SUPPORTS, ALONE).assemble(list(BARS), n_modes=1)
 ENDS = {name: bar.nodes for name, bar in BARS.items()}
-IMPORTED = fem.ImportedStructure(EXPORTED, NODES, ENDS, GROUPS)
 use(
     "fem.ImportedStructure",
     lambda **a: fem.ImportedStructure(**a).assemble(["rafters"], n_modes=1).frequencies([[1.0]]),
@@ -1156,7 +1155,6 @@ use(
 
 
 # newer arguments
-CLOCKED = F.set_axis(pd.date_range("2020-01-01", periods=len(F), freq="h"))
 fitted(
     HampelFilter,
     (BOTH, table(BOTH, fixed=False, rows=False, but=("repeated columns",))),

@@ -26,7 +26,7 @@ from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing import RecordFindings
 from tests.bad_input import registry
 
-SHARE = 47  # every forty-seventh bad value is tried each time
+SHARE = 97  # of so many bad values one is tried each time
 KINDS = ["legal", "refused", "warned", "silent", "unclear"]
 MOST = {"silent": 0.005, "unclear": 0.002}  # shares of all bad values
 MOST_OF_A_PART = 0.01  # share of both together in a part of them, in which there may be more by chance

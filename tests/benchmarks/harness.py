@@ -33,7 +33,6 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 sys.path.append(str(EXAMPLES))  # whose recipes some benchmarks measure, by imports after that of this module
 TABLES = {}  # what was shown, by title, as CSV
 OTHER = {}  # tables of another version that were not shown yet, by title, with its commit
-KW51_NOISE = (0.003, 0.0017, 0.0016, 0.0026, 0.00115, 0.0015)
 
 
 def recipes(name):

@@ -12,7 +12,7 @@ import pytest
 from tests.contract.run import SCRIPTS, run
 
 KEPT = json.loads(Path(__file__).with_name("results.json").read_text(encoding="utf-8"))
-SLOW = 1.35  # seconds of a processor
+SLOW = 0.95  # seconds of a processor
 
 
 def marked(name):

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.io
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -14,11 +14,8 @@ from skthermo.datasets import load_kw51
 from tests.datasets.kw51_file import CHANNELS, SENSORS, cell, kw51_bytes, kw51_fields, write_kw51
 from tests.nights import by_day
 
-FUZZ = settings(
-    max_examples=by_day(25, at_night=60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+FUZZ = settings(max_examples=by_day(25, at_night=60))
 NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*read-as:UserWarning")
-HOUR = pd.Timedelta("1h")
 
 
 def check_equal(data, fields):

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.io
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.datasets import load_z24
@@ -122,7 +122,7 @@ def test_a_table_far_too_large_is_refused(tmp_path):
         load_z24(tmp_path / "large.csv")
 
 
-FUZZ = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(max_examples=50)
 
 
 def outcome(file, content):

@@ -129,6 +129,7 @@ def test_what_labels_call_damaged_is_not_learned(name):
 
 
 @WARM
+@pytest.mark.one_case
 @pytest.mark.parametrize(
     "refit", [True, lambda results: int(np.argmax(results["mean_test_score"]))], ids=["best", "own"]
 )

@@ -128,11 +128,11 @@ def test_the_baseline_is_the_history_of_later_windows_and_batches_are_one_pass()
 
 
 def test_any_outlier_detector_serves_and_grids_reach_its_parameters():
-    forest = whole(IsolationForest(random_state=0)).fit(YEAR)
+    forest = whole(IsolationForest(n_estimators=20, random_state=0)).fit(YEAR)
     assert isinstance(forest.detectors_[0], OutlierDetector)
     assert rate(forest, LATER) < 0.06
     assert not hasattr(forest, "pod")
-    grid = {"detector__contamination": [0.02, 0.1], "regressor__n_neighbors": [1, 15]}
+    grid = {"detector__contamination": [0.02], "regressor__n_neighbors": [1, 15]}
     neighbours = CompensatedDetector(MahalanobisDetector(), KNeighborsRegressor(), targets=MODES)
     search = GridSearchCV(neighbours, grid, cv=BlockedKFold(2)).fit(YEAR)
     assert search.best_params_["regressor__n_neighbors"] == 15

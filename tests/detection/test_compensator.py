@@ -19,11 +19,9 @@ from tests.detection.compensated import (
     LAGGED,
     MODES,
     POSITIONS,
-    TRUSS,
     F,
     T,
     X,
-    chain,
     compensator,
     hourly,
     with_gaps,
@@ -123,14 +121,6 @@ def test_a_folds_targets_enter_only_their_own_residuals():
     assert (after.iloc[others] != before.iloc[others]).any(axis=None)
 
 
-def test_order_of_columns_and_of_targets_does_not_matter():
-    order = np.random.default_rng(0).permutation(X.shape[1])
-    residuals = compensator(LinearRegression()).fit_transform(X)
-    shuffled = compensator(LinearRegression(), targets=MODES[::-1]).fit_transform(X.iloc[:, order])
-    assert list(shuffled.columns) == MODES[::-1]
-    np.testing.assert_allclose(shuffled[MODES], residuals, rtol=0, atol=1e-9)
-
-
 @pytest.mark.one_case
 @pytest.mark.parametrize("method", ["fit_transform", "transform"])
 def test_frames_arrays_names_and_positions_agree(method):
@@ -177,12 +167,6 @@ def test_out_of_fold_thresholds_keep_the_false_alarm_rate_and_in_sample_ones_do_
 
 
 # Frames, models and scikit-learn's machinery
-
-
-@pytest.mark.nightly
-def test_fe_models_within_are_shared_and_never_copied():
-    fitted = compensator(chain()).fit(X)
-    assert fitted.estimator_.model is clone(fitted).estimator.model is TRUSS
 
 
 @pytest.mark.filterwarnings("ignore::skthermo.exceptions.RecordsWarning")  # modes that are not among the targets

@@ -110,22 +110,6 @@ def test_targets_that_are_never_there_together_are_compensated():
 EMPTY = "ignore:.*not-evaluated"
 
 
-@pytest.mark.nightly
-@pytest.mark.filterwarnings(EMPTY)
-@pytest.mark.parametrize("data", [lambda frame: frame, lambda frame: frame.to_numpy()], ids=["frame", "array"])
-@pytest.mark.parametrize("estimator", [KNeighborsRegressor(3), RandomForestRegressor(5, random_state=0)], ids=str)
-def test_rows_without_any_temperature_are_not_evaluated(data, estimator):
-    holed, kept = with_gaps(list(T), [0, 7]), np.delete(np.arange(len(X)), [0, 7])
-    fitted = compensator(estimator, targets=POSITIONS).fit(data(holed))
-    for residuals in (fitted.transform(data(holed)), fitted.fit_transform(data(holed))):
-        expected = np.zeros((len(X), len(MODES)), dtype=bool)
-        expected[[0, 7]] = True
-        np.testing.assert_array_equal(np.isnan(np.asarray(residuals)), expected)
-    if isinstance(estimator, KNeighborsRegressor):
-        complete = compensator(targets=POSITIONS).fit(data(X.iloc[kept]))
-        np.testing.assert_array_equal(fitted.transform(data(X)), complete.transform(data(X)))
-
-
 @pytest.mark.filterwarnings(EMPTY)
 def test_a_fold_without_a_temperature_is_missing():
     residuals = compensator(cv="contiguous").fit_transform(with_gaps(list(T), slice(40, 80)))

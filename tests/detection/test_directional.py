@@ -88,7 +88,7 @@ def test_it_finds_more_than_the_mahalanobis_distance_at_no_more_false_alarms():
     detectors = {"any": MahalanobisDetector(0.02), "model": DirectionalDetector(directions, contamination=0.02)}
     for name, last in detectors.items():
         rates[name] = []
-        for seed in range(3):
+        for seed in range(2):
             detector = compensated(last, seed=seed)
             later = together(random_state=10 + seed), together(damage={"bottom": 0.08}, random_state=20 + seed)
             rates[name].append([(detector.predict(records) == -1).mean() for records in later])
@@ -124,21 +124,12 @@ def residuals_of_the_truss():
     return TemperatureCompensator(targets=list(F)).fit_transform(T.join(F))
 
 
-def test_equal_numbers_give_equal_results_whatever_made_them():
-    R, model = residuals_of_the_truss(), make_truss()
-    frames = [R, R.copy(), pd.DataFrame(np.asfortranarray(R), R.index, R.columns), pickle.loads(pickle.dumps(R))]
-    fitted = [DirectionalDetector(model).fit(table) for table in frames]
-    for one, table in zip(fitted, frames, strict=True):
-        np.testing.assert_array_equal(one.damage_index(table), fitted[0].damage_index(R))
-        np.testing.assert_array_equal(one.minimum_detectable_damage(), fitted[0].minimum_detectable_damage())
-    assert MahalanobisDetector().fit(R).score(R) == MahalanobisDetector().fit(R.copy()).score(R.copy())
-
-
 @pytest.mark.parametrize("between", [StandardScaler(), PCA(), PCA(whiten=True)], ids=repr)
 def test_columns_that_are_no_relative_residuals_are_refused(between):
+    residuals = residuals_of_the_truss()
     for directions in ("softening", make_truss()):
         with pytest.raises(ValueError, match="neither frequencies nor relative residuals"):
-            make_pipeline(between, DirectionalDetector(directions)).fit(residuals_of_the_truss())
+            make_pipeline(between, DirectionalDetector(directions)).fit(residuals)
 
 
 def test_frequencies_in_any_unit_and_relative_residuals_find_the_same_losses():

@@ -31,13 +31,6 @@ def test_a_mode_that_others_determine_is_found_in_spite_of_gaps(weights, share):
         MahalanobisDetector().fit(rows)
 
 
-def test_a_mode_with_a_single_value_has_no_variance():
-    rows = F.copy()
-    rows[1:, 2] = np.nan
-    with pytest.raises(ValueError, match="column 2 has a single value"):
-        MahalanobisDetector().fit(rows)
-
-
 def test_complete_rows_have_the_plain_distance_whatever_the_baseline_lacks():
     detector = MahalanobisDetector().fit(GAPPY)
     learned, level = detector.covariance_, detector.report_["level"].to_numpy()
@@ -61,7 +54,7 @@ def test_a_distance_in_few_modes_is_as_rare_as_the_index_that_it_becomes(there):
     np.testing.assert_allclose(detector.damage_index(rows)[far], expected[far], rtol=0.05)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 399), st.floats(1.01, 100))
 def test_a_row_farther_away_in_the_same_direction_has_a_higher_index(row, factor):
     detector = MahalanobisDetector().fit(GAPPY)

@@ -28,7 +28,7 @@ def test_scores_form_one_chain():
     np.testing.assert_array_equal(detector.predict(F) == -1, index > detector.threshold_)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.floats(-12, 12), min_size=3, max_size=3))
 def test_index_does_not_depend_on_units(exponents):
     scale = 10.0 ** np.array(exponents)

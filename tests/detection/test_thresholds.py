@@ -53,7 +53,7 @@ def test_each_record_is_evaluated_by_records_of_other_blocks_that_it_does_not_re
 )
 def test_false_alarms_are_few_however_long_records_remember(detector, n_rows, correlation, most):
     rates = []
-    for seed in range(20):
+    for seed in range(10):
         baseline, new = np.split(0.01 * autoregressive(n_rows + 1000, correlation, seed, 6), [n_rows])
         fitted = detector(contamination=0.02).fit(baseline)
         rates.append((fitted.damage_index(new) > fitted.threshold_).mean())
@@ -102,13 +102,13 @@ def test_the_empirical_covariance_is_the_default(threshold):
 @pytest.mark.parametrize("detector", [MahalanobisDetector, DirectionalDetector])
 def test_false_alarms_on_new_records_are_near_what_is_asked_where_the_baseline_is_small(detector):
     rates = {"quantile": [], "conformal": []}
-    for seed in range(60):
+    for seed in range(30):
         random = np.random.default_rng(seed)
         baseline, later = random.normal(size=(80, 5)), random.normal(size=(400, 5))
         for name, found in rates.items():
             fitted = detector(contamination=0.02, threshold=name).fit(0.01 * baseline)
             found.append((fitted.damage_index(0.01 * later) > fitted.threshold_).mean())
-    error = np.std(rates["conformal"]) / np.sqrt(60)
+    error = np.std(rates["conformal"]) / np.sqrt(30)
     assert np.mean(rates["conformal"]) < 0.02 + 3 * error
     assert np.mean(rates["quantile"]) > 0.03
 

@@ -4,13 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skthermo.datasets import load_kw51, make_kw51_campaign
-from tests.datasets.kw51_file import write_kw51
+from skthermo.datasets import make_kw51_campaign
 from tests.examples.pages import recipes
 
 study = recipes("kw51")
-INDEX = {"check_freq": False, "check_index_type": False}  # a file's time stamps have no frequency
-FOURTEEN = [f"f{mode}" for mode in range(1, 15)]
 
 
 N_AFTER = 300
@@ -33,27 +30,6 @@ def records():
         campaign.retrofit,
         campaign.clean_frequencies * shift,
     )
-
-
-@pytest.mark.nightly
-def test_a_campaign_in_the_format_of_the_file_is_read_back_equal(tmp_path):
-    campaign = make_kw51_campaign(n_hours=200, shapes=True, random_state=0)
-    padded = [table.reindex(columns=[*table, *range(8)]) for table in (campaign.frequencies, campaign.damping)]
-    shapes = np.concatenate([campaign.shapes, np.full((200, 8, 12), np.nan)], axis=1)
-    file = tmp_path / "trackedmodes.mat"
-    write_kw51(file, *padded, shapes, campaign.temperatures, times=campaign.frequencies.index)
-    data = load_kw51(file)
-    pd.testing.assert_frame_equal(data.frequencies.iloc[:, :6], campaign.frequencies, **INDEX)
-    pd.testing.assert_frame_equal(data.damping.iloc[:, :6], campaign.damping, **INDEX)
-    pd.testing.assert_frame_equal(data.temperatures, campaign.temperatures, **INDEX)
-    np.testing.assert_array_equal(data.shapes[:, :6], campaign.shapes)
-    assert data.sensors == campaign.sensors
-    assert (data.state == campaign.state).all()
-    assert list(data.frequencies) == FOURTEEN
-    assert data.frequencies.iloc[:, 6:].isna().all(axis=None)
-    from_file = study.Records.read(file)
-    assert from_file.title == "KW51, trackedmodes.mat"
-    pd.testing.assert_frame_equal(from_file.frequencies, campaign.frequencies, **INDEX)
 
 
 def test_imputed_records_have_no_gaps_and_keep_what_was_measured(records):

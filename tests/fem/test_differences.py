@@ -26,7 +26,7 @@ def changed(factors):
     return {name: whole({name: factor}) for name, factor in factors.items()}
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(factors=st.fixed_dictionaries(dict.fromkeys(NAMES, FACTORS)), sparse=st.booleans(), check=FACTORS)
 def test_a_linear_stiffness_is_recovered_at_any_factors(factors, sparse, check):
     form = scipy.sparse.csr_array if sparse else np.asarray

@@ -14,7 +14,7 @@ TRUSS = make_truss()
 NOMINAL = np.ones((1, 4))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.integers(0, TRUSS.n_dof - 1), min_size=1, max_size=5, unique=True))
 def test_labels_mean_their_positions(positions):
     labels = [TRUSS.dofs[i] for i in positions]

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, load_affine
@@ -41,7 +41,7 @@ def outcome(path, n_modes=4):
             return str(error)
 
 
-FUZZ = settings(max_examples=2, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FUZZ = settings(max_examples=2)
 
 
 def test_what_terms_leave_of_the_total_is_constant_and_said(tmp_path):

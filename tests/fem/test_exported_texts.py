@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.fem import AffineModel, evaluate_modes, load_affine
@@ -43,7 +43,7 @@ def test_every_text_is_the_same_model(tmp_path, kind):
     assert model.dofs == (tuple(DOFS) if kind in LABELLED else ())
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150)
 @given(
     kind=st.sampled_from(list(TEXTS)),
     seed=st.integers(0, 2**32 - 1),

@@ -11,7 +11,7 @@ from skthermo.fem import AffineModel, Bar, Beam, PointMass, Spring, Structure
 
 TRUSS = make_truss()
 THETAS = st.lists(st.floats(0.3, 3.0), min_size=4, max_size=4).map(lambda row: np.array([row]))
-FEW = settings(max_examples=25, deadline=None)
+FEW = settings(max_examples=25)
 
 
 def square(rotation=((1, 0), (0, 1)), shift=(0.0, 0.0), order=(0, 1, 2, 3)):

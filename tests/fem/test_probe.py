@@ -47,7 +47,7 @@ def test_one_call_for_each_term_and_one_for_each_check():
     assert set(model.groups) == {"E", "A"}
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(theta=st.lists(st.floats(0.2, 5), min_size=3, max_size=3))
 def test_the_models_matrices_are_the_programs(theta):
     model = probe(affine_program, NAMES, random_state=0)

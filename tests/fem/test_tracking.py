@@ -154,7 +154,7 @@ def test_the_sum_of_the_macs_is_the_highest_that_distinct_candidates_have():
 shapes = st.integers(0, 2**31).map(lambda seed: np.random.default_rng(seed).standard_normal((5, 3, 2)) @ [1, 1j])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(shapes, st.complex_numbers(min_magnitude=0.1, max_magnitude=10))
 def test_mac_ignores_scale_and_phase(phi, scale):
     np.testing.assert_allclose(np.diag(mac(phi, scale * phi)), 1, rtol=1e-10)

@@ -145,8 +145,10 @@ def test_damage_that_comes_and_goes_is_one_event_and_then_known_until_it_grows(f
     one.acknowledge(event.Index, harmless=False, note="crack")
     assert one.status(one.last_).state == "known damage"
     assert set(one.update(lowered(0.01)[460:520])["state"]) <= {"known damage", "watch"}
+    assert {open_["acknowledged"] for open_ in one.status(one.last_).events if open_["kind"] == "damage"} == {True}
     one.update(lowered(0.04)[520:640])
     assert one.status(one.last_).state in ("drift", "alarm")
+    assert not all(open_["acknowledged"] for open_ in one.status(one.last_).events)  # an answer is wanted again
 
 
 def test_damage_that_is_known_soon_is_no_drift_while_its_mean_fills(fitted):

@@ -302,17 +302,20 @@ def verdict(kind, series, folder):
     return "said" if any(word in texts for word in ("left out", "set aside", "might also be", "not used")) else "wrong"
 
 
-@pytest.mark.parametrize("series", SERIES)
-@pytest.mark.parametrize("kind", KINDS)
+def of_each(kinds):
+    """A test of each kind of files and each series; by day one of the series, another one for the next kind."""
+    each = [(kind, series, (place + number) % len(SERIES) == 0)
+            for place, kind in enumerate(kinds) for number, series in enumerate(SERIES)]  # fmt: skip
+    return pytest.mark.parametrize(
+        ("kind", "series"), [pytest.param(*one, marks=() if day else pytest.mark.nightly) for *one, day in each]
+    )
+
+
+@of_each(KINDS)
 def test_files_are_read_as_they_are(kind, series, tmp_path):
     assert verdict(kind, series, tmp_path) == "right"
 
 
-@pytest.mark.parametrize("series", SERIES)
-@pytest.mark.parametrize("kind", DOUBTFUL)
+@of_each(DOUBTFUL)
 def test_what_is_not_certain_is_said_or_refused(kind, series, tmp_path):
     assert verdict(kind, series, tmp_path) in ("right", "said", "refused")
-
-
-def test_there_are_many_files():
-    assert len(SERIES) * (len(KINDS) + len(DOUBTFUL)) >= 150

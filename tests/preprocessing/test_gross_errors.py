@@ -8,13 +8,14 @@ from hypothesis import strategies as st
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.preprocessing import LagFeatures, check_records
+from tests.nights import by_day
 
 YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
 PLACE = ["what", "column", "n_rows", "from", "to"]
 ROWS = st.lists(st.integers(0, len(T) - 1), min_size=3, max_size=40, unique=True).map(sorted)
 SENSOR, MODE = st.integers(0, T.shape[1] - 1), st.integers(0, F.shape[1] - 1)
-often = settings(max_examples=25, deadline=None)
+often = settings(max_examples=by_day(8, at_night=25))
 
 
 def changed(table, rows, column, values):
@@ -237,7 +238,7 @@ ANYTHING = st.one_of(
 
 
 @given(temperatures=ANYTHING, frequencies=ANYTHING)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=by_day(45, at_night=60))
 @pytest.mark.filterwarnings("error")
 def test_nothing_fails_whatever_is_given(temperatures, frequencies):
     found = check_records(temperatures, frequencies)

@@ -17,6 +17,7 @@ GAPPY = F.mask(RNG.random(F.shape) < 0.2)
 @pytest.mark.parametrize("weights", ["uniform", "distance"])
 def test_imputer_gives_scikit_learns_values_on_a_frame_of_its_own(weights):
     filled = KNNGapImputer(weights=weights).fit_transform(GAPPY)
+    assert list(BiasAligner().fit(GAPPY).get_feature_names_out()) == list(GAPPY)
     expected = KNNImputer(n_neighbors=10, weights=weights).fit_transform(GAPPY)
     np.testing.assert_array_equal(filled.to_numpy(), expected)
     assert filled.index.equals(GAPPY.index)

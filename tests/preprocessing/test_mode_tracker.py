@@ -110,7 +110,7 @@ def lowest_cost(cost):
     )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(0, 2**31), st.integers(1, 4), st.integers(1, 4), st.sampled_from([0.05, 0.2, 0.6]))
 def test_the_assignment_is_optimal_and_one_to_one(seed, n_modes, n_poles, max_shift):
     random = np.random.default_rng(seed)

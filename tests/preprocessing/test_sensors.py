@@ -28,7 +28,7 @@ def test_complete_rows_give_plain_means():
     np.testing.assert_allclose(ambient["ambient"], T.mean(axis=1), atol=1e-12)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 1000), st.floats(0.0, 0.6))
 def test_failing_sensors_do_not_move_the_mean(seed, share):
     T, air, _ = readings(seed=seed)

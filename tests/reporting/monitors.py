@@ -123,7 +123,7 @@ class FakeMonitor(Monitor):
         kinds = set(self.events_["kind"][self.events_["end"].isna()])
         states = {"damage": "alarm", "drift": "drift", "watch": "watch"}
         state = next((state for kind, state in states.items() if kind in kinds), "")
-        return SimpleNamespace(standing=lambda: ([state], None), set_aside=lambda number: ([("fault" in kinds)],))
+        return SimpleNamespace(standing=lambda: ([state], [0]), set_aside=lambda number: ([("fault" in kinds)],))
 
     def get_params(self, deep=True):
         return {name: getattr(self, name) for name in inspect.signature(Monitor).parameters}

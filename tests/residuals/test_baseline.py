@@ -11,7 +11,7 @@ from tests.residuals.series import autoregressive, residuals
 # Order statistics and correlation times
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=60), st.floats(0.05, 0.95))
 def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, confidence):
     scores = np.array(scores)
@@ -143,6 +143,26 @@ def test_noise_is_not_bounded_by_the_largest_residual_and_keeps_its_covariance()
     drawn = found.draw(later, np.random.RandomState(0))
     assert np.abs(drawn).max() > np.abs(found.values).max()
     np.testing.assert_allclose(np.cov(drawn.T), np.cov(found.values.T), rtol=0.1)
+
+
+def test_modes_that_are_missing_are_drawn_given_those_that_are_there():
+    rng = np.random.default_rng(0)
+    weather, later = rng.uniform(-10, 30, (3000, 1)), rng.uniform(-10, 30, (3000, 1))
+    values = rng.multivariate_normal([0, 0], [[1, 0.8], [0.8, 1]], 3000)
+    complete = residuals(weather, values)
+    np.testing.assert_array_equal(
+        complete.draw_complete(later, np.random.RandomState(0), False), complete.draw(later, np.random.RandomState(0))
+    )
+    values[rng.random(3000) < 0.5, 1] = np.nan
+    drawn = residuals(weather, values).draw_complete(later, np.random.RandomState(0), True)
+    np.testing.assert_allclose(np.cov(drawn.T), [[1, 0.8], [0.8, 1]], atol=0.1)
+
+
+def test_standard_deviations_of_normal_residuals_are_known_to_a_root_of_their_number():
+    values = np.random.default_rng(0).standard_normal((2000, 2))
+    found = residuals(np.random.default_rng(1).uniform(size=2000), values)
+    np.testing.assert_allclose(found.level_errors, 1 / np.sqrt(2 * 2000), rtol=0.15)
+    assert np.isnan(found.outliers).mean() > 0.98
 
 
 # Many records

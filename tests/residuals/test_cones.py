@@ -18,7 +18,7 @@ def directions_of(random, n_dimensions, n_directions, kind):
     return found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(0, 10_000),
     st.integers(1, 7),

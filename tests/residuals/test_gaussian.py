@@ -44,7 +44,7 @@ def test_the_likelihood_is_flat_at_the_solution():
             assert abs(pair[0] - pair[1]) / (2 * step) < 1e-4
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.lists(st.floats(-9, 9), min_size=3, max_size=3),
     st.lists(st.floats(-100, 100), min_size=3, max_size=3),

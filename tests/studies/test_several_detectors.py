@@ -10,7 +10,7 @@ from sklearn.base import BaseEstimator, OutlierMixin, clone
 from sklearn.ensemble import IsolationForest
 from sklearn.exceptions import ConvergenceWarning
 
-from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector
+from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.exceptions import RecordsWarning
 from skthermo.studies import DetectabilityStudy, Scenario
 from tests.studies.studies import SIDE_BY_SIDE, WEATHER, compensated, study_of
@@ -99,9 +99,8 @@ class CountedForest(IsolationForest):
 
 
 def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fem, tmp_path):
-    forest = OutlierDetector(CountedForest(n_estimators=10))
+    forest = OutlierDetector(CountedForest(n_estimators=2))
     several = {"raw": forest, "residuals": compensated(forest), "distance": compensated()}
-    several["falls"] = compensated(DirectionalDetector())
     without = study_of(fem, several, SCENARIOS)
     without.run(WEATHER, SIDE_BY_SIDE)
     once = CountedForest.n_fits

@@ -1,7 +1,6 @@
 """A small chain and its records, for tests."""
 
 import functools
-import time
 import warnings
 
 import numpy as np
@@ -49,19 +48,3 @@ def fitted():
 def as_measured(fem, frequencies, temperatures):
     """Frequencies of the FE model in the measured domain, times the discrepancy in the weather."""
     return fem.aligner_.inverse_transform(np.asarray(frequencies)) * np.exp(fem.discrepancy_(temperatures))
-
-
-class Logged:
-    """A model that writes down how many rows it solves."""
-
-    parameter_names = ("k",)
-    n_modes = 1
-
-    def __init__(self, log):
-        self.log = log
-
-    def frequencies(self, theta):
-        time.sleep(0.3 * (len(theta) == 77))  # long enough for the other process to come along
-        with open(self.log, "a") as file:
-            file.write(f"{len(theta)}\n")
-        return np.sqrt(theta)

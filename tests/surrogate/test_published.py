@@ -42,6 +42,7 @@ def test_a_network_that_the_paper_has_not_is_refused():
         paper_chain(TRUSS, network="kw51-mapper")
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("purpose", TABLES.values())
 def test_networks_follow_scikit_learn(purpose):
     small = {"hidden_layer_sizes": (32, 16, 8), "max_iter": 60, "learning_rate_init": 0.01, "batch_size": 16}

@@ -110,10 +110,9 @@ CHANGES = [
     lambda one: one.changed("with_modes", [0, 1, 2]),
     lambda one: one.changed("with_added", stiffness=None, mass=np.eye(TRUSS.n_dof)),
     lambda one: one.changed("with_added", stiffness=None, mass=2 * np.eye(TRUSS.n_dof)),
-    lambda one: one.with_columns(["top"], {}, np.vstack([one.box, [[0.8, 1.0]]])),
-    lambda one: one.with_columns(["top"], {}, np.vstack([one.box, [[0.7, 1.0]]])),
-    lambda one: one.with_columns(["bottom"], {}, np.vstack([one.box, [[0.8, 1.0]]])),
-    lambda one: one.with_columns([], {"deck": np.eye(TRUSS.n_dof)}, np.vstack([one.box, [[0.8, 1.2]]])),
+    lambda one: one.with_damage_parameters(["top"], 0.0, 0.2),
+    lambda one: one.with_damage_parameters(["top"], 0.0, 0.3),
+    lambda one: one.with_damage_parameters(["bottom"], 0.0, 0.2),
 ]
 
 

@@ -5,10 +5,10 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.linear_model import Ridge
 
 from skthermo.preprocessing import HampelFilter
-from skthermo.surrogate import resampled
-from skthermo.surrogate._records import ServiceRecords
+from skthermo.surrogate import TemperatureMapper, resampled
 from tests.surrogate.chains import F, T, chain
 
 
@@ -27,10 +27,16 @@ def run_lengths(states):
     return np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
 
 
-def records_with(missing, outliers=None, places=None):
-    outliers = np.full(missing.shape, np.nan) if outliers is None else outliers
-    places = np.random.default_rng(0).normal(size=(len(missing), 2)) if places is None else places
-    return ServiceRecords(missing, outliers, places)
+def without(table, rows, columns=slice(None)):
+    table = table.copy()
+    table.loc[rows, columns] = np.nan
+    return table
+
+
+def drawn_gaps(fem, weather, n_seeds):
+    """Which frequencies are missing in histories of this weather, (n_seeds, n_rows, n_modes)."""
+    known = fem.weather(weather)
+    return np.array([fem.recorder_.gaps(known, random_state=seed)[1] for seed in range(n_seeds)])
 
 
 @pytest.fixture(scope="module")
@@ -56,32 +62,27 @@ def flawless():
     return chain(random_state=0).fit(T, F)
 
 
+@pytest.mark.filterwarnings("ignore:.*not-evaluated")
 @pytest.mark.parametrize("knows_weather", [True, False])
-def test_markov_gaps_come_as_often_and_last_as_long(knows_weather):
-    missing = np.column_stack([lasting(3000, share, length, seed=1) for share, length in ((0.2, 8), (0.05, 2))])
-    weather = np.random.default_rng(1).normal(size=(1500, 2)) if knows_weather else np.full((1500, 2), np.nan)
-    records, random = records_with(missing), np.random.RandomState(0)
-    drawn = [missing[records.draw(weather, random)] for _ in range(30)]
-    for column in (0, 1):
-        shares = np.array([one[:, column].mean() for one in drawn])
-        lengths = np.concatenate([run_lengths(one[:, column]) for one in drawn])
-        trained = run_lengths(missing[:, column])
-        assert abs(shares.mean() - missing[:, column].mean()) < 4 * shares.std() / np.sqrt(len(drawn))
-        assert abs(lengths.mean() - trained.mean()) < 4 * lengths.std() / np.sqrt(len(trained))
+def test_markov_gaps_come_as_often_and_last_as_long(in_service, spoiled, knows_weather):
+    weather = T if knows_weather else without(T, np.arange(len(T)) % 3 > 0)
+    drawn, trained = drawn_gaps(in_service, weather, 60)[..., 1], spoiled[1]["f2"].isna()
+    shares, lengths = drawn.mean(axis=1), np.concatenate([run_lengths(one) for one in drawn])
+    assert abs(shares.mean() - trained.mean()) < 4 * shares.std() / np.sqrt(len(drawn))
+    known = run_lengths(trained)
+    assert abs(lengths.mean() - known.mean()) < 4 * lengths.std() / np.sqrt(len(known))
 
 
-def test_outages_stay_whole():
-    missing = (np.arange(1000) % 50 < 7)[:, np.newaxis]
-    drawn = missing[records_with(missing).draw(np.zeros((2000, 2)), np.random.RandomState(0))]
-    assert set(run_lengths(drawn[:, 0])[1:-1]) == {7}
-
-
-def test_gaps_follow_the_weather():
-    cold = np.random.default_rng(0).normal(size=3000)
-    missing = (cold > 1)[:, np.newaxis]
-    records = records_with(missing, places=cold[:, np.newaxis])
-    share = [missing[records.draw(np.full((400, 1), at), np.random.RandomState(0))][:1].mean() for at in (-2.0, 2.0)]
-    assert share == [0.0, 1.0]
+@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
+def test_outages_stay_whole_and_gaps_follow_the_weather():
+    heat = T.mean(axis=1)
+    warm = heat.rank(pct=True) > 0.7
+    outages, in_heat = without(F, np.arange(len(F)) % 50 < 7), without(F, warm, "f2")
+    whole = drawn_gaps(chain(random_state=0).fit(T, outages), T, 5)[..., 0]
+    assert {length for one in whole for length in run_lengths(one)[1:-1]} == {7}
+    hot = chain(mapper=TemperatureMapper(Ridge()), random_state=0).fit(T, in_heat)  # whose first row has known weather
+    share = [drawn_gaps(hot, T[part], 40)[:, 0, 1].mean() for part in (heat == heat.max(), heat == heat.min())]
+    assert share == [1.0, 0.0]
 
 
 def test_modes_and_sensors_are_missing_together(in_service, spoiled):
@@ -98,21 +99,6 @@ def test_gaps_are_the_same_whatever_the_noise(in_service):
         found = in_service.simulate(T, gaps="fitted", random_state=4, **options)
         np.testing.assert_array_equal(found.isna(), expected)
     assert (in_service.recorder_.gaps(in_service.weather(T), random_state=5)[1] != expected).any()
-
-
-def test_sizes_of_outliers_are_smoothed_run_by_run():
-    outliers = np.full((1000, 2), np.nan)
-    sizes = np.random.default_rng(0).uniform(0.05, 0.2, 20)
-    outliers[50::50, 0][:10], outliers[60::50, 1][:10] = sizes[:10], -sizes[10:]
-    outliers[50:53, 0] = sizes[0]
-    records = ServiceRecords(np.zeros((1000, 3), dtype=bool), outliers, np.zeros((1000, 1)))
-    drawn = np.vstack([records.drawn_outliers(np.arange(1000), np.random.RandomState(seed)) for seed in range(200)])
-    np.testing.assert_array_equal(np.sign(drawn[:1000]), np.sign(outliers))
-    np.testing.assert_allclose(drawn[51:53, 0], drawn[50, 0])
-    logs = np.log(np.abs(drawn[~np.isnan(drawn)]))
-    known = np.log(np.abs(outliers[~np.isnan(outliers)]))
-    assert logs.max() > known.max()
-    assert (logs.mean(), logs.std()) == pytest.approx((known.mean(), known.std()), rel=0.05)
 
 
 def test_outliers_come_as_often_in_the_same_mode_and_in_runs(in_service, spoiled):

@@ -76,7 +76,7 @@ def test_deviations_are_those_of_the_mappers_posterior_behind_the_model(options)
     np.testing.assert_allclose(stated(fem, few), expected, rtol=0.1)
 
 
-@pytest.mark.parametrize("days", [60, 365])
+@pytest.mark.parametrize("days", [60, pytest.param(365, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("wrap", [TemperatureMapper, lambda one: make_pipeline(LagFeatures(1), TemperatureMapper(one))])
 def test_a_mapper_whose_regressor_states_deviations_widens_those_of_the_chain(days, wrap):
     T, F = bridge(0, 395)

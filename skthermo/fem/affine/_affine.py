@@ -25,6 +25,7 @@ from skthermo._core.arrays import (
     check_theta,
     integer_row,
     is_label,
+    mapping_of,
     positive_integer,
     real_array,
     shape_array,
@@ -902,8 +903,7 @@ class ReducedModel(AffineModel):
     The j-th lowest frequency is never below the full model's j-th (Rayleigh-Ritz). The estimate of a relative error
     [MMO00]_ is r' K_0^-1 r / (2 lambda), with the residual r = K phi - lambda M phi of a mode of unit modal mass and
     the nominal stiffness K_0: within 30 % of K_0, 0.64 to 1.3 times the error. Shapes are given at all degrees of
-    freedom. A damaged model is checked anew, and its basis is enlarged if necessary. Iteration on the basis errs by at
-    most a hundredth of ``tol``, which a bound certifies row by row; LAPACK solves the other rows.
+    freedom. A damaged model is checked anew, and its basis is enlarged if necessary.
 
     Examples
     --------
@@ -1067,9 +1067,7 @@ def check_groups(groups, names: Sequence[str], keys: Sequence[Key]) -> dict[str,
         groups = {name: [i for i, key in enumerate(keys) if name in key] for name in names}
         return {name: tuple(positions) for name, positions in groups.items() if positions}
     found = {}
-    if not isinstance(groups, Mapping):
-        raise ValueError(f"groups is {groups!r:.200}; expected a mapping of group to the terms that it scales")
-    for group, terms in groups.items():
+    for group, terms in mapping_of(groups, "groups", "a mapping of group to the terms that it scales").items():
         if isinstance(terms, bytes | type) or not isinstance(terms, Iterable):
             raise ValueError(f"group {group!r} is {terms!r:.200}; expected stiffness terms, such as ['E_deck']")
         positions: set[int] = set()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -13,8 +12,7 @@ from scipy.sparse import csc_array
 from skthermo._core.arrays import Array, RandomState, as_random_state
 from skthermo._core.parallel import map_on_blas_threads
 from skthermo.fem._factors import Solve, factorise
-from skthermo.fem._terms import SparseTerms
-from skthermo.fem.modal import AffineCore, ShiftInvertSolver, may_be_missed, pair_modes
+from skthermo.fem.modal import AffineCore, may_be_missed, pair_modes
 
 
 class Basis(NamedTuple):
@@ -25,13 +23,6 @@ class Basis(NamedTuple):
     error: float
     check_points: Array
     snapshot_points: Array
-
-
-class Directions(NamedTuple):
-    """Directions (n_dof, n), orthonormal in a stiffness, and the energies (n,) that vectors have along them."""
-
-    vectors: Array
-    energies: Array
 
 
 def grow_basis(
@@ -47,21 +38,15 @@ def grow_basis(
     nominal = np.ones((1, len(bounds)))
     stiffness = csc_array(full.stiffness.assemble(nominal)[0])
     solve: Any = factorise(stiffness)
+    used = nominal[:0]
     if start is None:
         used = np.vstack([nominal, *drawn(bounds, random, 16)])
-        start, points = snapshots_at(full, used[:2]), used[2:]  # the others start from the modes of a basis
-    else:
-        used = points = nominal[:0]
-    forgotten, error_of_snapshot = 1e-3 * tol, 10 * tol  # an energy, and an error of an eigenvalue
-    directions = principal_directions(of_unit_energy(start, stiffness), stiffness, forgotten)
-    vectors, core = basis_of(directions, full, tol)
-    new = of_unit_energy(snapshots_at(guided(full, core, vectors, error_of_snapshot), points), stiffness)
-    largest: list[float] = []
+        start = snapshots_at(full, used)
+    known, largest = of_unit_energy(start, stiffness), list[float]()
     for _ in range(40):
-        if new.shape[1]:
-            known = directions.vectors * np.sqrt(directions.energies)
-            directions = principal_directions(np.hstack([known, new]), stiffness, forgotten)
-            vectors, core = basis_of(directions, full, tol)
+        directions, energies = principal_directions(known, stiffness, 1e-3 * tol)
+        vectors = directions[:, energies > tol]
+        core = full.projected(vectors, tol)
         for candidates in drawn(bounds, random, 64)[::-1]:  # errors are largest at corners
             estimates, steps = estimated_errors(full, core, vectors, candidates, solve)
             errors, is_near = estimates.max(axis=1), estimates.max() < 10 * tol
@@ -70,7 +55,7 @@ def grow_basis(
         else:
             candidates, is_near = np.vstack(drawn(bounds, random, 20)), False
             candidates = candidates[~(candidates[:, np.newaxis] == used).all(axis=2).any(axis=1)]
-            errors = true_errors(guided(full, core, vectors, 1e-2 * tol), core, candidates)
+            errors = true_errors(full, core, candidates)
             if errors.max() < tol / 2:
                 return Basis(vectors, core, float(errors.max()), candidates, used)
         largest.append(float(errors.max()))
@@ -82,29 +67,12 @@ def grow_basis(
         if is_near:
             new = np.hstack([steps[row][:, estimates[row] >= tol / 4] for row in worst])
         else:
-            snapshots = snapshots_at(guided(full, core, vectors, error_of_snapshot), candidates[worst])
-            new = of_unit_energy(snapshots, stiffness)
+            new = of_unit_energy(snapshots_at(full, candidates[worst]), stiffness)
+        known = np.hstack([directions * np.sqrt(energies), new])
     raise RuntimeError(
         f"after {len(largest)} rounds {vectors.shape[1]} basis vectors do not give frequencies to {tol:g}; expected a "
         "larger tol, or narrower bounds"
     )
-
-
-def basis_of(directions: Directions, full: AffineCore, tol: float) -> tuple[Array, AffineCore]:
-    """Basis vectors, the directions with ``tol`` or more of the strain energy of a snapshot, and the core on them."""
-    vectors = directions.vectors[:, directions.energies > tol]
-    return vectors, full.projected(vectors, tol)
-
-
-def guided(full: AffineCore, core: AffineCore, vectors: Array, tol: float) -> AffineCore:
-    """The full core; a sparse one is solved from the shapes of the core on the basis, to a relative error ``tol``."""
-    if not (isinstance(full.stiffness, SparseTerms) and isinstance(full.mass, SparseTerms)):
-        return full
-
-    def guide(theta: Array, n_shapes: int) -> Array:
-        return vectors @ core.solver.modes(theta, min(n_shapes, vectors.shape[1]))[1]
-
-    return replace(full, solver=ShiftInvertSolver(full.stiffness, full.mass, guide, tol))
 
 
 def drawn(bounds: Array, random: np.random.RandomState, n_points: int) -> tuple[Array, Array]:
@@ -163,9 +131,9 @@ def of_unit_energy(vectors: Array, stiffness: csc_array) -> Array:
     return vectors / np.sqrt(np.einsum("im,im->m", vectors, stiffness @ vectors))
 
 
-def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> Directions:
-    """Principal directions of vectors in the inner product of a stiffness, without directions of less than some
-    energy."""
+def principal_directions(vectors: Array, stiffness: csc_array, least: float) -> tuple[Array, Array]:
+    """Principal directions of vectors, orthonormal in a stiffness, and the energies of the vectors along them, without
+    directions of less than some energy."""
     energies, turns = scipy.linalg.eigh(vectors.T @ (stiffness @ vectors))
     kept = energies > max(least, 1e-13 * energies[-1])  # less is rounding error
-    return Directions(vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept])
+    return vectors @ (turns[:, kept] / np.sqrt(energies[kept])), energies[kept]

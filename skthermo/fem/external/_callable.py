@@ -12,7 +12,7 @@ import numpy as np
 from joblib import Memory
 from numpy.typing import ArrayLike
 
-from skthermo._core.arrays import Array, check_flag, check_path, check_theta, positive_integer, real_array
+from skthermo._core.arrays import Array, check_flag, check_path, check_theta, mapping_of, positive_integer, real_array
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._terms import (
@@ -35,22 +35,13 @@ def read_parameter_groups(
     """Parameters of each damage group; by default each parameter is one."""
     if groups is None:
         return {name: (name,) for name in parameter_names}
-    if not isinstance(groups, Mapping):
-        raise ValueError(f"groups is {groups!r:.200}; expected a mapping of group to the parameters that it scales")
+    groups = mapping_of(groups, "groups", "a mapping of group to the parameters that it scales")
     found = {group: check_different(names) for group, names in groups.items()}
     for group, names in found.items():
         unknown = [name for name in names if name not in parameter_names]
         if unknown:
             raise ValueError(f"group {group!r} names {unknown}; expected some of {list(parameter_names)}")
     return found
-
-
-def memory_in(folder: str | PathLike) -> Memory:
-    """The memory that keeps results in a folder, wherever the process goes."""
-    path = check_path(folder, "cache").absolute()
-    if path.is_file():
-        raise ValueError(f"{path}: the cache is a file; expected a folder")
-    return Memory(path, verbose=0)
 
 
 def frequencies_of_row(
@@ -135,7 +126,12 @@ class CallableModel:
         self.groups = read_parameter_groups(groups, self.parameter_names)
         self._factors = np.ones(len(self.parameter_names))
         self._is_quiet = False
-        self._memory = None if cache is None else memory_in(cache)
+        self._memory = None
+        if cache is not None:
+            folder = check_path(cache, "cache").absolute()  # wherever the process goes
+            if folder.is_file():
+                raise ValueError(f"{folder}: the cache is a file; expected a folder")
+            self._memory = Memory(folder, verbose=0)
 
     @property
     def cache(self) -> Path | None:

@@ -1,10 +1,10 @@
 """Modal analysis of affine matrices: eigenproblems by LAPACK, columns that follow modes, and derivatives."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.linalg
@@ -13,7 +13,6 @@ from scipy.optimize import linear_sum_assignment
 
 from skthermo._core.arrays import Array, Matrix
 from skthermo.fem._terms import AffineTerms, DenseTerms, SparseTerms
-from skthermo.fem.modal._condensation import EigenSolver, batch_solver
 from skthermo.fem.modal._modes import REPEATED, LocalModes, linearised_by_row
 from skthermo.fem.modal._sparse import ShiftInvertSolver, count_modes
 
@@ -28,7 +27,7 @@ class NominalModes(NamedTuple):
     repeated: NDArray[np.bool_]  # which modes share a repeated frequency, (n_modes, n_modes)
 
     @classmethod
-    def of_ranks(cls, solver: EigenSolver, mass: AffineTerms, ranks: NDArray[np.intp]) -> "NominalModes":
+    def of_ranks(cls, solver: "Solver", mass: AffineTerms, ranks: NDArray[np.intp]) -> "NominalModes":
         """The modes of some ranks at theta = 1."""
         nominal = np.ones((1, mass.exponents.shape[1]))
         eigenvalues, shapes = solver.modes(nominal, int(ranks.max()) + 1)
@@ -56,16 +55,14 @@ class AffineCore:
 
     stiffness: AffineTerms
     mass: AffineTerms
-    solver: EigenSolver
+    solver: "Solver"
     nominal: NominalModes
     ranks: NDArray[np.intp]
     track: bool
     available: int  # how many modes the mass allows and the solver finds
-    guards: int = GUARD_MODES  # how many modes above the lowest are computed first where columns are followed
     healthy: "AffineCore | None" = None  # whose nominal modes define the columns, if it is another core
     parts: AffineTerms | None = None  # of the mass: those that damage groups lose with their section
     n_lowest: int = field(init=False)  # how many of the lowest modes contain all columns at theta = 1
-    n_solved: int = field(init=False)  # how many of the lowest modes are computed at first
     first_candidates: int = field(init=False)  # how many are examined at first, where columns are followed
     max_candidates: int = field(init=False)  # how many are examined before a mode counts as dissolved
     rows_per_chunk: int = field(init=False)  # rows of theta that are solved together, so that memory stays bounded
@@ -79,18 +76,16 @@ class AffineCore:
         ranks: Sequence[int],
         track: bool,
         available: int,
-        parts: AffineTerms | None = None,
     ) -> "AffineCore":
         """The core whose columns are the modes of these ranks (the lowest is 0) at theta = 1."""
         solver, order = eigen_solver(stiffness, mass), np.asarray(ranks, dtype=np.intp)
         nominal = NominalModes.of_ranks(solver, mass, order)
-        return cls(stiffness, mass, solver, nominal, order, track, available, parts=parts)
+        return cls(stiffness, mass, solver, nominal, order, track, available)
 
     def __post_init__(self) -> None:
         self.n_lowest = int(self.ranks.max()) + 1
         self.max_candidates = min(self.available, 8 * self.n_lowest)  # beyond them a mode counts as dissolved
         self.first_candidates = min(self.n_lowest + GUARD_MODES, self.max_candidates)
-        self.n_solved = min(self.n_lowest + self.guards, self.max_candidates) if self.track else self.n_lowest
         numbers = max(self.stiffness.n_entries, 2 * self.stiffness.n_dof * self.n_lowest)
         self.rows_per_chunk = max(1, min(self.stiffness.max_rows, 2**25 // (8 * numbers)))
 
@@ -119,11 +114,8 @@ class AffineCore:
 
     def rescaled(self, row: Array) -> "AffineCore":
         """The core whose theta = 1 is this one's theta = row; its columns stay the same nominal modes."""
-        changed: dict[str, Any] = {
-            name: one.with_factors(one.coefficients(row)[0]) for name, one in self._terms.items()
-        }
-        solver = eigen_solver(changed["stiffness"], changed["mass"])
-        return replace(self, **changed, solver=solver, healthy=self.healthy or self)
+        changed = {name: one.with_factors(one.coefficients(row)[0]) for name, one in self._terms.items()}
+        return self._with_terms(changed, self.healthy or self)
 
     def with_modes(self, ranks: NDArray[np.intp]) -> "AffineCore":
         """The core whose columns are other modes of the healthy nominal state."""
@@ -135,15 +127,19 @@ class AffineCore:
     def with_parameters(self, columns: NDArray[np.intp]) -> "AffineCore":
         """The core of fewer parameters, the others being 1."""
         healthy = self.healthy.with_parameters(columns) if self.healthy else None
-        return self._with_exponents({name: one.exponents[:, columns] for name, one in self._terms.items()}, healthy)
+        changed = {name: one.with_factors(one.factors, one.exponents[:, columns]) for name, one in self._terms.items()}
+        return self._with_terms(changed, healthy)
 
     def with_group_factors(self, scaled: NDArray[np.int64]) -> "AffineCore":
         """The core with further parameters that multiply groups of stiffness terms, (n_terms, n_groups)."""
         healthy = self.healthy.with_group_factors(scaled) if self.healthy else None
         further = {name: np.zeros((len(one.factors), scaled.shape[1]), int) for name, one in self._terms.items()}
         further["stiffness"] = scaled[: len(self.stiffness.factors)]  # the healthy core may lack terms that were added
-        exponents = {name: np.hstack([one.exponents, further[name]]) for name, one in self._terms.items()}
-        return self._with_exponents(exponents, healthy)
+        changed = {
+            name: one.with_factors(one.factors, np.hstack([one.exponents, further[name]]))
+            for name, one in self._terms.items()
+        }
+        return self._with_terms(changed, healthy)
 
     def with_mass_factors(self, masses: Sequence[Matrix]) -> "AffineCore":
         """The core with further parameters: 1 + the number of times that each of these masses is added."""
@@ -154,10 +150,7 @@ class AffineCore:
         solver, nominal = eigen_solver(wider.stiffness, heavy), self.nominal.beside(heavy)
         return replace(wider, mass=heavy, solver=solver, nominal=nominal)
 
-    def _with_exponents(self, exponents: Mapping[str, NDArray], healthy: "AffineCore | None") -> "AffineCore":
-        changed: dict[str, Any] = {
-            name: one.with_factors(one.factors, exponents[name]) for name, one in self._terms.items()
-        }
+    def _with_terms(self, changed: dict[str, Any], healthy: "AffineCore | None") -> "AffineCore":
         solver = eigen_solver(changed["stiffness"], changed["mass"])
         return replace(self, **changed, solver=solver, healthy=healthy)
 
@@ -191,16 +184,9 @@ class AffineCore:
         stiffness, mass = self.stiffness.projected(basis), self.mass.projected(basis)
         nominal = self.nominal._replace(weighted_shapes=basis.T @ self.nominal.weighted_shapes)
         nominal_row = np.ones((1, stiffness.exponents.shape[1]))
-        lapack = dense_solver(stiffness, mass, nominal_row, widest=1e13 * tol)
-        solver = batch_solver(stiffness, mass, nominal_row, lapack, max(0.02 * tol, 1e-12))
+        solver = dense_solver(stiffness, mass, nominal_row, widest=1e13 * tol)
         available = min(self.max_candidates, basis.shape[1])
-        projected = replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
-        # Few modes swap across the widest gap between nominal eigenvalues: guards up to it are enough.
-        highest = min(projected.n_lowest + GUARD_MODES + 1, available)
-        eigenvalues = solver.eigenvalues(nominal_row, highest)[0, projected.n_lowest - 1 :]
-        ratios = eigenvalues[1:] / eigenvalues[:-1]
-        known = len(ratios) and np.isfinite(ratios).all()
-        return replace(projected, guards=int(ratios.argmax()) if known else GUARD_MODES)
+        return replace(self, stiffness=stiffness, mass=mass, solver=solver, nominal=nominal, available=available)
 
     def frequencies(self, theta: Array) -> tuple[Array]:
         """Frequencies in Hz, (n_samples, n_modes)."""
@@ -211,7 +197,7 @@ class AffineCore:
     def modes(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies in Hz and shapes (n_samples, n, n_modes)."""
         if self.track:
-            return self._tracked(theta, self.n_solved)
+            return self._tracked(theta, self.first_candidates)
         eigenvalues, shapes = self.solver.modes(theta, self.n_lowest)
         return np.sqrt(eigenvalues[:, self.ranks]) / (2 * np.pi), shapes[:, :, self.ranks]
 
@@ -279,11 +265,10 @@ class AffineCore:
         order, spread = pair_modes(mac, self.nominal.repeated), self.nominal.mass_spread(theta, self.mass)
         frequencies = np.take_along_axis(np.sqrt(eigenvalues) / (2 * np.pi), order, axis=1)
         shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)
-        is_final = n_candidates >= self.first_candidates  # of the fewer of a basis, any may be assigned
-        doubtful = may_be_missed(mac, order, self.nominal.repeated, spread, is_final=is_final)
-        more = 2 * n_candidates if is_final else self.first_candidates
-        if n_candidates < self.max_candidates and doubtful.any():
-            frequencies[doubtful], shapes[doubtful] = self._tracked(theta[doubtful], min(more, self.max_candidates))
+        missed = may_be_missed(mac, order, self.nominal.repeated, spread)
+        if n_candidates < self.max_candidates and missed.any():
+            more = min(2 * n_candidates, self.max_candidates)
+            frequencies[missed], shapes[missed] = self._tracked(theta[missed], more)
         return frequencies, shapes
 
 
@@ -305,17 +290,9 @@ def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = No
 
 
 def may_be_missed(
-    mac: NDArray[np.float64],
-    order: NDArray[np.intp],
-    repeated: NDArray[np.bool_],
-    spread: ArrayLike = 1.0,
-    *,
-    is_final: bool = True,
+    mac: NDArray[np.float64], order: NDArray[np.intp], repeated: NDArray[np.bool_], spread: ArrayLike = 1.0
 ) -> NDArray[np.bool_]:
     """Samples in which a mode beyond the candidates could have a higher MAC with a reference than the one assigned.
-
-    If the assignment is not final, also samples in which it could be another one with more candidates: where some
-    reference is not assigned its best candidate.
 
     Modes are orthogonal, so the MACs of a reference with all modes add up to 1 (with repeated references, to their
     number). No mode beyond the candidates can have a higher MAC than what the candidates leave of that sum. Where the
@@ -325,8 +302,7 @@ def may_be_missed(
     spans = repeated @ mac
     assigned = np.take_along_axis(spans, order[:, :, np.newaxis], axis=2)[:, :, 0]
     left = np.multiply.outer(spread, repeated.sum(axis=1)) - spans.sum(axis=2)
-    least = left if is_final else np.maximum(left, spans.max(axis=2))
-    return (assigned < least).any(axis=1)
+    return (assigned < left).any(axis=1)
 
 
 def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -335,19 +311,18 @@ def repeated_modes(eigenvalues: NDArray[np.float64]) -> NDArray[np.bool_]:
     return cluster[:, np.newaxis] == cluster
 
 
-def eigen_solver(stiffness: AffineTerms, mass: AffineTerms) -> EigenSolver:
-    """Batches for dense terms, shift-invert for sparse ones."""
-    if isinstance(stiffness, DenseTerms) and isinstance(mass, DenseTerms):
-        return dense_solver(stiffness, mass, np.ones((1, stiffness.exponents.shape[1])))
-    if isinstance(stiffness, SparseTerms) and isinstance(mass, SparseTerms):
-        return ShiftInvertSolver(stiffness, mass)
-    raise TypeError("stiffness and mass must both be dense or both sparse")
-
-
 class DenseSolver(ABC):
     """A solver by LAPACK; at one theta the stiffness is factored when it is first needed."""
 
     _stiffness: DenseTerms
+
+    @abstractmethod
+    def eigenvalues(self, theta: Array, n_modes: int) -> Array:
+        """Lowest eigenvalues, (n_samples, n_modes)."""
+
+    @abstractmethod
+    def scaled(self, factors: Array) -> "DenseSolver":
+        """The solver of the same structure with its stiffness terms multiplied."""
 
     @abstractmethod
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
@@ -424,7 +399,19 @@ class FlexibilitySolver(DenseSolver):
         return inverse @ self._mass.assemble(theta) @ transposed, transposed, ones
 
 
-def dense_solver(stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = 1e6) -> EigenSolver:
+Solver: TypeAlias = DenseSolver | ShiftInvertSolver
+
+
+def eigen_solver(stiffness: AffineTerms, mass: AffineTerms) -> Solver:
+    """Batches for dense terms, shift-invert for sparse ones."""
+    if isinstance(stiffness, DenseTerms) and isinstance(mass, DenseTerms):
+        return dense_solver(stiffness, mass, np.ones((1, stiffness.exponents.shape[1])))
+    if isinstance(stiffness, SparseTerms) and isinstance(mass, SparseTerms):
+        return ShiftInvertSolver(stiffness, mass)
+    raise TypeError("stiffness and mass must both be dense or both sparse")
+
+
+def dense_solver(stiffness: DenseTerms, mass: DenseTerms, nominal: Array, widest: float = 1e6) -> DenseSolver:
     """The standard form, which is the fastest, where it is accurate enough; else the flexibility form.
 
     Up to the ``widest`` ratio of eigenvalues, the standard form gives the lowest one to 1e-9 of its value.

@@ -1,6 +1,6 @@
 """Sparse eigenproblems K phi = lambda M phi, one theta after the other, and checks for mechanisms and missing mass."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import scipy.sparse
@@ -11,74 +11,6 @@ from skthermo._core.arrays import Array, Label, Matrix, as_dense
 from skthermo.fem._factors import Solve, factorise
 from skthermo.fem._terms import SparseTerms
 
-
-def modes_near(
-    stiffness: scipy.sparse.csc_array,
-    solve: Solve,
-    mass: scipy.sparse.csc_array,
-    guesses: Array,
-    n_modes: int,
-    *,
-    tol: float,
-) -> tuple[Array, Array] | None:
-    """Eigenvalues in ascending order and shapes of unit modal mass, or None where few steps do not find them.
-
-    Rayleigh-Ritz of A = K^-1 M, in the inner product of M, on the guesses, two columns that a few steps of inverse
-    iteration make of random ones, and the images of all these by A. A mode that the guesses lack shows among the
-    others. A residual r of unit modal mass says that an eigenvalue of A lies within |r|, and bounds the error of a
-    converged one by |r|^2 over the distance to the next (Kato and Temple). The modes are found once this is below
-    ``tol`` for all that may be among the lowest.
-    """
-    if not np.isfinite(guesses).all():
-        return None
-    nothing = guesses[:, :0]
-    known = orthonormal(guesses, mass, nothing, nothing)
-    random = np.random.default_rng(0).standard_normal((len(guesses), 2))
-    for _ in range(3):  # towards the lowest modes beside those
-        random = solve(orthonormal(random, mass, *known)[1])
-    basis, weighted = (np.hstack(both) for both in zip(known, orthonormal(random, mass, *known), strict=True))
-    n_followed = basis.shape[1]
-    images, block = nothing, weighted
-    for _ in range(6):
-        if not block.shape[1] or basis.shape[1] < n_modes:
-            return None
-        images = np.hstack([images, solve(block)])
-        values, weights = np.linalg.eigh(weighted.T @ images)
-        values, weights = values[::-1][:n_followed], weights[:, ::-1][:, :n_followed]
-        vectors = images @ weights
-        residuals = vectors - basis @ (weights * values)
-        distances = np.sqrt(np.einsum("im,im->m", residuals, mass @ residuals))
-        if are_found(values, distances, n_modes, tol):
-            shapes = vectors[:, :n_modes]
-            shapes /= np.sqrt(np.einsum("im,im->m", shapes, mass @ shapes))
-            return np.einsum("im,im->m", shapes, stiffness @ shapes), shapes
-        added, block = orthonormal(images[:, -block.shape[1] :], mass, basis, weighted)
-        basis, weighted = np.hstack([basis, added]), np.hstack([weighted, block])
-    return None
-
-
-def are_found(values: Array, distances: Array, n_modes: int, tol: float) -> bool:
-    """Whether all eigenvalues that may be among the largest ``n_modes`` have converged to ``tol``."""
-    apart = np.abs(values / values[:, np.newaxis] - 1)
-    together = apart < 0.01  # relative distance of eigenvalues that are evaluated together
-    gaps = np.where(together, np.inf, apart).min(axis=1)
-    errors = together @ (distances / values) ** 2 / gaps
-    wanted = values + distances >= values[n_modes - 1]
-    return bool(values[n_modes - 1] > 0 and (errors[wanted] < tol).all())
-
-
-def orthonormal(columns: Array, mass: scipy.sparse.csc_array, basis: Array, weighted: Array) -> tuple[Array, Array]:
-    """Directions x of the columns with x' M x = 1, M-orthogonal to each other and to a basis, and M x."""
-    for _ in range(2):  # the second time against rounding
-        columns = columns - basis @ (weighted.T @ columns)
-    products = columns.T @ (mass @ columns)
-    scale = np.sqrt(np.maximum(products.diagonal(), np.finfo(float).tiny))
-    shares, directions = np.linalg.eigh(products / scale / scale[:, np.newaxis])
-    kept = shares > 1e-14  # share of modal mass below which a direction is rounding error
-    vectors = (columns / scale) @ (directions[:, kept] / np.sqrt(shares[kept]))
-    return vectors, mass @ vectors
-
-
 GUARD_VECTORS = 2  # eigenpairs computed beyond those wanted: repeated and clustered eigenvalues converge together
 
 
@@ -87,54 +19,34 @@ class ShiftInvertSolver:
 
     The start vector is random with a fixed seed: the same theta gives the same bits, and no mode of a symmetric
     structure is orthogonal to it.
-
-    A ``guide``, which gives shapes near a number of modes at many theta, (n_samples, n_dof, n_shapes), makes it faster:
-    from good shapes, eigenvalues are found to a relative error ``tol``. Rows that it does not help are solved as
-    without it.
     """
 
-    def __init__(
-        self,
-        stiffness: SparseTerms,
-        mass: SparseTerms,
-        guide: Callable[[Array, int], Array] | None = None,
-        tol: float = 0.0,
-    ):
+    def __init__(self, stiffness: SparseTerms, mass: SparseTerms):
         self._stiffness = stiffness
         self._mass = mass
-        self._guide = guide
-        self._tol = tol
         self._start = seeded_start(stiffness.n_dof)
-        self._factorise = stiffness.pattern.elimination.factorise
+        self._factorise = stiffness.pattern.factorise
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
-        return self._each(theta, n_modes, with_shapes=False)[0]
+        solved = (lowest_modes(*matrices, n_modes, self._start)[0] for matrices in self._matrices(theta))
+        return np.array(list(solved)).reshape(len(theta), n_modes)
 
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
-        return self._each(theta, n_modes, with_shapes=True)
+        eigenvalues, shapes = np.empty((len(theta), n_modes)), np.empty((len(theta), len(self._start), n_modes))
+        for row, matrices in enumerate(self._matrices(theta)):
+            eigenvalues[row], shapes[row] = lowest_modes(*matrices, n_modes, self._start)
+        return eigenvalues, shapes
 
     def scaled(self, factors: Array) -> "ShiftInvertSolver":
         return ShiftInvertSolver(self._stiffness.with_factors(self._stiffness.factors * factors), self._mass)
 
-    def _each(self, theta: Array, n_modes: int, *, with_shapes: bool) -> tuple[Array, Array]:
-        eigenvalues = np.full((len(theta), n_modes), np.nan)
-        shapes = np.full((len(theta) if with_shapes else 0, len(self._start), n_modes), np.nan)
-        guesses = None if self._guide is None else self._guide(theta, n_modes + 2 * GUARD_VECTORS)
-        pairs = zip(self._stiffness.each(theta), self._mass.each(theta), strict=True)
-        for row, (stiffness, mass) in enumerate(pairs):
-            solve, found = self._factorise(stiffness), None
-            if solve is not None and guesses is not None and guesses.shape[2] >= n_modes:
-                found = modes_near(stiffness, solve, mass, guesses[row], n_modes, tol=self._tol)
-            if found is None:
-                found = lowest_modes(stiffness, solve, mass, n_modes, self._start)
-            eigenvalues[row] = found[0]
-            if with_shapes:
-                shapes[row] = found[1]
-        return eigenvalues, shapes
+    def _matrices(self, theta: Array) -> Iterator[tuple[Matrix, Solve | None, Matrix]]:
+        """Stiffness, solves with it, and mass, row by row."""
+        for stiffness, mass in zip(self._stiffness.each(theta), self._mass.each(theta), strict=True):
+            yield stiffness, self._factorise(stiffness), mass
 
     def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
-        stiffness, mass = self._stiffness.assemble(theta)[0], self._mass.assemble(theta)[0]
-        solve = self._factorise(stiffness)
+        stiffness, solve, mass = next(self._matrices(theta))
         eigenvalues, shapes = lowest_modes(stiffness, solve, mass, n_modes, self._start)
         return eigenvalues, shapes, solve or (lambda columns: np.full_like(columns, np.nan))
 

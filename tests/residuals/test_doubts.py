@@ -1,0 +1,158 @@
+"""What the weather and the sensors of records leave in doubt, and searches of similar records, by brute force."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.distance import cdist
+from scipy.stats import multivariate_normal
+
+from skthermo.residuals.gaussian import Gaussian, check_invertible
+from skthermo.residuals.sensors import SensorRegression, filled_findings
+from skthermo.residuals.weather import (
+    NearestPlaces,
+    TrainingRange,
+    implausible,
+    mean_of_nearest,
+    nearest,
+    one_in_each_part,
+    unpredicted_findings,
+    unseen_weather,
+)
+from tests.gappy_rows import COVARIANCE, MEAN, records, with_gaps
+
+RANDOM = np.random.default_rng(0)
+PLACES, WANTED = RANDOM.normal(size=(60, 2)), RANDOM.normal(size=(25, 2))
+AIR = pd.DataFrame({"air": np.linspace(-10.0, 30.0, 100), "deck": 5.0})
+
+
+def kinds(findings):
+    return [one.kind for one in findings]
+
+
+def test_doubts_name_the_inputs_that_are_far_outside_the_range_and_no_others():
+    reach = TrainingRange.spanned(AIR, slice(None))
+    assert reach.excess([[40.0, np.nan]])[0, 0] == pytest.approx(10 / 40)
+    assert reach.doubts(AIR + [9.0, 0.2]) == []
+    (found,) = reach.doubts(AIR + [11.0, 0.0])
+    assert (found.kind, "'air'" in str(found), "'deck'" in str(found)) == ("other-weather", True, False)
+    assert "kelvin" in str(reach.doubts(AIR + 273.15)[0])
+
+
+def test_temperatures_that_no_weather_gives_are_named():
+    reach = TrainingRange.spanned(AIR, slice(None))
+    assert implausible(reach, AIR) == []
+    (found,) = implausible(reach, AIR.assign(deck=-999.0))
+    assert (found.kind, "'deck'" in str(found), "'air'" in str(found)) == ("doubtful-values", True, False)
+
+
+def test_a_fold_in_weather_of_its_own_is_named():
+    halves, mixed = np.repeat([0, 1], 50), np.arange(100) % 2
+    (found,) = unseen_weather(AIR, halves, "Errors are too large")
+    assert (found.kind, "'air'" in str(found), "'deck'" in str(found)) == ("other-weather", True, False)
+    assert unseen_weather(AIR, mixed, "") == []
+    assert unseen_weather(AIR[40:60], np.repeat([0, 1], 50)[40:60], "") != []  # all ten records of a fold
+    assert unseen_weather(AIR[42:58], np.repeat([0, 1], 50)[42:58], "") == []  # eight are too few
+
+
+def test_rows_without_a_prediction_have_their_causes():
+    weather = np.array([[np.nan, np.nan], [1.0, np.nan], [1.0, 2.0]])
+    for unknown, parts in (([0], ["without any"]), ([1], ["with lags"]), ([0, 1], ["without any", "with lags"])):
+        (found,) = unpredicted_findings(np.isin(np.arange(3), unknown), weather)
+        assert found.kind == "not-evaluated"
+        assert [part for part in ("without any", "with lags") if part in str(found)] == parts
+    assert unpredicted_findings(np.zeros(3, dtype=bool), weather) == []
+
+
+def test_the_nearest_places_are_those_of_sorted_distances():
+    apart = cdist(WANTED, PLACES)
+    expected = np.argsort(apart, axis=1)[:, :7]
+    distances, near = nearest(PLACES, WANTED, 7)
+    np.testing.assert_array_equal(near, expected)
+    np.testing.assert_allclose(distances, np.sort(apart, axis=1)[:, :7])
+    found = NearestPlaces(PLACES, 7).nearest(WANTED)
+    np.testing.assert_allclose(found[0], distances.mean(axis=1))
+    np.testing.assert_array_equal(found[1], expected)
+    assert nearest(PLACES, WANTED[:0], 7)[0].shape == (0, 7)
+    assert nearest(PLACES, WANTED, 100)[1].shape == (25, 60)
+
+
+def test_means_of_the_nearest_places_count_those_where_a_column_is_used():
+    values = RANDOM.normal(size=(60, 3))
+    used = RANDOM.random((60, 3)) < [1.0, 0.6, 0.05]
+    found = mean_of_nearest(PLACES, values, used, WANTED, 5)
+    for column in range(3):
+        own, expected = used[:, column], []
+        for distances in cdist(WANTED, PLACES[own]):
+            expected.append(values[own, column][np.argsort(distances)[:5]].mean())
+        np.testing.assert_allclose(found[:, column], expected)
+    assert np.isnan(mean_of_nearest(PLACES[:0], values[:0], used[:0], WANTED, 5)).all()
+
+
+@pytest.mark.parametrize("most", [7, 100, 1000])
+def test_of_many_records_one_in_each_part_is_chosen(most):
+    chosen = one_in_each_part(100, most)
+    assert len(chosen) == min(most, 100)
+    np.testing.assert_array_equal(chosen * len(chosen) // 100, np.arange(len(chosen)))
+
+
+def sensors_of(n_rows=400):
+    air = RANDOM.normal(10, 8, n_rows)
+    columns = {"air": air, "girder": 0.8 * air + RANDOM.normal(2, 1, n_rows), "cable": RANDOM.normal(0, 2, n_rows)}
+    return pd.DataFrame(columns)
+
+
+def test_errors_of_filled_values_move_predictions_by_their_deviation():
+    T = sensors_of()
+    sensors, gappy = SensorRegression.fitted(T), T[:30].copy()
+    gappy.loc[::3, "girder"], gappy.loc[0] = np.nan, [np.nan, np.nan, 1.0]
+    filled, deviations = sensors.fill(gappy)
+    filled = pd.DataFrame(filled, columns=T.columns)
+    slopes = np.array([[0.5, -2.0, 1.0]])
+    found = sensors.variances_of_fills(gappy, filled, lambda X: np.asarray(X) @ slopes.T, lambda moved: moved)
+    (covariance,) = [sensors.gaussian.covariance]
+    single = np.flatnonzero(gappy["girder"].isna() & gappy["air"].notna())
+    np.testing.assert_allclose(found[single, 0], (2.0 * deviations[single, 1]) ** 2)
+    known, lost = [2], [0, 1]
+    rest = (
+        covariance[np.ix_(lost, lost)]
+        - np.outer(covariance[lost, known[0]], covariance[lost, known[0]]) / (covariance[2, 2])
+    )
+    assert found[0, 0] == pytest.approx(slopes[0, lost] @ rest @ slopes[0, lost])
+    assert not found[gappy.notna().all(axis=1)].any()
+    assert not sensors.variances_of_fills(T[:5], T[:5], lambda X: np.asarray(X), lambda moved: moved).any()
+    (finding,) = filled_findings(deviations, T.columns, "Errors grow")
+    assert (finding.kind, "'cable'" in str(finding)) == ("faulty-sensor", False)
+    assert filled_findings(0 * deviations, T.columns, "") == []
+
+
+def test_densities_of_gappy_rows_are_those_of_the_modes_that_are_there():
+    rows, normal = with_gaps(records(50)), Gaussian(MEAN, COVARIANCE)
+    expected = np.zeros(50)
+    for place, row in enumerate(rows):
+        there = ~np.isnan(row)
+        if there.any():
+            expected[place] = multivariate_normal.logpdf(row[there], MEAN[there], COVARIANCE[np.ix_(there, there)])
+    np.testing.assert_allclose(normal.log_densities(rows), expected, atol=1e-9)
+
+
+def test_the_distribution_without_some_rows_is_that_of_the_others():
+    rows = records(80)
+    found, expected = Gaussian.fitted(rows).without(rows[:20], 80), Gaussian.fitted(rows[20:])
+    np.testing.assert_allclose(found.mean, expected.mean)
+    np.testing.assert_allclose(found.covariance, expected.covariance)
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda rows: rows * [1, 1, 0] + [0, 0, 5], "'c'] are constant"),
+        (lambda rows: np.column_stack([rows[:, :2], rows[:, 0] - rows[:, 1]]), "copies or combinations"),
+        (lambda rows: rows[:3], "3 baseline rows and 3 modes"),
+    ],
+)
+def test_modes_that_leave_no_inverse_are_named(change, named):
+    rows = change(records(80))
+    normal = Gaussian.fitted(rows)
+    with pytest.raises(ValueError, match="singular") as error:
+        check_invertible(normal, len(rows), has_gaps=False, names=list("abc"))
+    assert named in str(error.value)
