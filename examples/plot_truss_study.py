@@ -219,7 +219,8 @@ print_table(
     (100 * pd.DataFrame(smallest_losses)).round(1).rename_axis("group").to_string(),
     "inf: not even the whole loss would be found.",
 )
-StructureDisplay.from_estimator(detector, truss_structure()).ax_.set_title("Smallest loss of stiffness of a group")
+display = StructureDisplay.from_estimator(detector, truss_structure())
+display.ax_.set_title("Smallest loss of stiffness of a group (grey: none is found)")
 
 # %%
 # The vertical members are grey: not even their whole loss would be seen in these six frequencies.

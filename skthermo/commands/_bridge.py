@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import re
+import shutil
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -197,7 +198,7 @@ class Bridge:
                     self.lines.append(f"{counted(monitor.keep_acknowledgements(file), 'acknowledgement')} kept")
                 except ValueError as error:
                     self.lines.append(f"no acknowledgement of the former monitor kept: {error}")
-                file.replace(file.with_name(f"{file.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{file.suffix}"))
+                shutil.copy2(file, file.with_name(f"{file.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{file.suffix}"))
             monitor.save(file)
             fitted = datetime.now(UTC).isoformat(timespec="seconds")
             Taken(self.taken_file, layouts, {}, fitted, settings.of_a_fit).write()
@@ -341,8 +342,8 @@ class Bridge:
         self.records |= {"revised": len(evaluated) - len(new), "ahead": ahead, "reasons": reasons}
         self.records |= {name.removeprefix("n_"): counts[name] for name in COUNTS}
         doubt = "records are stamped too far ahead" if n_ahead > 0 else ""
-        if not (doubt or states["healthy"] or states["watch"]):
-            doubt = "no new record could be evaluated"
+        if not doubt and is_unknown.all():
+            doubt = "no new record could be evaluated" if len(new) else "no new record has come"
         self.describe(monitor, doubt, bool((evaluated["state"] == "alarm").any()))
         is_usual = len(new) == len(evaluated) and not (n_ahead or any(counts[name] for name in COUNTS))
         return is_usual and self.state == Taken.read(self.taken_file).state
@@ -608,7 +609,7 @@ def check_layout(table: pd.DataFrame, file: Path, records: RecordSettings, layou
     """Raise an error if a file has not the columns of a file of the baseline, or all columns."""
     known = [records.columns, *layouts]
     if not any(set(table) == set(layout) for layout in known):
-        nearest = max(known, key=lambda layout: len(set(layout) & set(table)))
+        nearest = min(known, key=lambda layout: len(set(layout) ^ set(table)))
         lacking = [name for name in nearest if name not in table]
         raise ValueError(f"{file} lacks the columns {lacking}; expected {nearest}, in any order, as in the baseline")
 

@@ -34,7 +34,7 @@ def write_demo(folder: Path, now: pd.Timestamp) -> list[str]:
         f"{at['T.csv']}, {at['F.csv']}: temperatures and frequencies of a girder bridge, a healthy year",
         f"{at['new.csv']}: the 30 days after it, healthy",
         f"{at['damaged.csv']}: the last day, in which the first span has lost 10 % of its stiffness",
-        f"next: skthermo init {at['T.csv']} {at['F.csv']} --into {folder / 'bridge'}",
+        f"next: skthermo init {at['T.csv']} {at['F.csv']} --into river",
     ]
 
 

@@ -11,9 +11,11 @@ import inspect
 import json
 import re
 import runpy
+import sys
 import tomllib
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
@@ -259,10 +261,42 @@ def _made_by(path: Path, setting: str, what: str) -> Any:
         raise ValueError(
             f"{setting} is {str(path)!r}; expected a Python file and its function, such as 'bridge.py:make'"
         )
-    names = runpy.run_path(file, run_name=Path(file).stem)
-    if not callable(names.get(function)):
-        raise ValueError(f"{setting}: {file} has no function {function!r}; expected one that gives {what}")
-    return names[function]()
+    try:
+        with imports_from(Path(file).resolve().parent):
+            names = runpy.run_path(file, run_name=Path(file).stem)
+            if callable(names.get(function)):
+                return names[function]()
+    except Exception as error:  # code of users may raise anything
+        raise ValueError(f"{setting}: {_place_of(error, Path(file))}: {type(error).__name__}: {error}") from error
+    raise ValueError(f"{setting}: {file} has no function {function!r}; expected one that gives {what}")
+
+
+@contextmanager
+def imports_from(folder: Path) -> Iterator[None]:
+    """Files of a folder can be imported, as when Python runs a script in it; another bridge may have files with the
+    same names."""
+    before = set(sys.modules)
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        for name in set(sys.modules) - before:
+            if Path(getattr(sys.modules[name], "__file__", None) or "").parent == folder:
+                del sys.modules[name]
+
+
+def _place_of(error: BaseException, file: Path) -> str:
+    """File and line of an error in a Python file, or in one beside it: the last line there that was run."""
+    folder, own, cause = file.resolve().parent, [], error
+    while cause is not None:
+        steps = traceback.extract_tb(cause.__traceback__)
+        own += [(step.filename, step.lineno) for step in steps if Path(step.filename).resolve().parent == folder]
+        cause = cause.__cause__
+    if isinstance(error, SyntaxError):
+        own.append((error.filename, error.lineno))
+    name, line = own[-1] if own else (str(file), None)
+    return f"{name}, line {line}" if line else name
 
 
 class SettingError(ValueError):

@@ -518,8 +518,8 @@ class EventLevels:
         months = sorted({*range(1, 13)} - {*known.index.month})
         missing = ", ".join(pd.Timestamp(2001, month, 1).month_name() for month in months)
         method = (
-            f"from {counted_number(len(peaks), 'peak')} of the damage index in {counted_number(n_years, 'year', 2)} of "
-            "baseline" + (", extrapolated" if asked < 0.4 else "")
+            f"set by the highest of {len(peaks)} rises of the damage index in {counted_number(n_years, 'year', 2)} of "
+            "healthy baseline" + (", extrapolated" if asked < 0.4 else "")
         )
         estimate = FalseAlarmEstimate(per_year, int(fewest), int(most), n_years, missing, method)
         return cls(threshold, min(float(release), threshold), peaks, estimate)
@@ -653,7 +653,7 @@ class SmallestChanges:
             parts.append(f"a loss of stiffness {groups}")
         if not parts:
             return "no fall of the responses raises an alarm"
-        text = f"{', or '.join(parts)} raises an alarm within {duration_text(self.within)}"
+        text = f"{', or '.join(parts)} raises an alarm within {duration_text(self.within)} in half of the cases"
         return text.replace("\N{NO-BREAK SPACE}", " ")
 
 

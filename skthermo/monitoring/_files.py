@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import pickle
 import zlib
 from importlib import import_module
 from pathlib import Path
@@ -154,7 +155,13 @@ def _listed(numbers: dict[str, str]) -> str:
 def _by_joblib(monitor: Any) -> bytes:
     """A compressed file of joblib, which ends with a checksum."""
     stream = io.BytesIO()
-    joblib.dump(monitor, stream)
+    try:
+        joblib.dump(monitor, stream)
+    except pickle.PicklingError as error:
+        raise ValueError(
+            f"the monitor cannot be saved: {error}; expected a model from matrices, or functions of a module that is "
+            "installed, not of a file that was run"
+        ) from error
     compressor = zlib.compressobj(level=1, strategy=zlib.Z_RLE)  # the fastest, which adds a checksum
     return compressor.compress(stream.getbuffer()) + compressor.flush()
 

@@ -68,6 +68,7 @@ from skthermo.monitoring._records import (
     Intake,
     Lookback,
     read_records,
+    refuse_other_units,
     usable_baseline,
     without_what_cannot_be,
     without_wrong_clocks,
@@ -687,7 +688,8 @@ class Monitor(SavesFrames, Estimator):
         ------
         ValueError
             If the records are no frame on a ``DatetimeIndex`` with the columns and the time zone of the baseline; if a
-            known stamp comes with other values. The monitor then stays as it was.
+            known stamp comes with other values; if all temperatures are in degrees Fahrenheit, kelvin or tenths of a
+            degree. The monitor then stays as it was.
 
         Warns
         -----
@@ -700,6 +702,7 @@ class Monitor(SavesFrames, Estimator):
             *(self._read(new), self.baseline_, self.records_, self.ahead_, max_delay),
             are_confirmed=check_flag(confirm, "confirm"),
         )
+        refuse_other_units(intake.fresh.drop(columns=self.targets_), self.baseline_.drop(columns=self.targets_))
         after, fresh = self._twin(), intake.fresh.index
         numbers = intake.n_repeated, int((fresh < self.last_).sum()), len(intake.too_late)
         after.tallies_ = {name: self.tallies_[name] + n for name, n in zip(self.tallies_, numbers, strict=True)}

@@ -78,6 +78,33 @@ def without_wrong_clocks(X: pd.DataFrame, records: pd.DataFrame) -> tuple[pd.Dat
     return records[~records.index.isin(wrong)], [RecordsWarning(text, "wrong-stamps")]
 
 
+def refuse_other_units(new: pd.DataFrame, baseline: pd.DataFrame, far: float = 10.0, fewest: int = 12) -> None:
+    """Raise an error for temperatures that are in another unit than the baseline's.
+
+    In most records all of them are ``far`` degrees warmer or colder than the baseline ever was in that season, and
+    within it as in the other unit. Of a single thermometer, a few records may be its fault.
+    """
+    known = new.columns[new.notna().any()]
+    if not len(known) or new[known].count().sum() < (fewest if len(known) == 1 else 1):
+        return
+    new, baseline = new[known], baseline[known]
+    units = {"degrees Celsius": (1.0, 0.0), "degrees Fahrenheit": (1.8, 32.0), "kelvin": (1.0, 273.15)}
+    units["tenths of a degree"] = (10.0, 0.0)
+    excesses: dict[str, list[pd.DataFrame]] = {name: [] for name in units}
+    for month, rows in new.groupby(new.index.month):
+        season = baseline[np.isin((baseline.index.month - month) % 12, [11, 0, 1])]
+        for name, (factor, zero) in units.items():
+            values = (rows - zero) / factor
+            excesses[name].append(np.maximum(season.min() - values, values - season.max()))
+    beyond = {name: pd.concat(parts).median() for name, parts in excesses.items()}
+    for name in units:
+        if (beyond["degrees Celsius"] > far).all() and (beyond[name] <= 0).all():
+            raise ValueError(
+                f"the temperatures {list(known)} of {counted(len(new), 'record')} are far from those of this season in "
+                f"the baseline, and within them as in {name}; expected degrees Celsius, as in the baseline"
+            )
+
+
 @dataclass(frozen=True)
 class Intake:
     """What a batch brings: ``fresh`` records to evaluate, and others with the reasons why they are not evaluated.

@@ -272,7 +272,7 @@ def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
     events, drift, aside = monitor.events_, monitor.drift_, monitor.set_aside_
     yield str(replace(status_of(monitor), events=()))
     yield f"expected: {monitor.false_alarm_estimate_}"
-    yield f"smallest change: {monitor.smallest_changes_} in weather of the baseline"
+    yield f"smallest change: {monitor.smallest_changes_}, in weather of the baseline"
     if len(aside):
         n_values = counted(int(aside["n_rows"].sum()), "value")
         yield f"baseline: {n_values} set aside: {'; '.join(aside['detail'].head(3))}"
@@ -281,10 +281,14 @@ def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
         harmless = "harmless" if event["harmless"] else "not harmless"
         said = f"acknowledged as {harmless}" if event["acknowledged"] else "not acknowledged"
         times = f"{event['n_times']} times" if event["n_times"] > 1 else ""
-        parts = [times, f"peak {event['peak']:.4g} on {event['peak_time']}", event["modes"], event["groups"], said]
+        kind, peak = event["kind"], event["peak"]
+        level = f"mean of 30 days up to {peak:.3g} times its limit" if kind == "drift" else f"index up to {peak:.4g}"
+        highest = "" if kind == "fault" else f"{level} on {event['peak_time']}"
+        parts = [times, highest, event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""
         yield f"event {number}: {event['kind']} from {event['start']} {until}, {', '.join(filter(None, parts))}{note}"
-    yield f"events: {len(events)}, {events['end'].isna().sum()} of them open" if len(events) else "events: none"
+    before = f"; those before the last {most} are on the page and in events_" if len(events) > most else ""
+    yield f"events: {len(events)}, {events['end'].isna().sum()} of them open{before}" if len(events) else "events: none"
     for group, one in () if drift is None else drift[drift["significant"]].iterrows():
         beyond = ", beyond the limit" if one["beyond_limit"] else ""
         yield f"drift: {group} {one['change']:+.1%} so far, {one['per_year']:+.2%} a year{beyond}"

@@ -579,6 +579,8 @@ class DamageIndexDisplay(Display):
             one.set_title(shared.shortened(title))
             one.set_ylim(bottom=0)
             hold_outliers(one, keep=(0.0, highest))
+            if [text.get_gid() for text in one.texts] == ["not evaluated"]:  # it stands above the points
+                one.set_ylim(top=1.2 * one.get_ylim()[1])
             if not is_own_figure or number % n_columns == 0:
                 one.set_ylabel(shared.plain(self.label if height > 3 else self.label.replace(" (", "\n(")))
             if not is_own_figure or number >= len(titles) - n_columns:

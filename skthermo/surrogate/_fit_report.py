@@ -328,8 +328,9 @@ def doubts_of_modes(modes: pd.DataFrame, unexplained_offset: float) -> Iterator[
         yield ModelWarning(
             f"the model is not calibrated to these records: {', and '.join(reasons)} (see report_.modes). Simulated "
             "damage moves the modes too much or too little, so that detection rates and severities are wrong by more "
-            "than their noise. Give Hz and the modes of the model in their order, update the model (ModelUpdater), and "
-            "give studies models=updater.sample_models(20) or uncertainty=(..., 'model')",
+            "than their noise. Give Hz, mass and stiffness of the model in kg and N/m, and its modes in their order; "
+            "update the model (ModelUpdater), and give studies models=updater.sample_models(20) or "
+            "uncertainty=(..., 'model')",
             "uncalibrated-model",
         )
     if "round trip" in modes:

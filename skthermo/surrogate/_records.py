@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
@@ -133,32 +134,39 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
 
 
 def doubts_of_order(
-    model: FEModel, F: Table, *, large: float = 15.0, small: float = 5.0, better: float = 0.25
+    model: FEModel, F: Table, *, large: float = 15.0, small: float = 5.0, least: float = 2.0, better: float = 0.25
 ) -> list[RecordsWarning]:
     """The finding that modes look like others of the model.
 
     Modes count as swapped if another order reduces the squared offsets to a share of ``better``, all below ``large``
-    percent; a mode within ``small`` percent is not taken for another one.
+    percent: modes of other columns, each farther than ``least`` percent from its own, where a factor common to all
+    modes does not count; or modes without a column, if those of a column are farther than ``small`` percent from it.
     """
     nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
-    offsets, names = 100 * (np.nanmean(as_floats(F), axis=0) / nominal - 1), column_names(F, "f")
+    measured, names, own = np.nanmean(as_floats(F), axis=0), column_names(F, "f"), np.arange(len(nominal))
     if len(nominal) < 2:
         return []
+    logs, offsets = 100 * np.log(measured[:, np.newaxis] / nominal), 100 * (measured / nominal - 1)
+    exchanged: NDArray[np.intp] = linear_sum_assignment(logs**2)[1]
+    before, after = (logs[own, order] - logs[own, order].mean() for order in (own, exchanged))
+    exchanged = own if np.abs(before[exchanged != own]).min(initial=np.inf) < least else exchanged
     table, near = match_modes(model, as_floats(F)), np.abs(offsets) < small
-    order = np.where(near, np.arange(len(nominal)), table["mode"])
-    best = np.where(near, offsets, table["offset"])
-    moved = np.flatnonzero(order != np.arange(len(nominal)))
-    is_better = (best**2).sum() < better * (offsets**2).sum() and np.abs(best).max() < large
-    if not len(moved) or not is_better or len(np.unique(order)) < len(order):
-        return []
-    return [
-        RecordsWarning(
-            f"the frequencies {[names[place] for place in moved]} look like other modes of the model. They would be "
-            "learned as those of their columns. Order them as the model does, or use "
-            f"model.with_modes({order.tolist()})",
-            "mode-order",
-        )
-    ]
+    others = np.where(near, own, table["mode"])
+    for order, given, best in (
+        (exchanged, before, after),
+        (others, offsets, np.where(near, offsets, table["offset"])),
+    ):
+        is_better = (best**2).sum() < better * (given**2).sum() and np.abs(best).max() < large
+        if is_better and (order != own).any() and len(np.unique(order)) == len(order):
+            return [
+                RecordsWarning(
+                    f"the frequencies {[names[place] for place in np.flatnonzero(order != own)]} look like other modes "
+                    "of the model. They would be learned as those of their columns. Order them as the model does, or "
+                    f"use model.with_modes({order.tolist()}); match_modes compares frequencies and shapes",
+                    "mode-order",
+                )
+            ]
+    return []
 
 
 def measurement_noise(mapper: BaseEstimator, T: Table, F: Table, *, most: int = 3000) -> Array:

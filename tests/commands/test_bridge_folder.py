@@ -2,12 +2,14 @@
 
 import json
 import os
+import pickle
 import shutil
 import subprocess
 import sys
 from importlib.resources import files
 from itertools import pairwise
 
+import joblib
 import pandas as pd
 import pytest
 
@@ -103,6 +105,15 @@ def test_temperatures_wait_for_frequencies_of_the_same_time(bridge, records):
     pd.testing.assert_frame_equal(
         load_monitor(bridge / "monitor.joblib").records_, records[FIRST : FIRST + 8], check_freq=False
     )
+
+
+def test_a_file_without_one_of_its_columns_lacks_that_one_alone(bridge, records):
+    night = records[FIRST : FIRST + 3]
+    night.filter(regex="^T").to_csv(bridge / "new" / "T.csv", index_label="time")
+    night[["f1", "f2", "f4", "f5", "f6"]].to_csv(bridge / "new" / "f.csv", index_label="time")
+    done = run("update", bridge, "--now", str(night.index[-1]), "--json")
+    (error,) = done.json["bridges"][0]["errors"]
+    assert (done.code, "lacks the columns ['f3'];" in error) == (FAILED, True)
 
 
 def test_a_wrong_file_keeps_no_other_out_and_is_named_until_it_is_mended(bridge, records):
@@ -202,6 +213,18 @@ def test_a_monitor_is_not_replaced_by_chance_and_the_old_one_is_kept(bridge, rec
     assert_same_history(load_monitor(bridge / "monitor.joblib"), seen)
     lines = [json.loads(line) for line in (bridge / "transitions.jsonl").read_text().splitlines()]
     assert len({one["fitted"] for one in lines}) in (1, 2)  # the second fit may be of the same second
+
+
+def test_a_fit_that_cannot_be_saved_leaves_the_monitor(bridge, monkeypatch):
+    before = (bridge / "monitor.joblib").read_bytes()
+
+    def write(monitor, stream):
+        raise pickle.PicklingError("Can't pickle a function")
+
+    monkeypatch.setattr(joblib, "dump", write)
+    failed = run("fit", bridge, "--replace")
+    assert (failed.code, "cannot be saved" in failed.err, "Traceback" in failed.err) == (FAILED, True, False)
+    assert (bridge / "monitor.joblib").read_bytes() == before
 
 
 def test_a_monitor_of_another_version_is_refused_by_name(bridge, records):
@@ -383,6 +406,27 @@ def test_an_fe_model_of_a_python_file_follows_drift_and_is_drawn(bridge, records
     edit(settings(bridge), "make_model", "make_modl")
     failed = run("fit", settings(bridge), "--replace")
     assert (failed.code, "make_modl" in failed.err) == (FAILED, True)
+
+
+def test_a_python_file_imports_those_beside_it_and_its_errors_have_a_line(bridge, tmp_path, monkeypatch):
+    drawn = []
+
+    def page(subject, path, *, structure=None, **options):
+        drawn.append(structure)
+        return path
+
+    monkeypatch.setattr(skthermo.reporting, "owner_report", page)
+    other = shutil.copytree(bridge, tmp_path / "other")
+    for number, folder in enumerate((bridge, other)):
+        (folder / "parts.py").write_text(f"SPANS = {number}\n")
+        (folder / "model.py").write_text("from parts import SPANS\n\n\ndef make_structure():\n    return SPANS\n")
+        text = settings(folder).read_text().replace("# [page]", "[page]").replace("# structure = ", "structure = ")
+        settings(folder).write_text(text)
+    run("report", bridge, other)
+    assert drawn == [0, 1]
+    (bridge / "parts.py").write_text("\nSPANS = {}['main']\n")
+    failed = run("report", bridge)
+    assert (failed.code, "parts.py, line 2: KeyError" in failed.err) == (FAILED, True)
 
 
 def test_the_page_is_written_from_the_templates_that_the_settings_name(bridge, monkeypatch):

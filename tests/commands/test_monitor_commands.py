@@ -125,6 +125,16 @@ def test_status_and_acknowledge(bridge):
     assert "event is 7; expected the number of one of the 1 events" in wrong.err
 
 
+def test_known_damage_is_a_state_of_records_that_were_evaluated(bridge, records):
+    bridge("acknowledge", 1, "--damage", state="alarm")
+    new = records[DAMAGED + 10 : DAMAGED + 14].copy()
+    new.iloc[-1] = np.nan
+    done = bridge("update", state="alarm", new=new)
+    monitor = load_monitor(done.file)
+    assert (done.code, monitor.status(monitor.last_).state) == (HEALTHY, "known damage")
+    assert f"state: known damage (newest record {monitor.last_})" in done.out
+
+
 def test_other_forms_of_files(bridge, records, tmp_path):
     new = records[FIRST + 10 : FIRST + 12]
     form = {"sep": ";", "decimal": ",", "date_format": "%d.%m.%Y %H:%M"}

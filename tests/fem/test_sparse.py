@@ -96,6 +96,12 @@ def test_large_indefinite_matrices_are_refused():
         AffineModel({("k",): chain(300) - 0.1 * scipy.sparse.eye_array(300)}, scipy.sparse.eye_array(300))
     with pytest.raises(ValueError, match="mass has a negative eigenvalue"):
         AffineModel({("k",): chain(300)}, chain(300) - 0.1 * scipy.sparse.eye_array(300))
+    for mass in (
+        scipy.sparse.diags_array(1.0 - 2.0 * (np.arange(300) == 7)),
+        np.diag(1.0 - 2.0 * (np.arange(300) == 7)),
+    ):
+        with pytest.raises(ValueError, match="negative at degree of freedom 7;"):
+            AffineModel({("k",): chain(300)}, mass)
     hidden = scipy.sparse.diags_array(np.arange(300) < 9, dtype=float).tolil()
     hidden[200, 201] = hidden[201, 200] = 0.1
     with pytest.raises(ValueError, match="mass has a negative eigenvalue"):

@@ -140,6 +140,31 @@ def test_where_most_thermometers_depart_none_is_left_out(monitor, records, moved
     assert served.corrected_.equals(faulty.loc[served.records_.index])
 
 
+@pytest.mark.parametrize("unit", ["degrees Fahrenheit", "kelvin"])
+def test_temperatures_in_another_unit_than_the_baselines_are_refused(monitor, records, unit):
+    twin, new, thermometers = copy.deepcopy(monitor), records[N_BASELINE * PER_DAY :], ["T0", "T1", "T2"]
+    wrong = new.copy()
+    wrong[thermometers] = 1.8 * new[thermometers] + 32 if unit == "degrees Fahrenheit" else new[thermometers] + 273.15
+    for batch in (wrong, wrong[:1]):
+        with pytest.raises(ValueError, match=f"as in {unit}"):
+            twin.update(batch)
+    assert len(twin.records_) == 0
+    twin.update(new)
+    assert twin.last_ == new.index[-1]
+
+
+def test_heat_and_a_thermometer_at_fault_are_no_other_unit(monitor, records):
+    hot, faulty = records[N_BASELINE * PER_DAY :].copy(), records[N_BASELINE * PER_DAY :].copy()
+    hot[["T0", "T1", "T2"]] += 9.0
+    faulty["T1"] = 1.8 * faulty["T1"] + 32
+    for batch in (hot, faulty):
+        twin = copy.deepcopy(monitor)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            twin.update(batch)
+        assert twin.last_ == batch.index[-1]
+
+
 def test_of_two_thermometers_that_contradict_each_other_both_stay(monitor, records):
     """It is not known which is wrong: of two, or of two that are left."""
     two, left = bridge(2), records.copy()

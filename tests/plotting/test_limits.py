@@ -63,6 +63,10 @@ def test_records_without_an_index_are_grey_ticks_with_their_number(index):
     (ticks,) = (line for line in display.ax_.lines if line.get_gid() == "not evaluated")
     np.testing.assert_array_equal(ticks.get_xdata(), index.index[[3, 4, 5, 300]])
     assert ticks.get_color() == "#555555"
+    for ax in display.axes_:  # no point lies behind the number
+        (number,) = ax.texts
+        below = number.get_window_extent().y0
+        assert ax.transData.transform((0, index.max()))[1] < below
     assert texts(DamageIndexDisplay.from_predictions(index * np.nan, THRESHOLD).ax_) == ["365 not evaluated"]
 
 

@@ -8,7 +8,7 @@ from tests.reporting.monitors import FakeMonitor, event_row
 
 
 def test_days_without_an_evaluated_record_are_ticks_and_counted():
-    monitor = FakeMonitor(freq="12h", n_days=80, n_not_evaluated=6)
+    monitor = FakeMonitor(n_days=80, n_not_evaluated=3)
     monitor.days_ = monitor.days_.drop(monitor.days_.index[10:14])  # four days without any record
     display = DamageIndexDisplay.from_estimator(monitor)
     (ticks,) = [line for line in display.ax_.lines if line.get_gid() == "not evaluated"]
@@ -32,7 +32,7 @@ def test_records_in_alarm_have_a_colour_and_a_marker_of_their_own():
 
 
 def test_a_new_threshold_is_a_step_at_its_first_record():
-    monitor = FakeMonitor(freq="12h", n_days=60)
+    monitor = FakeMonitor(n_days=60)
     monitor.evaluations_.loc[monitor.evaluations_.index[31:], "threshold"] = 5.0
     for by in ("day", "record"):
         (line,) = DamageIndexDisplay.from_estimator(monitor, by=by).threshold_lines_

@@ -156,6 +156,16 @@ class TestUnits:
         assert only(check_records(None, F.assign(f2=factor * F["f2"]), model=model))[:2] == ("wrong-unit", "f2")
         assert check_records(None, factor * F).table.empty
 
+    @pytest.mark.parametrize("factor", [np.sqrt(1000.0), np.sqrt(1e-3)])
+    def test_a_model_whose_mass_is_in_another_unit(self, factor):
+        found = check_records(None, factor * F, model=make_truss()).table
+        assert (found["what"].tolist(), found["severity"].tolist()) == (["wrong-unit"], ["doubtful"])
+
+    def test_frequencies_of_no_structure_are_doubtful(self):
+        found = check_records(T, 1000 * F)
+        assert (found.table["what"].tolist(), found.table["severity"].tolist()) == (["wrong-unit"], ["doubtful"])
+        assert check_records(T, 1000 * F, unit="kN").table.empty
+
     def test_periods_and_modes_too_few(self):
         assert kinds(check_records(None, 1 / F, model=make_truss())) == {"wrong-unit"}
         assert kinds(check_records(None, F.iloc[:, 1:], model=make_truss())) == {"mode-order"}

@@ -13,7 +13,7 @@ from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
-from skthermo.datasets import load_z24, make_truss, make_truss_campaign, make_z24
+from skthermo.datasets import load_z24, make_kw51, make_kw51_campaign, make_truss, make_truss_campaign, make_z24
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner, KNNGapImputer, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
@@ -185,6 +185,33 @@ class TestWarningsOfFit:
         (text,) = (str(one.message) for one in said if one.message.kind == "mode-order")
         assert "['f0', 'f1'] look like other modes" in text
         assert "with_modes([1, 0, 2, 3])" in text
+
+    @pytest.mark.filterwarnings("ignore:.*(mode-order|uncalibrated-model|outside-bounds|poor-fit)")
+    @pytest.mark.parametrize(
+        ("offsets", "order", "is_named"),
+        [
+            ([1.02, 1.01, 1.02, 1.023], [0, 1, 3, 2], True),  # 7 % apart
+            ([0.95, 0.94, 0.95, 0.93], [0, 1, 3, 2], True),  # of a model that is too stiff
+            ([1.0, 1.0, 1.03, 0.97], [0, 1, 3, 2], False),  # either order leaves an offset
+            ([1.02, 1.01, 1.02, 1.023], [0, 1, 2, 3], False),
+        ],
+    )
+    def test_close_modes_of_a_model_in_another_order_are_named(self, offsets, order, is_named):
+        z24 = make_z24()
+        air = T["T1"].to_frame()
+        measured = (1 - 0.0005 * (air - air.mean())).to_numpy() * (z24.frequencies(np.ones(4))[0] * offsets)
+        F = pd.DataFrame(measured, T.index).add_prefix("f")
+        fem = DataInformedFEM(z24.with_modes(order), mapper=TemperatureMapper(Ridge())).fit(air, F)
+        texts = [str(doubt) for doubt in fem.report_.doubts if doubt.kind == "mode-order"]
+        assert bool(texts) == is_named
+        assert not is_named or "with_modes([0, 1, 3, 2])" in texts[0]
+
+    @pytest.mark.filterwarnings("ignore:.*(uncalibrated-model|few-records)")
+    def test_modes_of_the_models_of_measured_bridges_are_in_order(self):
+        campaign = make_kw51_campaign(random_state=0)
+        air, modes = campaign.temperatures[::24], campaign.frequencies[::24]
+        fem = DataInformedFEM(make_kw51(), mapper=TemperatureMapper(Ridge())).fit(air, modes)
+        assert not [doubt for doubt in fem.report_.doubts if doubt.kind == "mode-order"]
 
     @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
     def test_a_narrow_box_is_named(self):

@@ -176,7 +176,8 @@ class AffineModel:
         mass_terms = terms.from_matrices(mass_matrices, exponents_of(mass_keys, self.parameter_names))
         nominal = np.ones((1, len(self.parameter_names)))
         check_supported(stiffness_terms.assemble(nominal)[0], self.dofs)
-        available = count_modes(mass_terms.assemble(nominal)[0], at_least=1 if n_modes is None else wanted)
+        least = 1 if n_modes is None else wanted
+        available = count_modes(mass_terms.assemble(nominal)[0], at_least=least, dofs=self.dofs)
         solvable = n_dof - 1 if terms is SparseTerms else n_dof
         if n_modes is None:
             wanted = min(wanted, available)

@@ -128,7 +128,7 @@ def check_supported(stiffness: Matrix, dofs: Sequence[Label] = ()) -> None:
         _refuse(largest[motion[largest] > 0.5 * motion[largest[0]]], dofs)
 
 
-def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> int:
+def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass", dofs: Sequence[Label] = ()) -> int:
     """How many modes of finite frequency a mass matrix allows: an error if fewer than ``at_least``.
 
     For a sparse matrix with many masses this is the number of degrees of freedom with mass.
@@ -147,7 +147,9 @@ def count_modes(mass: Matrix, *, at_least: int, what: str = "nominal mass") -> i
         shifted = _scaled(mass, scale) + 1e-10 * scipy.sparse.eye_array(len(diagonal), format="csc")
         negative, count = factorise(shifted) is None, int(massive.sum())
     if negative:
-        raise ValueError(f"the {what} has a negative eigenvalue; expected none below zero")
+        rows = np.flatnonzero(diagonal < 0)
+        where = f", as its diagonal is negative at {_listed(rows, dofs)}" if len(rows) else ""
+        raise ValueError(f"the {what} has a negative eigenvalue{where}; expected none below zero")
     if count < at_least:
         raise ValueError(
             f"n_modes is {at_least}, but {len(diagonal)} degrees of freedom, {len(diagonal) - count} of them "

@@ -18,6 +18,7 @@ from skthermo.preprocessing.checks._beside_weather import look_at_both, looks_ex
 from skthermo.preprocessing.checks._columns import (
     Reading,
     compare_with_model,
+    doubt_size,
     look_at_inputs,
     look_at_responses,
     put_stuck_aside,
@@ -71,6 +72,8 @@ def examine(
             if model is not None and unit == "Hz":
                 check_model(model)
                 compare_with_model(reading, model)
+            elif unit == "Hz":
+                doubt_size(reading)
         put_stuck_aside(reading)
     return readings, [*findings, *copies], is_pair and "different-rows" not in map(itemgetter(0), findings)
 

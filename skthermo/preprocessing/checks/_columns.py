@@ -405,24 +405,34 @@ def compare_with_model(F: Reading, model: Any) -> None:
         return
     middles = median(F.values)
     units = {"rad/s": 2 * np.pi, "kHz": 1e-3, "mHz": 1e3, "cycles per minute": 60.0}  # how many of them are 1 Hz
+    of_model = "Hz of a model with mass or stiffness in another unit, such as kg for t (1000 moves modes by 31.6)"
+    scales = [*units.values(), np.sqrt(1000.0), np.sqrt(1e-3)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        expected = np.array([nominal, *np.outer([*units.values()], nominal), 1 / nominal])
+        expected = np.array([nominal, *np.outer(scales, nominal), 1 / nominal])
         off = np.abs(np.log(middles / expected))
     if np.isnan(off[0]).all():
         return
-    names = ["Hz", *units, "seconds, the periods"]
+    names = ["Hz", *units, of_model, of_model, "seconds, the periods"]
     typical = np.nanmedian(off, axis=1)
     best = 1 + int(np.argmin(typical[1:]))
     if typical[best] < 0.2 and typical[0] > 0.5:
         detail = f"the medians {texts_of(middles)} beside {texts_of(nominal)} Hz of the model are about those in"
         detail = f"{detail} {names[best]}; {len(everywhere)} rows"
-        F.found("wrong-unit", "", everywhere, detail, meaningless=True)
+        F.found("wrong-unit", "", everywhere, detail, meaningless=names[best] != of_model)
         return
     for place in np.flatnonzero(off[0] > 0.5):
         fits = np.flatnonzero(off[1:, place] < 0.2)
         hint = f", as in {names[1 + fits[0]]}," if len(fits) else ""
         detail = f"has the median {middles[place]:.4g}, the model {nominal[place]:.4g} Hz{hint}"
         F.found_in("wrong-unit", place, detail)
+
+
+def doubt_size(F: Reading) -> None:
+    """Name frequencies of which all are above 1000 Hz, where no model tells whether they are in mHz."""
+    middles = median(F.values)
+    if middles.size and np.nanmin(middles, initial=np.inf) > 1000 and not np.isnan(middles).all():
+        detail = f"the medians {texts_of(middles)} Hz are about those of structures in mHz; {len(F.values)} rows"
+        F.found("wrong-unit", "", np.ones(len(F.values), dtype=bool), detail)
 
 
 @dataclass(frozen=True)

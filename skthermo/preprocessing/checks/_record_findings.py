@@ -27,8 +27,8 @@ WARNINGS = {
     "useless-column": "columns say nothing, or repeat another: {}. They carry no information, or carry it twice. "
     "Repair the sensors, or leave the columns out",
     "set-aside": "values cannot be measurements: {}. They count as missing. Put NaN there",
-    "wrong-unit": "columns have another unit or sign: {}. They are read as degrees Celsius and Hz. Convert them, or "
-    "order modes as the model does",
+    "wrong-unit": "columns have another unit or sign: {}. They are read as degrees Celsius and Hz. Convert them, "
+    "order modes as the model does, or give its mass and stiffness in kg and N/m",
     "exchanged-tables": "temperatures and frequencies look exchanged: {}. Frequencies would be predicted from "
     "frequencies, which hides all damage. Give temperatures in the first table only, and frequencies in the second",
     "mode-order": "columns do not have one mode of the model each: {}. One mode would be read as another. Track modes "

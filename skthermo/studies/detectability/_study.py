@@ -15,7 +15,9 @@ from sklearn.exceptions import NotFittedError
 
 from skthermo._core.arrays import Array, as_random_state, check_jobs, check_probability, is_auto, positive_integer
 from skthermo._core.estimators import Stages, last_step, seeded
+from skthermo._core.frames import Table, has_stamps, usual_step
 from skthermo._core.parallel import run_jobs, single_blas_thread
+from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected, one_of_each_kind, warn_each
 from skthermo.exceptions import ModelWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel
@@ -365,7 +367,7 @@ class DetectabilityStudy(BaseEstimator):
             try:
                 rows[name] = [one.summary(confidence) for one in some]
             except ValueError as error:
-                errors[name] = error
+                errors[name] = ValueError(f"{error}{longer_step(T, self.fem.records_.temperatures)}")
         left = still_evaluating({name: candidates[name] for name in rows}, errors)
         texts = {name: f"{type(error).__name__}: {error}" for name, error in errors.items()}
         lines = [row for name in detectors for row in rows.get(name, [{"detector": name, "error": texts.get(name)}])]
@@ -864,6 +866,20 @@ def still_evaluating(left: dict[str, Candidate], errors: Mapping[str, Exception]
     if not left:
         raise next(iter(errors.values()))
     return left
+
+
+def longer_step(T: Table, baseline: Table) -> str:
+    """What an error says where the weather comes less often than the records of the baseline did; else nothing."""
+    if not (has_stamps(T) and has_stamps(baseline)):
+        return ""
+    step, usual = (usual_step(table.index.sort_values()) for table in (T, baseline))
+    if step <= usual:
+        return ""
+    return (
+        f". The weather comes every {duration_text(step)}, records of the baseline every {duration_text(usual)}: a "
+        "window has a value where it holds at least half of the records that it usually has. Give weather by the step "
+        "of the baseline"
+    )
 
 
 def evaluated(decided: Decided, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
