@@ -86,8 +86,8 @@ print(again.counts_)
 # What the owner sees
 # -------------------
 # Two sensors failed, and came back. The thermometers of this truss scatter by several degrees beside each other, so
-# that it takes two weeks to see that T3 is 5 °C too high; until then, its error raises alarms. The drift is followed,
-# and the sudden damage is found within a day.
+# that it takes three weeks to see that T3 is 5 °C too high. Alarms of these weeks then become an event of kind "fault".
+# The drift is followed, but opens an event, too, and the sudden damage is in alarm within a day.
 
 print(monitor.summary())
 print(monitor.events_[["kind", "start", "end", "peak", "modes"]].to_string())
