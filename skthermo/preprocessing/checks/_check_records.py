@@ -135,7 +135,8 @@ def check_records(
     >>> print(check_records(year.temperatures[["T1"]] + 273.15))
     1 finding in 365 records.
     wrong-unit: 'T1' lies between 268.093 and 309.327, as in kelvin, in 365 rows, 2025-01-01 to 2025-12-31
-        They are read as degrees Celsius and Hz. Convert them, or order modes as the model does
+        They are read as degrees Celsius and Hz. Convert them, order modes as the model does, or give its mass and
+        stiffness in kg and N/m
     """
     readings, findings, belong_together = examine(temperatures, frequencies, unit, model)
     outliers, tables, left_out, n_rows = None, {}, {}, 0
