@@ -60,9 +60,10 @@ def crossing(coupling, is_tracked):
     return AffineModel(terms, np.eye(3), n_modes=3, track=is_tracked), np.c_[a, np.ones(600)]
 
 
-@pytest.mark.parametrize("coupling", [0.0, 1e-4])
-def test_rows_on_both_sides_of_tracked_modes_that_cross_are_served(coupling):
-    model, theta = crossing(coupling, True)
+@pytest.mark.parametrize("is_tracked", [True, False])
+@pytest.mark.parametrize("coupling", [0.0, 1e-4, 2e-2, 4e-2])
+def test_rows_on_both_sides_of_modes_that_cross_or_repel_each_other_are_served(coupling, is_tracked):
+    model, theta = crossing(coupling, is_tracked)
     surface = FrequencySurface(model.frequencies, theta)
     frequencies, served = surface.frequencies(theta)
     exact = model.frequencies(theta)
@@ -73,9 +74,22 @@ def test_rows_on_both_sides_of_tracked_modes_that_cross_are_served(coupling):
     assert np.abs(frequencies[served] / exact[served] - 1).max() < 2 * TOL
 
 
-@pytest.mark.parametrize(("coupling", "is_tracked"), [(0.0, False), (1e-4, False), (5e-3, True), (2e-2, True)])
-def test_modes_that_are_sorted_across_a_crossing_or_repel_each_other_have_no_surface(coupling, is_tracked):
-    model, theta = crossing(coupling, is_tracked)
+@pytest.mark.parametrize("share", [0.5, 0.7, 0.9])
+def test_modes_whose_columns_change_places_at_some_distance_are_not_served_there(share):
+    model, theta = crossing(4e-2, False)
+    border = np.quantile(theta[:, 0], share)  # where the columns change places, 4 % apart and more
+
+    def solve(rows):
+        modes = np.where(rows[:, :1] > border, [1, 0, 2], [0, 1, 2])
+        return np.take_along_axis(model.frequencies(rows), modes, axis=1)
+
+    frequencies, served = FrequencySurface(solve, theta).frequencies(theta)
+    assert served.mean() > 0.5
+    assert np.abs(frequencies[served] / solve(theta)[served] - 1).max() < 2 * TOL
+
+
+def test_modes_whose_columns_are_not_known_have_no_surface():
+    model, theta = crossing(5e-3, True)  # those of the nominal model are half one mode and half the other
     with pytest.raises(RuntimeError, match="check points"):
         FrequencySurface(model.frequencies, theta)
 

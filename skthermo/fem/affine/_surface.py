@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import chain, combinations_with_replacement
+from itertools import chain, combinations, combinations_with_replacement
 from math import comb
 from typing import Any
 
@@ -70,6 +70,50 @@ class PrincipalBox:
 def are_near_rows(number: int) -> NDArray[np.bool_]:
     """Which of some drawn points are near rows: all but every fourth, which is anywhere in the box."""
     return np.arange(number) % 4 > 0
+
+
+@dataclass(frozen=True)
+class SmoothCoordinates:
+    """Functions of the frequencies that are smooth in theta also where two modes cross or repel each other.
+
+    These are ln f of a mode alone, and of each of ``pairs`` of modes the mean of ln f and the square of half its
+    difference: symmetric functions of two eigenvalues have no branch points where these meet.
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of_modes(cls, frequencies: Array) -> SmoothCoordinates:
+        """The coordinates for some rows, (n_samples, n_modes): modes that come close are pairs, the closest first."""
+        logs, pairs, left = np.log(frequencies), [], set(range(frequencies.shape[1]))
+        gaps = {(i, j): np.nanmin(np.abs(logs[:, i] - logs[:, j])) for i, j in combinations(sorted(left), 2)}
+        for pair in sorted(gaps, key=gaps.__getitem__):
+            if gaps[pair] < 0.05 and left.issuperset(pair):
+                pairs.append(pair)
+                left.difference_update(pair)
+        return cls(tuple(pairs))
+
+    def values(self, frequencies: Array) -> tuple[Array, Array]:
+        """Coordinates, (n_samples, n_modes), and halves of the differences with their sign, (n_samples, n_pairs)."""
+        found, halves = np.log(frequencies), np.empty((len(frequencies), len(self.pairs)))
+        for number, (i, j) in enumerate(self.pairs):
+            mean, halves[:, number] = (found[:, j] + found[:, i]) / 2, (found[:, j] - found[:, i]) / 2
+            found[:, i], found[:, j] = mean, halves[:, number] ** 2
+        return found, halves
+
+    def frequencies(self, values: Array, errors: Array, signs: Array) -> tuple[Array, Array]:
+        """Frequencies, (n_samples, n_modes), and the largest of their relative errors in each row.
+
+        Given are coordinates with their errors, both changed in place, and the signs of the differences.
+        """
+        for number, (i, j) in enumerate(self.pairs):
+            half = np.sqrt(np.maximum(values[:, j], 0.0))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                errors[:, i] += errors[:, j] / (2 * half)
+            errors[:, j] = errors[:, i]
+            values[:, j] = values[:, i] + signs[:, number] * half
+            values[:, i] -= signs[:, number] * half
+        return np.exp(values), errors.max(axis=1)
 
 
 @dataclass(frozen=True)
@@ -151,7 +195,9 @@ class FrequencySurface:
 
     In the box of all parameters that a model may have, frequencies are no polynomials; along the rows of theta that the
     weather gives they nearly are. Polynomials of ln f are fitted by least squares to a few hundred solves near such
-    rows, and checked at others. A damaged structure needs a surface of its own.
+    rows, and checked at others. Of two modes that come within 2 % of each other, polynomials give the mean and the
+    squared difference of ln f, which are smooth also where modes cross or repel each other. A damaged structure needs a
+    surface of its own.
 
     Parameters
     ----------
@@ -187,7 +233,7 @@ class FrequencySurface:
     The box holds the rows along their principal directions, with a quarter of its half-width as a margin, or 2 %. The
     difference from the polynomial of one degree less estimates the error of a row. Rows are not served outside the box,
     where that estimate is more than half of the least one at a check point of too large an error, and where two modes
-    are within 1 %.
+    are within 1 %, or a polynomial of their difference leaves open which is higher.
 
     Examples
     --------
@@ -278,6 +324,7 @@ class FrequencySurface:
         checks = self._box.drawn(100, random)
         exact, near = solve(checks), are_near_rows(100)
         points, values = checks[:0], exact[:0]
+        self._coordinates = SmoothCoordinates.of_modes(exact)
         may_serve = np.mean(smallest_gap(exact[near]) > CLOSE) >= 0.5
         for degree in range(3, may_serve * highest_degree + 1):
             n_more = 2 * n_terms(checks.shape[1], degree) - len(points)
@@ -292,12 +339,16 @@ class FrequencySurface:
     def _fit(self, points: Array, values: Array, degree: int) -> None:
         self.degree_, features = degree, terms(self._box.places(points), degree)
         n_lower = n_terms(points.shape[1], degree - 1)
-        whole, lower = (
-            np.linalg.lstsq(part, np.log(values), rcond=None)[0] for part in (features, features[:, :n_lower])
-        )
+        smooth, halves = self._coordinates.values(values)
+        whole, lower = (np.linalg.lstsq(part, smooth, rcond=None)[0] for part in (features, features[:, :n_lower]))
         difference = whole.copy()
         difference[:n_lower] -= lower
-        self._coefficients = np.hstack([whole, difference])
+        apart = np.abs(halves) > CLOSE / 2
+        signed = [
+            np.linalg.lstsq(features[one], half[one], rcond=None)[0]
+            for one, half in zip(apart.T, halves.T, strict=True)
+        ]
+        self._coefficients = np.column_stack([whole, difference, *signed])
 
     def _check(self, checks: Array, exact: Array, near: NDArray[np.bool_], tol: float) -> None:
         frequencies, estimates = self._estimated(checks)
@@ -310,18 +361,26 @@ class FrequencySurface:
 
     def _estimated(self, theta: Array) -> tuple[Array, Array]:
         """Frequencies and estimates of the largest relative error of each row, infinite where none is served."""
-        frequencies = np.full((len(theta), self._coefficients.shape[1] // 2), np.nan)
+        n_modes = (self._coefficients.shape[1] - len(self._coordinates.pairs)) // 2
+        frequencies = np.full((len(theta), n_modes), np.nan)
         estimates = np.full(len(theta), np.inf)
         known = np.flatnonzero(~np.isnan(theta).any(axis=1))
         places = self._box.places(theta[known])
         is_inside = self._box.holds(theta[known], places)
         inside = known[is_inside]
         if len(inside):
-            logs, differences = np.hsplit(terms(places[is_inside], self.degree_) @ self._coefficients, 2)
-            frequencies[inside] = np.exp(logs)
+            polynomials = terms(places[is_inside], self.degree_) @ self._coefficients
+            smooth, differences, halves = np.split(polynomials, [n_modes, 2 * n_modes], axis=1)
+            frequencies[inside], errors = self._coordinates.frequencies(smooth, np.abs(differences), np.sign(halves))
             is_apart = smallest_gap(frequencies[inside]) > CLOSE
-            estimates[inside] = np.where(is_apart, np.abs(differences).max(axis=1), np.inf)
+            estimates[inside] = np.where(is_apart & self._in_order(frequencies[inside], halves), errors, np.inf)
         return frequencies, estimates
+
+    def _in_order(self, frequencies: Array, halves: Array) -> NDArray[np.bool_]:
+        """Rows in which the polynomials of differences, with their sign, agree with the others to a half."""
+        found = self._coordinates.values(frequencies)[1]
+        agreed: NDArray[np.bool_] = np.abs(halves - found) < np.abs(found) / 2
+        return np.asarray(agreed.all(axis=1))
 
 
 def smallest_gap(frequencies: Array) -> Array:
