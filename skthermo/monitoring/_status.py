@@ -219,17 +219,11 @@ class MonitorStatus:
         return {name: plain(value) for name, value in flat.items() if name not in ("records", "levels")}
 
 
-def state_of(monitor: Any, evaluations: pd.DataFrame) -> str:
-    """How the structure is by its open events, else by the newest record."""
-    if not len(evaluations):
-        return "not evaluated"
-    events = monitor._events()
-    standing, number = events.standing()
-    is_set_aside = events.set_aside(number)[0][-1]
-    if standing[-1] in ("alarm", "drift") or is_set_aside:
-        return "drift" if standing[-1] == "drift" and not is_set_aside else "alarm"
-    newest = evaluations["state"].iloc[-1]
-    return "watch" if standing[-1] == "watch" else "not evaluated" if newest == "alarm" else newest
+def state_of(standing: str, is_set_aside: bool, newest: str) -> str:
+    """How the structure is by its open events, else by the state of the newest record."""
+    if standing in ("alarm", "drift") or is_set_aside:
+        return "drift" if standing == "drift" and not is_set_aside else "alarm"
+    return "watch" if standing == "watch" else "not evaluated" if newest == "alarm" else newest
 
 
 def status_of(monitor: Any) -> MonitorStatus:
@@ -240,14 +234,17 @@ def status_of(monitor: Any) -> MonitorStatus:
     for name in ("modes", "groups"):
         opened[name] = pd.Series([[one for one in text.split(", ") if one] for text in opened[name]], dtype=object)
     opened["size"] = opened["size"].astype(object).where(opened["size"].notna(), None)
+    state = "not evaluated"
     if len(evaluations):
-        standing, number = monitor._events().standing()
+        found = monitor._events()
+        standing, number = found.standing()
+        state = state_of(standing[-1], found.set_aside(number)[0][-1], evaluations["state"].iloc[-1])
         opened["acknowledged"] &= (opened["event"] != number[-1]) | (standing[-1] not in ("alarm", "drift"))
     shown = ["event", "kind", "since", "peak", "modes", "groups", "size", "n_times", "acknowledged", "harmless"]
     failed = faults[faults["until"].isna()].astype({"column": str})
     levels = ("threshold_", "clear_threshold_", "watch_threshold_", "false_alarms_per_year", "watch_per_year")
     return MonitorStatus(
-        state=state_of(monitor, evaluations),
+        state=state,
         reason=str(evaluations["reason"].iloc[-1]) if len(evaluations) else "",
         records=RecordTimes(
             baseline_end=baseline[-1],
