@@ -284,9 +284,9 @@ def _fitting(rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequen
     """Formats by which the most rows have a stamp, if these are most rows, and their stamps are not all the same."""
     half = len(rows) // 2
     sample = [*rows[half :: max(len(rows) // 8, 1)], *rows[half : half + 4]]
-    signs = {sign for row in sample for sign in stamp_text(row, places)}
-    likely = [form for form in forms if signs.issuperset(re.sub(r"%.|\w", "", form))]
     texts = [stamp_text(row, places) for row in sample]
+    signs = {re.sub(r"\w+", "", WITH_OFFSET.sub("", " ".join(text.split()))) for text in texts}
+    likely = [form for form in forms if form == ISO or form in NUMERIC_STAMPS or re.sub(r"%.|\w", "", form) in signs]
     if forms == WRITTEN_STAMPS and all(re.fullmatch(r"[-+]?\d{0,7}([.,]\d*)?", text) for text in texts):
         return []  # measurements
     found = {form: times_in(rows, places, form) for form in likely if parsed(texts, form).notna().any()}
