@@ -258,6 +258,8 @@ def test_what_fit_keeps_has_a_trailing_underscore_and_does_not_change_with_what_
         ]
     elif "targets" in estimator.get_params() or getattr(estimator, "window", 0) == "6h":
         pytest.skip("needs names or stamps")
+    elif isinstance(estimator, ExponentialMeans):
+        pytest.skip("its half-life needs stamps")
     fit = fitted(estimator, *tables)
     check_names_of_state(estimator, fit)
     kept = pickle.dumps(fit)

@@ -195,6 +195,7 @@ def test_scenarios_count_alike_and_what_is_not_evaluated_is_not_found(fem):
 
 
 @pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore:.*few-records")  # means of a week in half a year
 def test_a_search_finds_what_each_setting_scores(task):
     detector = with_memory("1D")
     few, many = ({"window": [w], f"{LAGS}__lags": [n]} for w, n in (("1D", 1), ("7D", 3)))
@@ -232,10 +233,11 @@ def test_other_detectors_are_evaluated_too(fem, detector):
 
 
 @pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore:.*few-records")  # means of a week
 def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     grid = {"window": ["1D", "7D"]}
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*(other-weather|not-evaluated|trend)")
+        warnings.filterwarnings("ignore", ".*(other-weather|not-evaluated|trend|few-records)")
         search = GridSearchCV(with_memory("1D"), grid, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
     best = task.refit(search)
     expected = with_memory("7D").fit(SIDE_BY_SIDE)

@@ -25,6 +25,8 @@ GROUPS = ["bottom", "top", "diagonal"]
 TINY = 1e-3
 EXACT = DamagePrior(model_error=0, something_else=0)  # the model is right, and nothing else has changed
 N_MASSES = 9
+MEAN = WEATHER.mean()
+STILL = MEAN.to_numpy() + 0.02 * (WEATHER - MEAN)  # damage has the same effect on each record
 
 
 def simulated(fem, damage=None, T=WEATHER):
@@ -46,18 +48,21 @@ def most_probable(found):
     [{"top": 0.05}, {"diagonal": 0.5}, {"bottom": 0.8}, {"bottom": 0.3, "diagonal": 0.2}, dict.fromkeys(GROUPS, 0.1)],
 )
 def test_damage_without_noise_is_found_exactly(fem, damage):
-    found = identify_damage(fem, WEATHER, simulated(fem, damage), GROUPS, noise=TINY, prior=EXACT, random_state=0)
+    prior = DamagePrior(model_error=0.005, something_else=0)  # effects between those that were solved err by less
+    found = identify_damage(fem, STILL, simulated(fem, damage, STILL), GROUPS, noise=TINY, prior=prior, random_state=0)
     expected = {"all groups": 0.1} if len(damage) == len(GROUPS) else damage
-    assert most_probable(found) == pytest.approx(expected, abs=2e-3)
-    assert found.damage == pytest.approx(damage, abs=2e-3)
+    assert most_probable(found) == pytest.approx(expected, abs=2e-4)
+    assert found.damage == pytest.approx(damage, abs=2e-4)
     assert found.probability > 0.9
     assert found.probability_of_damage == pytest.approx(1)
     assert found.table["probability"].gt(0.9).to_dict() == {group: group in damage for group in GROUPS}
     assert found.p_value < 1e-6
-    np.testing.assert_allclose(found.shifts["explained"], found.shifts["measured"], atol=4e-4)
+    np.testing.assert_allclose(found.shifts["explained"], found.shifts["measured"], atol=5e-5)
+    assert found.misfit_p_value > 0.99
 
 
 @pytest.mark.one_case
+@pytest.mark.filterwarnings("ignore:.*undetermined")  # with so weak diagonals, top and bottom act alike
 @pytest.mark.parametrize("severity", [0.5, 0.7, 0.88, 0.92])  # modes of the truss swap places at 0.88
 def test_severe_damage_of_one_group_is_not_something_else(fem, severity):
     found = identify_damage(fem, WEATHER, simulated(fem, {"diagonal": severity}), GROUPS, random_state=0)
@@ -388,11 +393,12 @@ def test_records_in_foreign_weather_are_not_compared(fem):
 
 
 @pytest.mark.nightly
+@pytest.mark.filterwarnings("ignore:.*unexplained-shifts")  # of wrong models
 def test_severities_are_averages_over_models(fem):
     later = make_truss_campaign(samples_per_year=120, damage={"diagonal": 0.1}, random_state=1)
     records, groups = (later.temperatures, later.frequencies), ["top", "diagonal"]
     whole, half = (model.matrices(np.ones(4))[0] for model in (TRUSS, TRUSS.damaged({"diagonal": 0.5})))
-    models = [TRUSS.with_added(stiffness=2 * factor * (whole - half)) for factor in (0.3, -0.2)]
+    models = [TRUSS.with_added(stiffness=2 * factor * (whole - half)) for factor in (0.3, 0.1)]
     one, other, both = (
         identify_damage(fem, *records, groups, models=some, random_state=0).table.loc["diagonal"]
         for some in (models[:1], models[1:], models)

@@ -207,9 +207,9 @@ def looks_exchanged(temperatures: Array, frequencies: Array) -> bool:
 def misplaced_columns(temperatures: Table, frequencies: Table) -> list[RecordsWarning]:
     """The finding of temperatures that behave like frequencies, and of frequencies that behave like temperatures.
 
-    Frequencies are positive, vary by a few percent of their median, at most 15, and rise and fall together (rank
-    correlation above .1). Temperatures in degrees Celsius vary five times as much, and are nearly equal (rank
-    correlation above .6).
+    Frequencies are positive, vary by a few percent of their median, at most 15, and rise or fall together (rank
+    correlation beyond .1 and three standard errors). Temperatures in degrees Celsius vary five times as much, and are
+    nearly equal (rank correlation above .6).
     """
     if len(temperatures) < 30:
         return []
@@ -224,8 +224,9 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> list[RecordsWa
     ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=30).fillna(0).to_numpy()
     n_sensors = len(T.names)
     among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
-    together = across[:, ~is_temperature].mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
-    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), 0.1)
+    together = np.abs(across[:, ~is_temperature]).mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
+    certain = max(0.1, 3 / np.sqrt(len(T.values)))
+    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), certain)
     is_temperature &= ((across > 0.6) & T.nearly(F))[~is_mode].any(axis=0)
     found = []
     if is_mode.any():

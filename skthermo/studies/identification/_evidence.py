@@ -47,7 +47,7 @@ class Weight:
     """One set of causes by something else of each size, none first: log probability (n_errors,) up to a constant.
 
     The amounts follow normal laws within bounds, ``means`` (n_errors, k) and ``covariances``, and explain ``change``
-    (n_errors, n_observed) at ``places``, the most probable amounts (n_errors, k).
+    (n_errors, n_observed) where they are most probable, near ``places`` (n_errors, k).
     """
 
     causes: tuple[int, ...]
@@ -174,6 +174,7 @@ class Evidence:
             precisions = weighted @ slopes + deviations[..., np.newaxis] ** -2 * np.eye(size)
             right = weighted @ target[..., np.newaxis]
             means = np.linalg.solve(precisions, right)[..., 0]
+        explained = change + offset + (slopes @ (np.clip(means, lowest, highest) - places)[..., np.newaxis])[..., 0]
         misfit = (target**2 / self.variances).sum(axis=-1) - (right[..., 0] * means).sum(axis=-1)
         volume = (
             np.log(self.variances).sum(axis=-1) + np.linalg.slogdet(precisions * deviations[..., np.newaxis] ** 2)[1]
@@ -185,10 +186,7 @@ class Evidence:
         logs = logs + logsumexp(truncated(means, covariances, lowest, highest, lattice)[1], axis=-1) - np.log(64)
         logs = logs - np.log(ndtr(highest / deviations) - ndtr(lowest / deviations)).sum(axis=-1)
         logs = logs + np.array(log_priors)[:, np.newaxis] + self.log_errors
-        return [
-            Weight(*one)
-            for one in zip(sets, log_priors, logs, means, covariances, places, change + offset, strict=True)
-        ]
+        return [Weight(*one) for one in zip(sets, log_priors, logs, means, covariances, places, explained, strict=True)]
 
     def _explanation(
         self, weight: Weight, errors: Array, probability: float, random: np.random.RandomState
