@@ -77,16 +77,15 @@ class Corrections:
 
     def _after(self, state: DayState, raw: pd.DataFrame) -> DayState:
         """The state after the records of one day."""
-        wrong = self.plausible.implausible(raw.to_numpy())
-        T, F = self._split(raw.mask(wrong))
-        sensors, drift = state.sensors, state.drift
+        wrong, sensors, drift = self.plausible.implausible(raw.to_numpy()), state.sensors, state.drift
         if self.drift is not None:
+            T, F = self._split(raw.mask(wrong))
             seen_T, seen_F = T.drop(columns=self.reference), F
             if self.sensors is not None:
                 seen_T, seen_F, _ = self.sensors.masked(sensors.faults, T, F, once_found=True)
             drift = self.drift.advance(drift, seen_T, seen_F.where(seen_F > 0))
         if self.sensors is not None:  # it is to see what is implausible, but not what stands for a missing value
-            is_missing = wrong & (raw.isin(MISSING_CODES) | np.isinf(raw))
+            is_missing = wrong & (raw.isin(MISSING_CODES) | np.isinf(raw)) if wrong.any() else wrong
             sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
         return DayState(state.day, sensors, drift)
 
@@ -130,7 +129,8 @@ class Corrections:
         return records, about.join(drifts).astype({"held": object, "note": object, "at_fault": object})
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-        return records.drop(columns=self.targets), records[self.targets]
+        is_target = records.columns.isin(self.targets)
+        return records.loc[:, ~is_target], records[self.targets]
 
     def faults(self, state: DayState) -> pd.DataFrame:
         """Sensors that have failed."""
