@@ -87,6 +87,7 @@ def test_other_quantities_are_no_modes():
     assert not list(misplaced_columns(T, strain))
 
 
+@pytest.mark.nightly
 def test_the_warning_comes_from_fit():
     both = YEAR.temperatures.join(YEAR.frequencies)
     with pytest.warns(RecordsWarning, match="'f4'"):

@@ -37,6 +37,7 @@ def given(*calls, action="always"):
     return [one for one in caught if isinstance(one.message, SkthermoWarning)]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("action", ["default", "always"])
 def test_two_lines_that_fit_warn_twice(action):
     lines = [

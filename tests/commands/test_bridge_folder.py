@@ -47,6 +47,7 @@ def valid(said):
     return said
 
 
+@pytest.mark.nightly
 def test_records_of_a_folder_are_taken_in_night_by_night_as_in_one_pass(bridge, records):
     whole = load_monitor(bridge / "monitor.joblib")
     whole.update(records[FIRST : DAMAGED + 10])
@@ -71,6 +72,7 @@ def test_records_of_a_folder_are_taken_in_night_by_night_as_in_one_pass(bridge, 
     assert (again.code, again.json["bridges"][0]["transitions"]) == (ALARM, [])
 
 
+@pytest.mark.nightly
 def test_a_log_that_grows_is_read_where_it_grows(bridge, records):
     log = bridge / "new" / "log.csv"
     for stop in (3, 4, 9):
@@ -93,6 +95,7 @@ def test_a_last_line_without_an_end_is_taken_when_it_stays_as_it_is(bridge, reco
     assert numbers == [2, 3, 3]
 
 
+@pytest.mark.nightly
 def test_temperatures_wait_for_frequencies_of_the_same_time(bridge, records):
     T, f = (records.filter(regex=f"^{letter}") for letter in "Tf")
     for (first, last), (begin, end) in (((0, 5), (0, 3)), ((5, 8), (3, 8))):
@@ -116,6 +119,7 @@ def test_a_file_without_one_of_its_columns_lacks_that_one_alone(bridge, records)
     assert (done.code, "lacks the columns ['f3'];" in error) == (FAILED, True)
 
 
+@pytest.mark.nightly
 def test_a_wrong_file_keeps_no_other_out_and_is_named_until_it_is_mended(bridge, records):
     now = write_day(records, bridge, FIRST, FIRST + 3)
     broken = records[FIRST + 3 : FIRST + 5].rename(columns={"T1": "T9"})
@@ -132,6 +136,7 @@ def test_a_wrong_file_keeps_no_other_out_and_is_named_until_it_is_mended(bridge,
     assert len(load_monitor(bridge / "monitor.joblib").records_) == 5
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("one_detector")
 def test_a_quiet_night_is_one_line(bridge, records):
     for row in (FIRST, FIRST + 1):
@@ -152,6 +157,7 @@ def test_an_empty_file_and_a_text_without_records_are_named_once(bridge, records
     assert "no records in" not in run("update", bridge, "--now", write_day(records, bridge, FIRST + 1)).out
 
 
+@pytest.mark.nightly
 def test_a_file_whose_last_bits_have_changed_is_the_same(bridge, records):
     now = write_day(records, bridge, FIRST, FIRST + 3, name="log.csv")
     run("update", bridge, "--now", now)
@@ -163,6 +169,7 @@ def test_a_file_whose_last_bits_have_changed_is_the_same(bridge, records):
     assert run("update", bridge).code == FAILED
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("year", ["0001", "1970", "2062", "2300", "9999"])
 def test_a_record_that_is_out_by_years_stops_no_night_after_it(bridge, records, year):
     write_day(records, bridge, FIRST, FIRST + 3, name="a.csv")
@@ -199,6 +206,7 @@ def test_later_records_of_the_baselines_files_are_new_ones(records, tmp_path):
     assert len(load_monitor(toml.parent / "monitor.joblib").records_) == 10
 
 
+@pytest.mark.nightly
 def test_a_monitor_is_not_replaced_by_chance_and_the_old_one_is_kept(bridge, records):
     now = write_day(records, bridge, FIRST, DAMAGED + 10)
     run("update", settings(bridge), "--now", now)
@@ -236,6 +244,7 @@ def test_a_monitor_of_another_version_is_refused_by_name(bridge, records):
     assert (refused.code, "0.0.1" in refused.err, "--replace" in refused.err) == (FAILED, True, True)
 
 
+@pytest.mark.nightly
 def test_commands_that_an_engineer_uses(bridge, records):
     now = write_day(records, bridge, FIRST, DAMAGED + 30)
     assert run("update", settings(bridge), "--now", now).code == ALARM
@@ -256,6 +265,7 @@ def test_commands_that_an_engineer_uses(bridge, records):
     assert valid(report.json)["bridges"][0]["written"] == [str(bridge / "other.html")]
 
 
+@pytest.mark.nightly
 def test_records_are_taken_back_and_learned(bridge, records):
     now = write_day(records, bridge, FIRST, FIRST + 40)
     run("update", settings(bridge), "--now", now)
@@ -284,6 +294,7 @@ def test_settings_that_change_after_a_fit_are_reported_until_the_next_fit(bridge
     assert "changed-settings" not in run("status", settings(bridge), "--now", now).err
 
 
+@pytest.mark.nightly
 def test_status_by_the_clock_says_what_the_page_says(bridge, records):
     now = write_day(records, bridge, FIRST, FIRST + 10)
     assert run("update", settings(bridge), "--now", now).code == HEALTHY
@@ -326,6 +337,7 @@ def test_several_bridges_are_a_fleet(bridge, records, tmp_path):
     assert (run_twice.code, "another name" in run_twice.err) == (FAILED, True)
 
 
+@pytest.mark.nightly
 def test_bridges_in_one_file_of_metrics_and_each_in_its_own(bridge, records):
     edit(settings(bridge), "# metrics = ...", 'metrics = "own.prom"')
     now = write_day(records, bridge, FIRST, DAMAGED + 10)

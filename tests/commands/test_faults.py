@@ -78,6 +78,7 @@ def assert_goes_on(bridge, records, after):
     assert not list(bridge.glob(".*.unfinished"))
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("write", range(4))
 def test_a_disk_that_is_full_at_any_write(bridge, before, after, records, monkeypatch, write):
     calls = []
@@ -154,6 +155,7 @@ def test_what_a_killed_run_has_left_of_the_metrics_is_removed(bridge, records):
     assert [file.exists() for file in left] == [False, True]  # another process may be at work on a new one
 
 
+@pytest.mark.nightly
 def test_two_at_once(bridge, before, after, records):
     fcntl = pytest.importorskip("fcntl")
     with open(bridge / ".monitor.joblib.lock", "a+") as lock:
@@ -182,6 +184,7 @@ def test_a_folder_that_cannot_be_written(bridge, before, after, records):
     assert_goes_on(bridge, records, after)
 
 
+@pytest.mark.nightly
 def test_a_page_that_cannot_be_written_hides_no_alarm(bridge, after, records, monkeypatch):
     def fails(*_, **options):
         raise OSError("no space left")
@@ -197,7 +200,7 @@ def test_a_page_that_cannot_be_written_hides_no_alarm(bridge, after, records, mo
     assert_goes_on(bridge, records, after)
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize("clock", ["2020-01-01", "2050-01-01"])
 def test_a_wrong_clock_of_the_computer_changes_no_evaluation(bridge, after, records, monkeypatch, clock):
     """The monitor itself asks the clock whether a jump in the stamps is plausible."""
@@ -208,6 +211,7 @@ def test_a_wrong_clock_of_the_computer_changes_no_evaluation(bridge, after, reco
     assert_goes_on(bridge, records, after)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("change", ["one less", "text", "empty"])
 def test_columns_that_have_changed(bridge, before, after, records, change):
     file = bridge / "new" / f"{records.index[DAMAGED]:%Y-%m-%d}.csv"

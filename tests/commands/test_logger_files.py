@@ -438,6 +438,7 @@ def test_dates_serial_dates_and_texts_of_a_workbook_mean_the_same(first, then, t
     assert_read(read_columns(later, settings.csv, settings.records), RECORDS)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("kind", IN_CELLS)
 def test_a_workbook_beside_a_text_of_another_form_is_read(kind, tmp_path):
     text = log(rows(RECORDS[["T1"]], GERMAN, write=comma), ";", name="T.csv")

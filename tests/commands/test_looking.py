@@ -23,6 +23,7 @@ RECORDS = pd.DataFrame(
 RECORDS.iloc[5, 0] = np.nan
 
 
+@pytest.mark.nightly
 @given(
     separator=st.sampled_from([",", ";", "\t", "|"]),
     decimal=st.sampled_from([".", ","]),
@@ -120,6 +121,7 @@ def test_columns_that_cannot_be_used_are_named_where_others_are_lacking(tmp_path
 ZONES = ["Europe/Brussels", "America/New_York", "Australia/Lord_Howe", "UTC", "Asia/Kolkata", "America/St_Johns"]
 
 
+@pytest.mark.nightly
 @given(
     zone=st.sampled_from(ZONES),
     start=st.datetimes(pd.Timestamp("2015-01-01"), pd.Timestamp("2026-12-01")),
@@ -162,6 +164,7 @@ def test_columns_find_their_roles_and_units(tmp_path):
     assert run("init", tmp_path / "all.csv", "--into", tmp_path / "c", "--responses", "f9").code == 3
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("one_detector")
 def test_a_hanger_that_loses_force_is_found_beside_its_measured_tension(tmp_path):
     random, hours = np.random.default_rng(3), pd.date_range("2025-01-01", periods=395 * 24, freq="h")

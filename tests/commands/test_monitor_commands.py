@@ -58,6 +58,7 @@ def bridge(saved, tmp_path, records):
     return run
 
 
+@pytest.mark.nightly
 def test_healthy_records(bridge, records):
     done = bridge("update", new=records[FIRST + 10 : FIRST + 14])
     assert (done.code, done.err) == (HEALTHY, "")
@@ -71,6 +72,7 @@ def test_healthy_records(bridge, records):
     assert lines[-1] == "events: none"
 
 
+@pytest.mark.nightly
 def test_an_alarm_that_has_ended_within_the_new_records_is_one(bridge, records, saved):
     loud, quiet = records[DAMAGED + 10 : DAMAGED + 20], records[FIRST + 10 : FIRST + 30].copy()
     quiet.index = pd.date_range(loud.index[-1] + pd.Timedelta("1D"), periods=20, freq="D")
@@ -85,6 +87,7 @@ def test_an_alarm_that_has_ended_within_the_new_records_is_one(bridge, records, 
     assert bridge("status").code == HEALTHY
 
 
+@pytest.mark.nightly
 def test_records_that_cannot_be_evaluated(bridge, records):
     new = records[FIRST + 10 : FIRST + 20].copy()
     new.iloc[2:] = np.nan
@@ -125,6 +128,7 @@ def test_status_and_acknowledge(bridge):
     assert "event is 7; expected the number of one of the 1 events" in wrong.err
 
 
+@pytest.mark.nightly
 def test_known_damage_is_a_state_of_records_that_were_evaluated(bridge, records):
     bridge("acknowledge", 1, "--damage", state="alarm")
     new = records[DAMAGED + 10 : DAMAGED + 14].copy()
@@ -135,6 +139,7 @@ def test_known_damage_is_a_state_of_records_that_were_evaluated(bridge, records)
     assert f"state: known damage (newest record {monitor.last_})" in done.out
 
 
+@pytest.mark.nightly
 def test_other_forms_of_files(bridge, records, tmp_path):
     new = records[FIRST + 10 : FIRST + 12]
     form = {"sep": ";", "decimal": ",", "date_format": "%d.%m.%Y %H:%M"}
@@ -155,6 +160,7 @@ def test_a_file_that_may_be_cut_off_is_reported(bridge, records, tmp_path):
     assert "read-as" in done.err
 
 
+@pytest.mark.nightly
 def test_records_that_are_set_aside_are_not_healthy(bridge, records):
     new = records[FIRST + 10 : FIRST + 12].assign(f2=lambda table: 2 * table["f2"])
     done = bridge("update", new=new)
@@ -166,6 +172,7 @@ def test_records_that_are_set_aside_are_not_healthy(bridge, records):
     assert load_monitor(confirmed.file).last_ == new.index[0] + pd.Timedelta("800D")
 
 
+@pytest.mark.nightly
 def test_the_report_shows_the_updated_monitor(bridge, records, tmp_path, monkeypatch):
     shown = []
     monkeypatch.setattr(skthermo.reporting, "owner_report", lambda *given, **named: shown.append((given, named)))

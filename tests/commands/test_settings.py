@@ -43,6 +43,7 @@ def by_python(detector, *steps, compensated=None, **parameters):
     return Monitor(CompensatedDetector(detector, regression, targets=targets, **(compensated or {})), **parameters)
 
 
+@pytest.mark.nightly
 def test_the_file_makes_what_python_makes(fitted, tmp_path):
     made = load_monitor(fitted / "monitor.joblib")
     assert repr(made) == repr(by_python(DirectionalDetector(), HingeFeatures(), Ridge()))

@@ -94,6 +94,7 @@ def test_truth_is_the_model_of_the_zones_at_the_weather(bridge):
     assert list(records.theta) == list(bridge.truth.parameter_names)
 
 
+@pytest.mark.nightly
 def test_the_users_model_is_a_little_wrong():
     for bridge in make_fleet(12, random_state=1).values():
         nominal = bridge.truth.frequencies(np.ones((1, len(bridge.truth.parameter_names))))

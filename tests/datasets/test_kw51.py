@@ -93,6 +93,7 @@ def test_modes_are_of_the_right_kind(structure, model):
         assert np.argmax(waves) == half_waves - 1
 
 
+@pytest.mark.nightly
 def test_a_subset_of_parameters_is_the_same_bridge(model, full_model):
     chosen = make_kw51(["M_g", "E_br"])
     assert chosen.parameter_names == ("M_g", "E_br")

@@ -130,6 +130,7 @@ def test_damage_begins_when_it_is_said_to(unchanged):
     assert_allclose(from_the_start.clean_frequencies[:5], expected, rtol=1e-5)
 
 
+@pytest.mark.nightly
 def test_drift_and_damage_multiply():
     rate, n_hours = 0.03, 700
     campaign = make_kw51_campaign(

@@ -45,6 +45,7 @@ def test_gradient_vanishes_or_points_out_of_the_bounds(updated):
     assert all(abs(gradient[name]) < 1e-3 * largest for name in set(THETA) - {*AT_LOWER, *AT_UPPER})
 
 
+@pytest.mark.nightly
 def test_other_parameters_are_of_the_same_bridge(updated):
     expected = updated.frequencies(np.ones((1, 11)))
     drawn, thermal, everything = make_kw51(), make_kw51(updated=True), make_kw51("all", updated=True)

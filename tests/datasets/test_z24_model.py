@@ -136,6 +136,7 @@ def test_columns_of_the_damaged_bridge_are_the_healthy_modes(box):
     assert (kept > 0.5).all()
 
 
+@pytest.mark.nightly
 def test_modes_swap_within_thirty_percent_so_that_columns_follow_shapes(box):
     by_rank = BRIDGE.assemble(Z24_PARAMETERS, groups=(Z24_PARAMETERS | {"piers": "piers", "soil": "soil"}), n_modes=4)
     best = [model.nominal_mac(model.modes(box)[1]).argmax(axis=2) for model in (by_rank, MODEL)]

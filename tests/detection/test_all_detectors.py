@@ -76,6 +76,7 @@ def other_weather():
     return bridge, years[0][:"2024-02-11"], years[0]["2024-06-15":"2024-08-15"], years
 
 
+@pytest.mark.nightly
 @WARM
 @pytest.mark.parametrize("kind", ["compensated", "by day", "pipeline", "chain"])
 def test_who_learned_a_winter_says_so_in_summer_and_not_in_the_next_winter(kind):
@@ -110,6 +111,7 @@ def test_who_learned_a_winter_says_so_in_summer_and_not_in_the_next_winter(kind)
         assert (healthy == 1).mean() > 0.9
 
 
+@pytest.mark.one_case
 @WARM
 @pytest.mark.parametrize("name", ["Mahalanobis", "outliers", "compensated", "pipeline"])
 def test_what_labels_call_damaged_is_not_learned(name):
@@ -129,7 +131,7 @@ def test_what_labels_call_damaged_is_not_learned(name):
 
 
 @WARM
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "refit", [True, lambda results: int(np.argmax(results["mean_test_score"]))], ids=["best", "own"]
 )

@@ -61,6 +61,7 @@ def test_without_regimes_and_windows_it_is_the_pipeline():
     np.testing.assert_array_equal(one.residuals(LATER), other[0].transform(LATER))
 
 
+@pytest.mark.nightly
 def test_frames_and_arrays_agree_and_scores_form_one_chain():
     frame = whole(MahalanobisDetector(), window=5).fit(YEAR.reset_index(drop=True))
     array = whole(MahalanobisDetector(), window=5, targets=range(3, 9)).fit(YEAR.to_numpy())
@@ -84,6 +85,7 @@ def test_longer_windows_find_smaller_losses_at_the_same_false_alarms():
     assert rates[None][1] < rates[5][1] < rates["10D"][1]
 
 
+@pytest.mark.nightly
 def test_regimes_are_found_where_scatter_changes_and_find_damage_on_warm_days():
     modes = ["f1", "f2", "f3"]
     detectors = {
@@ -104,6 +106,7 @@ def test_regimes_are_found_where_scatter_changes_and_find_damage_on_warm_days():
     assert CompensatedDetector(targets=MODES).fit(YEAR).regime_ is None
 
 
+@pytest.mark.nightly
 def test_with_a_window_two_regimes_have_to_hold_in_a_later_third():
     """A loss that creeps after two thirds would be an alarm in the regime of little scatter."""
     steady, creeping = frosty(0), frosty(0)
@@ -127,6 +130,7 @@ def test_the_baseline_is_the_history_of_later_windows_and_batches_are_one_pass()
         np.testing.assert_allclose(found, index[found.index], rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_any_outlier_detector_serves_and_grids_reach_its_parameters():
     forest = whole(IsolationForest(n_estimators=20, random_state=0)).fit(YEAR)
     assert isinstance(forest.detectors_[0], OutlierDetector)

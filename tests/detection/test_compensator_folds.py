@@ -108,6 +108,7 @@ def service():
     return detector, later
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*not-evaluated")
 def test_a_day_behind_the_records_before_it_is_evaluated_as_in_one_pass(service):
     detector, later = service

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
@@ -33,6 +34,7 @@ def test_residuals_of_damping_do_not_depend_on_temperature():
     assert (residuals[DAMPING].corrwith(warmth).abs() < 0.1).all()
 
 
+@pytest.mark.nightly
 def test_missing_and_negative_ratios_are_taken():
     """Identification loses modes, and gives ratios just below zero now and then."""
     holed = BASELINE.copy()

@@ -83,6 +83,7 @@ def test_directions_of_a_model_are_its_derivatives(fem):
     assert of_chain.to_numpy() == pytest.approx(exact.to_numpy(), abs=0.05)
 
 
+@pytest.mark.nightly
 def test_it_finds_more_than_the_mahalanobis_distance_at_no_more_false_alarms():
     rates, directions = {}, make_truss().damage_directions(kind="stiffness")
     detectors = {"any": MahalanobisDetector(0.02), "model": DirectionalDetector(directions, contamination=0.02)}
@@ -132,6 +133,7 @@ def test_columns_that_are_no_relative_residuals_are_refused(between):
             make_pipeline(between, DirectionalDetector(directions)).fit(residuals)
 
 
+@pytest.mark.nightly
 def test_frequencies_in_any_unit_and_relative_residuals_find_the_same_losses():
     level = make_truss().frequencies(np.ones((1, 4)))[0]
     rows = 0.01 * np.random.RandomState(0).standard_normal((500, 6))
@@ -141,6 +143,7 @@ def test_frequencies_in_any_unit_and_relative_residuals_find_the_same_losses():
     np.testing.assert_allclose(losses[2], losses[0], rtol=0.05)
 
 
+@pytest.mark.nightly
 def test_the_unit_of_given_directions_does_not_matter():
     few = F[::3]
     effects = DirectionalDetector(make_truss()).fit(few).directions_
@@ -151,6 +154,7 @@ def test_the_unit_of_given_directions_does_not_matter():
     np.testing.assert_allclose(per_mille.severities(few), 1e3 * whole.severities(few), rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.nightly
 def test_an_index_means_the_same_whichever_modes_are_there():
     random = np.random.RandomState(0)
     baseline, later = (
@@ -256,6 +260,7 @@ def test_losses_that_explain_records_are_those_that_have_moved_them():
     assert single.severities(nothing).isna().all(axis=None)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*(few-records|not-evaluated)")  # of a winter, records count as few
 @pytest.mark.parametrize("kind", ["gaps", "winter", "tails"])
 def test_smallest_changes_hold_with_the_gaps_and_the_scatter_of_the_baseline(kind):

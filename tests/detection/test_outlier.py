@@ -159,6 +159,7 @@ def test_blocks_are_rows_or_durations(rows, block, message):
         OutlierDetector(OneClassSVM(), block=block).fit(rows)
 
 
+@pytest.mark.nightly
 def test_the_rate_asked_for_is_kept_where_records_depend_on_each_other():
     rates = {"conformal": [], "quantile": []}
     for seed in range(6):

@@ -139,6 +139,7 @@ def test_a_baseline_in_which_a_few_rows_decide_alone_about_a_direction_is_refuse
         MahalanobisDetector().fit(records(5))
 
 
+@pytest.mark.nightly
 def test_both_tests_of_directions_have_their_share_of_the_false_alarms():
     random = np.random.RandomState(0)
     rows, falls = 0.01 * random.standard_normal((100_000, 6)), -np.eye(6)[:2]

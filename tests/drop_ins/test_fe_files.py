@@ -325,6 +325,7 @@ def civil_nx():
         thread.join()
 
 
+@pytest.mark.nightly
 def test_civil_nx(civil_nx, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recipe = run_recipe(PAGE, "recipe-civil-nx", address=civil_nx, key="secret")

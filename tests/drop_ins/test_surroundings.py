@@ -49,6 +49,7 @@ def test_ray(folder, monkeypatch):
         ray.shutdown()
 
 
+@pytest.mark.nightly
 def test_polars():
     polars = pytest.importorskip("polars")
     recipe = run_recipe(PAGE, "recipe-records", "recipe-polars-frames")

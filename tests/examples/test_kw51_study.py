@@ -32,6 +32,7 @@ def records():
     )
 
 
+@pytest.mark.nightly
 def test_imputed_records_have_no_gaps_and_keep_what_was_measured(records):
     filled = records.imputed()
     assert filled.frequencies.notna().all(axis=None)

@@ -163,6 +163,7 @@ def test_a_function_that_fails_everywhere_is_an_error(folder):
     np.testing.assert_array_equal(counted.rows, THETA[5:])
 
 
+@pytest.mark.nightly
 def test_workers_share_one_folder(folder):
     model = CallableModel(three_modes, NAMES, 3, cache=folder)
     with joblib.parallel_config("loky"):
@@ -213,6 +214,7 @@ def check_all_solved(folder):
     np.testing.assert_array_equal(result, CallableModel(three_modes, NAMES, 3).frequencies(MANY))
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
 def test_killed_in_the_middle_of_solves(folder, tmp_path):

@@ -43,6 +43,7 @@ def test_every_text_is_the_same_model(tmp_path, kind):
     assert model.dofs == (tuple(DOFS) if kind in LABELLED else ())
 
 
+@pytest.mark.nightly
 @settings(max_examples=150)
 @given(
     kind=st.sampled_from(list(TEXTS)),

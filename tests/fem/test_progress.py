@@ -39,6 +39,7 @@ class Notebook(io.StringIO):
     __module__ = "ipykernel.iostream"
 
 
+@pytest.mark.nightly
 def test_only_a_terminal_or_a_notebook_sees_a_bar_unasked_and_only_after_a_second(monkeypatch):
     slow = CallableModel(slow_square_root, ["E"], 1)
     for stderr, model, progress, seen in (

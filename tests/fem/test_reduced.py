@@ -50,13 +50,14 @@ def test_the_tolerance_holds_at_every_corner_of_the_box(model, seed):
     assert np.abs(reduced.frequencies(corners) / model.frequencies(corners) - 1).max() < 1e-5
 
 
+@pytest.mark.nightly
 def test_no_point_is_one_of_a_sample_with_the_same_seed():
     drawn = sample(FRAME, 0.3, 128, random_state=0).theta
     for points in (REDUCED.check_points_, REDUCED.snapshot_points_, REDUCED.damaged({"soil": 0.99}).check_points_):
         assert not np.isclose(points[:, np.newaxis], drawn).all(axis=2).any()
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize("tol", [1e-3, 1e-7])
 def test_tolerance_sets_the_size(tol):
     reduced = FRAME.reduced(0.3, tol=tol, random_state=0)
@@ -83,6 +84,7 @@ def test_the_jacobian_is_exact_for_the_reduced_model_and_near_the_full_one(pair)
     np.testing.assert_allclose(reduced.jacobian(inner), model.jacobian(inner), atol=1e-2)
 
 
+@pytest.mark.nightly
 def test_tracked_columns_are_the_full_models():
     wide = np.random.default_rng(0).uniform(0.3, 1.7, (40, 4))
     full = TRACKED.frequencies(wide)

@@ -64,6 +64,7 @@ def kinds_after(monitor, stamp):
     return events[events["start"] >= stamp]["kind"].tolist()
 
 
+@pytest.mark.nightly
 def test_an_outage_is_not_damage_and_records_after_it_say_so(fitted):
     before = served(fitted, SERVICE[: 30 * PER_DAY])
     for hours in (24, 48, 120):
@@ -86,6 +87,7 @@ def failing():
     return lowered(0.01, 400, records.drop(records.index[240:260]))
 
 
+@pytest.mark.nightly
 def test_values_since_a_fault_began_are_left_out_and_no_alarm_rests_on_them(fitted, failing):
     one = served(fitted, failing)
     faults = one.faults_.set_index("column")
@@ -119,6 +121,7 @@ def test_any_division_gives_the_same_events_faults_and_tests(fitted, failing, se
     pd.testing.assert_frame_equal(answers, whole.evaluations_, check_freq=False)
 
 
+@pytest.mark.nightly
 def test_a_loss_that_creeps_is_a_drift_which_becomes_damage_under_the_same_number(fitted):
     n = len(SERVICE)
     one = served(fitted, lowered(np.maximum(np.arange(n) - 100, 0) / n * 0.008, 100), parts=10)
@@ -134,6 +137,7 @@ def test_a_loss_that_creeps_is_a_drift_which_becomes_damage_under_the_same_numbe
     assert not (healthy.weeks_["level"] > 1).any()
 
 
+@pytest.mark.nightly
 def test_damage_that_comes_and_goes_is_one_event_and_then_known_until_it_grows(fitted):
     records = SERVICE.copy()
     for first in range(160, 460, 60):  # ten days of each fifteen
@@ -151,6 +155,7 @@ def test_damage_that_comes_and_goes_is_one_event_and_then_known_until_it_grows(f
     assert not all(open_["acknowledged"] for open_ in one.status(one.last_).events)  # an answer is wanted again
 
 
+@pytest.mark.nightly
 def test_damage_that_is_known_soon_is_no_drift_while_its_mean_fills(fitted):
     """The mean of 30 days goes on to rise after an answer that came sooner."""
     onset, answer = 160, 225

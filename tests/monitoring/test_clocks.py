@@ -31,6 +31,7 @@ def in_zone(zone, start):
     return campaign().set_axis(stamps)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*(few-records|doubtful-values|not-evaluated)")
 @pytest.mark.parametrize(("begin", "change"), [("2025-04-10", "2026-04-23"), ("2025-10-15", "2026-10-29")])
 def test_records_about_a_change_of_clocks_give_the_same_in_one_batch_as_in_many(begin, change):
@@ -60,6 +61,7 @@ def assert_same_in_batches(records, cuts):
     assert whole.status(now=records.index[-1]).state == whole.status(whole.last_).state
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("start", ["1970-01-01", "1024 weeks later", "the beginning of a year"])
 def test_records_of_a_wrong_clock_are_set_aside_in_fit(start):
     records = campaign()[:N_BASELINE]

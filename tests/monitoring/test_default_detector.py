@@ -27,6 +27,7 @@ def fitted(**options):
         return Monitor(**options).fit(records())
 
 
+@pytest.mark.nightly
 def test_frequencies_have_directions_and_other_responses_have_none():
     by_unit = {unit: fitted(targets=MODES, units=unit).detector_ for unit in ("Hz", "mm")}
     assert all(isinstance(one, CompensatedDetector) for one in by_unit.values())

@@ -55,12 +55,14 @@ def ageing():
     return in_service(slowly())
 
 
+@pytest.mark.nightly
 def test_without_drift_none_is_claimed(healthy):
     assert not healthy.drift_[["significant", "beyond_limit"]].any(axis=None)
     assert (healthy.drift_["p_value"] > 0.05).all()
     assert healthy.days_.filter(like="drift").abs().max().drop("drift vertical").max() < 0.005
 
 
+@pytest.mark.nightly
 def test_slow_drift_is_followed_and_raises_no_alarm(ageing):
     """It begins after the baseline, and the last month waits."""
     drift = ageing.drift_
@@ -78,6 +80,7 @@ def test_sudden_damage_is_not_learned_as_drift(healthy):
     assert abs(damaged.drift_["change"] - healthy.drift_["change"])["diagonal"] < 0.03 * 0.12
 
 
+@pytest.mark.nightly
 def test_any_batches_give_the_same_drift_over_an_outage():
     records = slowly()[: FIRST + 90].drop(index=slowly().index[FIRST + 40 : FIRST + 60])
     once, parts = in_service(records), in_service(records, parts=7)

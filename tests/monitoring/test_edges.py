@@ -117,7 +117,7 @@ def saved_about_zero():
     return pickle.dumps(monitor)
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @some
 @given(
     shifts=st.dictionaries(
@@ -142,7 +142,7 @@ def test_responses_of_any_sign_that_move_by_up_to_a_thousand_times_their_range_a
     assert monitor.status(monitor.last_).state == "alarm"
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize("pattern", [[0.6, 1.0], [0.6, 0.6, 1.0], [0.6, 1.0, 0.6, 0.6, 1.0]])
 def test_a_change_that_comes_and_goes_is_one_event_and_never_healthy(pattern):
     monitor, records = fitted(), changed({}, 20)
@@ -152,6 +152,7 @@ def test_a_change_that_comes_and_goes_is_one_event_and_never_healthy(pattern):
     assert (monitor.events_["kind"] == "fault").sum() == 1
 
 
+@pytest.mark.nightly
 def test_an_alarm_stays_when_the_damage_grows_beyond_what_is_plausible():
     monitor = fitted()
     monitor.update(changed({"f3": 0.8}, 5))
@@ -163,6 +164,7 @@ def test_an_alarm_stays_when_the_damage_grows_beyond_what_is_plausible():
     assert monitor.events_["end"].notna().all()
 
 
+@pytest.mark.nightly
 def test_what_is_set_aside_is_healthy_only_once_it_is_acknowledged_or_comes_back():
     monitor = fitted("2D")
     answers = monitor.update(changed({"f3": 0.6}, 10))
@@ -223,6 +225,7 @@ def with_displacement():
     return table
 
 
+@pytest.mark.nightly
 def test_responses_may_have_any_sign_and_unit():
     records, targets = with_displacement(), [*MODES, "d", "e1", "e2"]
     units = dict.fromkeys(MODES, "Hz") | {"d": "mm", "e1": "µm/m", "e2": "µm/m"}
@@ -259,6 +262,7 @@ def test_a_new_baseline_moves_responses_of_any_sign_by_their_change():
     assert set(monitor.update(records[N_BASELINE + len(new) + len(later) :][:40])["state"][SETTLED:]) == {"alarm"}
 
 
+@pytest.mark.nightly
 def test_records_of_a_wrong_clock_are_set_aside_and_true_ones_are_not_late():
     monitor, new = fitted(), changed({}, 10)
     ahead = new[:20].set_axis(new.index[:20] + pd.Timedelta("800D"))
@@ -287,6 +291,7 @@ def test_a_logger_that_was_silent_for_months_is_taken_in_once_records_confirm_ea
     assert set(rest["state"]) == {"healthy"}
 
 
+@pytest.mark.nightly
 def test_a_record_of_the_present_needs_no_confirmation():
     now = pd.Timestamp.now().floor("h")
     records = truss().set_axis(pd.date_range(end=now - pd.Timedelta("100D"), periods=len(truss()), freq="6h"))
@@ -295,7 +300,7 @@ def test_a_record_of_the_present_needs_no_confirmation():
     assert monitor.update(new)["state"].tolist() == ["healthy"]
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("own", "options"), [(["f6", "f1", "f3", "f2", "f5", "f4"], {}), (MODES, {"targets": MODES[::-1]})]
 )
@@ -306,6 +311,7 @@ def test_modes_are_named_whatever_the_order_of_targets(own, options):
     assert monitor.events_["modes"].iloc[-1].split(",")[0] == "f6"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("value", "kind"), [(300.0, "implausible"), (-999.0, "dead")])
 def test_a_thermometer_that_gives_what_no_weather_gives_is_implausible_and_a_marker_is_a_missing_value(value, kind):
     monitor, new = fitted(), changed({})
@@ -348,6 +354,7 @@ def test_values_of_a_baseline_that_are_no_measurements_are_set_aside_and_named(s
     assert monitor.threshold_ == expected.threshold_
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*few-records")
 def test_a_column_that_says_nothing_is_left_out_and_named():
     records = truss()

@@ -45,6 +45,7 @@ def path(tmp_path, ending):
     return tmp_path / f"bridge.{ending}"
 
 
+@pytest.mark.one_case
 @each_form
 @pytest.mark.parametrize("stop", [FIRST + 3, DAMAGED + 8], ids=["in a window", "in an event"])
 def test_a_monitor_goes_on_where_it_stopped(monitor, records, path, stop):

@@ -82,6 +82,7 @@ def fleet():
     return made
 
 
+@pytest.mark.nightly
 def test_a_bridge_fails_alone_and_is_named(fleet):
     assert list(fleet.table.index) == ["a", "b", "c", "d", "broken", "odd"]
     assert fleet.table["is_fitted"].tolist() == [True] * 4 + [False, True]
@@ -252,6 +253,7 @@ def test_what_the_owner_found_is_kept(tmp_path):
         fleet.acknowledge("x", 1, harmless=True)
 
 
+@pytest.mark.nightly
 def test_monitors_that_were_fitted_one_by_one_are_a_fleet_like_any_other(fleet):
     single = {name: pickle.loads(pickle.dumps(fleet.monitors[name])) for name in "abc"}
     new = {

@@ -49,6 +49,7 @@ def lowered(records, share, n_days=20):
     return new
 
 
+@pytest.mark.nightly
 def test_the_lower_level_changes_no_alarm(truss_monitor, two_levels, whole, records):
     assert two_levels.threshold_ == truss_monitor.threshold_
     assert truss_monitor.watch_threshold_ is None
@@ -77,6 +78,7 @@ def test_a_watch_becomes_an_alarm_and_does_not_stand_beside_it(whole):
     assert [one["kind"] for one in status.events] == ["damage"]
 
 
+@pytest.mark.nightly
 @settings(
     max_examples=by_day(2, at_night=3),
     deadline=None,
@@ -92,6 +94,7 @@ def test_more_change_never_lowers_the_level(two_levels, records, shares):
     assert levels[-1] == 2
 
 
+@pytest.mark.nightly
 def test_a_watch_that_is_silent_is_not_evaluated_and_a_higher_rate_is_expected(two_levels, records):
     tried = (served(two_levels, lowered(records, share))[0] for share in np.arange(0.002, 0.02, 0.001))
     monitor = next(one for one in tried if one.status(one.last_).state == "watch")

@@ -159,6 +159,7 @@ def test_indices_are_those_of_the_detector_on_all_records(name):
     np.testing.assert_allclose(answers["index"], expected[N_BASELINE:], atol=1e-6)
 
 
+@pytest.mark.nightly
 def test_days_summarise_their_records():
     _, answers, after = fitted("mean by time")
     by_day = answers.groupby(answers.index.normalize())
@@ -274,6 +275,7 @@ def test_memory_of_steps_that_are_not_known_is_asked_for():
     pd.testing.assert_frame_equal(whole, pd.concat(parts))
 
 
+@pytest.mark.nightly
 def test_what_the_owner_says_of_an_event_stays_with_it():
     monitor, _, _ = fitted("lags")
     held = SERVICE.index[64:68]

@@ -86,6 +86,7 @@ def test_healthy_sensors_are_left_alone(monitor, records):
     pd.testing.assert_frame_equal(served.corrected_, records.loc[served.records_.index], check_freq=False)
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("kind", ["dead", "stuck", "offset", "drift", "implausible", "swapped"])
 def test_a_fault_is_named_dated_and_left_out(monitor, records, kind):
     faulty, columns = with_fault(records, kind)
@@ -130,7 +131,7 @@ def test_damage_is_not_taken_for_a_fault(monitor, records, lost):
     assert served.corrected_[MODES].equals(damaged.loc[served.records_.index, MODES])
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize("moved", [[6.0, -6.0, 20.0], [25.0, 25.0, 25.0]])
 def test_where_most_thermometers_depart_none_is_left_out(monitor, records, moved):
     faulty = records.copy()
@@ -140,6 +141,7 @@ def test_where_most_thermometers_depart_none_is_left_out(monitor, records, moved
     assert served.corrected_.equals(faulty.loc[served.records_.index])
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("unit", ["degrees Fahrenheit", "kelvin"])
 def test_temperatures_in_another_unit_than_the_baselines_are_refused(monitor, records, unit):
     twin, new, thermometers = copy.deepcopy(monitor), records[N_BASELINE * PER_DAY :], ["T0", "T1", "T2"]
@@ -153,6 +155,7 @@ def test_temperatures_in_another_unit_than_the_baselines_are_refused(monitor, re
     assert twin.last_ == new.index[-1]
 
 
+@pytest.mark.nightly
 def test_heat_and_a_thermometer_at_fault_are_no_other_unit(monitor, records):
     hot, faulty = records[N_BASELINE * PER_DAY :].copy(), records[N_BASELINE * PER_DAY :].copy()
     hot[["T0", "T1", "T2"]] += 9.0
@@ -165,6 +168,7 @@ def test_heat_and_a_thermometer_at_fault_are_no_other_unit(monitor, records):
         assert twin.last_ == batch.index[-1]
 
 
+@pytest.mark.nightly
 def test_of_two_thermometers_that_contradict_each_other_both_stay(monitor, records):
     """It is not known which is wrong: of two, or of two that are left."""
     two, left = bridge(2), records.copy()
@@ -191,6 +195,7 @@ def test_a_reference_tells_which_thermometer_is_wrong_and_fills_it():
     assert gap.corrected_["T0"].notna().all()
 
 
+@pytest.mark.nightly
 def test_one_thermometer_can_still_be_dead_or_stuck():
     alone = bridge(1)
     own = fitted(alone)

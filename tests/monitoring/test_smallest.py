@@ -66,6 +66,7 @@ def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_r
     assert changes.within < pd.Timedelta("3D")
 
 
+@pytest.mark.nightly
 def test_responses_about_zero_have_falls_in_their_units_and_none_in_common():
     about_zero = bridge()[:"2025"].copy()
     about_zero[MODES] -= about_zero[MODES].mean()

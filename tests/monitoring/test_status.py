@@ -40,6 +40,7 @@ def after(fitted, records):
     return monitor
 
 
+@pytest.mark.nightly
 def test_a_status_is_plain_and_says_what_the_tables_say(after):
     status = after.status(after.last_)
     plain = status.as_dict()
@@ -62,6 +63,7 @@ def test_a_status_is_plain_and_says_what_the_tables_say(after):
     assert plain["counts"] == after.counts_
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("damaged", [False, True])
 def test_silence_is_never_healthy_and_never_ends_an_alarm(monitor, records, damaged):
     assert monitor.status(monitor.last_).state == "not evaluated"  # no record yet

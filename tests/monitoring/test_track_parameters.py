@@ -66,6 +66,7 @@ def test_without_drift_none_is_claimed(healthy):
     assert ((bands["ci_low"] < 1) & (bands["ci_high"] > 1)).all()
 
 
+@pytest.mark.nightly
 def test_noise_that_lasts_for_weeks_is_no_drift():
     """A disturbance of 40 days, such as moisture, and little noise beside it: without allowance all would drift."""
     campaign, random = make_truss_campaign(2, noise=0.001, random_state=2), np.random.default_rng(0)

@@ -199,6 +199,7 @@ def test_a_mode_is_drawn_at_its_shape_and_the_largest_displacement_is_the_amplit
         np.testing.assert_allclose(places["l", "f"][0], [0, 0], atol=1e-12)
 
 
+@pytest.mark.nightly
 def test_modes_in_space_by_groups():
     structure = kw51_structure()
     options = {"model": make_kw51(), "modes": [0, 1, 2], "groups": ["girders", "arch"]}

@@ -41,6 +41,7 @@ class TestValues:
         found = check_records(changed(T, rows, column, value), F)
         assert only(found) == ("placeholders", T.columns[column], len(rows), T.index[rows[0]], T.index[rows[-1]])
 
+    @pytest.mark.nightly
     @given(rows=ROWS, column=MODE, value=st.sampled_from([-999.0, 9999.0, 0.0, -1.0, np.inf, 1e308]))
     @often
     def test_values_that_are_no_frequencies_are_named_with_their_rows(self, rows, column, value):
@@ -258,6 +259,7 @@ def test_arguments_that_are_no_tables_are_refused():
 
 
 class TestFindings:
+    @pytest.mark.nightly
     @given(random=st.randoms(use_true_random=False))
     @often
     def test_order_of_rows_and_columns_does_not_matter(self, random):

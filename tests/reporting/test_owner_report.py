@@ -217,6 +217,7 @@ def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
     assert "There was no warning" not in text
 
 
+@pytest.mark.nightly
 def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(page, found):
     opened = plt.figure()
     with plt.style.context("dark_background"):
@@ -226,6 +227,7 @@ def test_drawings_do_not_depend_on_the_users_style_and_none_stays_open(page, fou
     assert again == page.values("src")[-1:]
 
 
+@pytest.mark.nightly
 def test_control_characters_in_names_are_seen_and_harm_nothing():
     names = ["a\x00b", "line\nbreak \x1b[31m\u202e", "\x07bell"]
     explanations = {name: (0.33, {name: (0.2, 0.01)}) for name in names}

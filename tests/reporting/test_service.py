@@ -72,6 +72,7 @@ def page(real, tmp_path_factory):
     return Page(owner_report(real[0], path, title=HOSTILE, now=now).read_text(encoding="utf-8"))
 
 
+@pytest.mark.nightly
 def test_it_is_one_sound_page_without_network(page):
     sections = sections_in("monitor.html.j2")
     assert sections[:2] == ["today", "events"]
@@ -370,6 +371,7 @@ def test_time_zones_and_the_clock():
     assert "the dates of the records are wrong" in page.text
 
 
+@pytest.mark.nightly
 def test_ten_years_of_service_are_a_small_page(tmp_path):
     monitor = FakeMonitor(n_days=3650)
     file = owner_report(monitor, tmp_path / "a.html", now=monitor.last_)

@@ -17,6 +17,7 @@ def noise(random, kind, n_records, n_modes=4):
     return drawn
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["independent", "memory", "shared"])
 def test_means_of_a_month_are_rarely_improbable(kind):
     random, chances = np.random.default_rng(0), []

@@ -35,6 +35,7 @@ def test_numbers_of_independent_records_have_bounds():
     assert independent_records(np.array([])) == 1
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("share", [0.2, 0.7])
 def test_drawn_noise_has_the_slow_part_of_the_residuals_however_small(share):
     """Means over a week and a month scatter as those of the law: independent records, and a memory of 20 days."""

@@ -28,6 +28,7 @@ def table(study):
         return compare_extensions(study, WEATHER, baseline_factors=(2.0, 2.5))
 
 
+@pytest.mark.nightly
 def test_candidates_are_compared_with_the_same_present_and_the_best_is_first(table):
     assert set(table["candidate"]) == {"mode 7", "mode 8", "mode 9", "baseline x 2", "baseline x 2.5"}
     assert table["mdd_now"].nunique() == 1
@@ -37,6 +38,7 @@ def test_candidates_are_compared_with_the_same_present_and_the_best_is_first(tab
     assert (table["gain"] < table["ci_high"]).all()
 
 
+@pytest.mark.nightly
 def test_the_recommended_mode_gains_as_much_in_true_records(table):
     best = table[table["kind"] == "mode"].iloc[0]
     assert (best["candidate"], best["family"]) == ("mode 9", "top")

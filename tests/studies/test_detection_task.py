@@ -244,6 +244,7 @@ def test_the_best_of_a_search_is_fitted_to_the_baseline(task):
     assert best.threshold_ == expected.threshold_ != search.best_estimator_.threshold_
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*few-records")  # a line leaves residuals that follow the season
 def test_confirmation_evaluates_fresh_noise_and_weather(fem):
     task = task_of(fem, n_repeats=3, n_splits=1)

@@ -97,6 +97,7 @@ def test_a_program_that_gives_frequencies_alone_has_its_parameters_as_groups(fem
     np.testing.assert_allclose(tables[1][columns], tables[0][columns], atol=2e-3)
 
 
+@pytest.mark.nightly
 def test_a_reduced_model_and_rows_in_any_order_give_the_same(fem, reduced_fem):
     T = LATER.temperatures[:80]
     F = fem.simulate(T, damage={"top": 0.2}, noise="fitted", random_state=0)
@@ -177,6 +178,7 @@ def test_draws_make_a_scenario(fem):
 # Other causes
 
 
+@pytest.mark.nightly
 def test_stiffening_parameters_and_mass_are_causes_of_their_own(fem):
     asphalt, T = np.full(TRUSS.n_dof, 200.0), WEATHER
     causes = {"stiffening": ["top"], "parameters": ["diagonal"], "added_mass": {"asphalt": asphalt}}
@@ -361,6 +363,7 @@ def test_one_record_says_less_than_many(fem):
     assert one.table.loc["diagonal", "standard_error"] > many.table.loc["diagonal", "standard_error"]
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*few-records")
 def test_records_that_depend_on_those_before_count_less():
     errors = {}

@@ -59,6 +59,7 @@ def test_probabilities_are_those_of_one_law(fem):
     assert sets[-1] <= TRUSS.groups["bottom"]
 
 
+@pytest.mark.nightly
 def test_whole_groups_remain_whole_and_reduced_chains_give_the_same(fem, reduced_fem):
     F = damaged_records("bottom", TRUSS.groups["bottom"], 0.15)
     found, reduced = (located(one, F) for one in (fem, reduced_fem))
@@ -115,6 +116,7 @@ def symmetric():
     return bridge, model, fem, T, theta
 
 
+@pytest.mark.nightly
 def test_shapes_alone_distinguish_mirrored_places(symmetric):
     """Damage is in the third and fourth element."""
     bridge, model, fem, T, theta = symmetric

@@ -16,7 +16,7 @@ DETECTED = np.array([9.0, 21.0, 33.0, 38.0, 40.0])
 RECORDS = np.full(5, 40.0)
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize("log", [False, True])
 @pytest.mark.parametrize("records", [RECORDS, RECORDS * [0.31, 0.7, 0.55, 1.0, 0.93]])
 def test_agrees_with_a_generalised_linear_model(log, records):

@@ -65,6 +65,7 @@ def damaged(study, name):
     return [*found[:-1], found[-1][:, 100:]]
 
 
+@pytest.mark.nightly
 def test_best_first_then_those_with_too_many_false_alarms_then_failures(table):
     assert table.index.tolist() == ["lines", "raw", "twin", "dice", "loud", "broken"]
     assert table["within_limit"].tolist() == [True] * 4 + [False] * 2

@@ -32,6 +32,7 @@ def study(fem):
     return study
 
 
+@pytest.mark.nightly
 def test_repeats_do_not_depend_on_the_replicates(fem, study):
     alone = study_of(fem, "noise")
     results = alone.run(WEATHER)
@@ -144,10 +145,12 @@ def test_other_training_records_change_a_chain_as_its_error(fem):
     pd.testing.assert_frame_equal(fem.predict(year), predicted)
 
 
+@pytest.mark.nightly
 def test_a_refitted_chain_finds_the_same_parameters(fem):
     pd.testing.assert_frame_equal(refitted(fem).parameters_, fem.parameters_)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_a_chain_with_another_model_is_that_of_the_other_model(fem):
     plain = clone(fem).set_params(aligner="passthrough", inverse__prior=0.3).fit(YEAR.temperatures, YEAR.frequencies)

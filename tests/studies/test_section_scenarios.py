@@ -34,6 +34,7 @@ def of_model(fem, damage):
     return np.asarray(fem.aligner_.inverse_transform(clean)) * np.exp(fem.discrepancy_(T))
 
 
+@pytest.mark.nightly
 def test_a_chain_simulates_what_its_model_loses(fem):
     damage = {"bottom": 0.2, "top": 0.1}
     expected = of_model(fem, damage)
@@ -80,6 +81,7 @@ def test_scenarios_hand_the_kind_on(fem):
         Scenario("x", damage, kind="mass")
 
 
+@pytest.mark.nightly
 def test_studies_find_the_loss_that_is_simulated(fem):
     detector = CompensatedDetector(DirectionalDetector(fem), targets=list(YEAR.frequencies))
     drawn = UncertainDamage("drawn", pd.DataFrame({"diagonal": [0.1, 0.1]}), kind="section")

@@ -56,6 +56,7 @@ def study(fem):
     return study
 
 
+@pytest.mark.nightly
 def test_one_row_for_each_detector_and_scenario(study):
     results = study.results_
     assert results.columns[0] == "detector"
@@ -98,6 +99,7 @@ class CountedForest(IsolationForest):
         return super().fit(X, y, sample_weight)
 
 
+@pytest.mark.nightly
 def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fem, tmp_path):
     forest = OutlierDetector(CountedForest(n_estimators=2))
     several = {"raw": forest, "residuals": compensated(forest), "distance": compensated()}
@@ -116,6 +118,7 @@ def test_a_study_with_a_memory_fits_no_detector_again_and_gives_the_same_bits(fe
     assert CountedForest.n_fits == 4 * once
 
 
+@pytest.mark.nightly
 def test_the_truth_is_asked_once_for_all_detectors(fem):
     asked = Counter()
 

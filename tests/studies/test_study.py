@@ -41,6 +41,7 @@ def test_records_are_those_that_the_chain_simulates(fem, noise):
     assert results["measure"].tolist() == ["PFA", "POD"]
 
 
+@pytest.mark.nightly
 def test_same_bits_whatever_the_jobs(fem):
     scenarios = [*sweep(fem, (0.1, 0.3), ["bottom", "top"]), ProgressiveDamage("crack", {"top": 0.3}, 50, 90)]
     study = study_of(fem, compensated(), scenarios, n_repeats=3)
@@ -205,6 +206,7 @@ def test_records_that_cannot_be_evaluated_do_not_count():
     assert study.indices_["OutlierDetector", "healthy", "simulated"].iloc[5:15].isna().all()
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*many-false-alarms")
 def test_weather_outside_the_training_range_is_said_once(fem):
     study = study_of(fem, compensated(), sweep(fem, (0.1, 0.2)), n_repeats=3, n_jobs=2)
@@ -264,6 +266,7 @@ def in_service():
         return chain(random_state=0).fit(T, F)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*faulty-sensor", "ignore:.*not-evaluated")
 def test_a_repeat_has_the_same_gaps_in_all_scenarios_and_other_repeats_have_others(in_service):
     scenarios = [{}, {"bottom": 0.2}]

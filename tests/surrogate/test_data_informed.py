@@ -49,6 +49,7 @@ def test_frequencies_are_those_of_the_model_times_the_discrepancy(discrepancy, d
     assert (discrepancy is None) == (np.nanmax(np.abs(fem.discrepancy_(air))) == 0)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_the_discrepancy_is_what_the_model_cannot_follow():
     """Modes that the weather moves unlike any parameter does."""
@@ -73,6 +74,7 @@ def test_noise_is_estimated_out_of_fold_whatever_the_outliers_and_the_memory():
         np.testing.assert_array_equal(fem.report_.modes["noise"], 100 * fem.noise_)
 
 
+@pytest.mark.nightly
 def test_an_inverse_takes_the_noise_of_the_records_unless_it_is_stated():
     auto = chain(inverse=trained(noise="auto")).fit(T, F)
     np.testing.assert_array_equal(auto.inverse_.noise_, auto.noise_)
@@ -83,6 +85,7 @@ def test_an_inverse_takes_the_noise_of_the_records_unless_it_is_stated():
     assert (learned.inverse_.noise_ > 0.8 * learned.noise_).all()
 
 
+@pytest.mark.nightly
 def test_outliers_do_not_move_the_model():
     random = np.random.default_rng(0)
     raw = F * np.where(random.random(F.shape) < 0.01, 1.2, 1.0)
@@ -131,6 +134,7 @@ def gappy():
 FILLED = "ignore:.*(not-evaluated|faulty-sensor)"
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings(FILLED)
 def test_gaps_flow_through_fit_predict_and_score():
     holed_T, holed_F = gappy()
@@ -182,6 +186,7 @@ def test_an_inverse_of_another_models_parameters_is_refused():
         chain(inverse=inverse().set_params(model=other)).fit(T, F)
 
 
+@pytest.mark.nightly
 def test_an_inverse_within_a_pipeline_gets_the_model_too():
     nested = make_pipeline(inverse().set_params(model=None))
     fem = chain(inverse=nested).fit(T, F)
@@ -189,6 +194,7 @@ def test_an_inverse_within_a_pipeline_gets_the_model_too():
     np.testing.assert_array_equal(fem.predict(T), fitted().predict(T))
 
 
+@pytest.mark.nightly
 def test_an_aligner_without_a_reference_gets_the_models():
     within = make_pipeline(FunctionTransformer(check_inverse=False), BiasAligner())
     named, bare, inside = (chain(aligner=aligner) for aligner in (BiasAligner(TRUSS), BiasAligner(), within))
@@ -225,6 +231,7 @@ def test_same_seed_same_bits():
     assert not np.array_equal(other, alone)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_large_models_work_in_worker_processes():
     """Matrices above 1 MB reach workers as read-only memory maps."""

@@ -40,6 +40,7 @@ def error(mapper, seed, **options):
     return float(np.abs(mapper.predict(T) / clean - 1).to_numpy().mean())
 
 
+@pytest.mark.nightly
 def test_few_records_and_the_fleet_are_better_than_either():
     errors = {"fleet": [], "alone": [], "both": []}
     for seed in range(20, 25):
@@ -66,6 +67,7 @@ def test_a_bridge_unlike_the_others_loses_little():
     assert np.mean(ratios) < 1.1
 
 
+@pytest.mark.nightly
 def test_standard_deviations_are_no_smaller_than_errors():
     inside = []
     for seed in range(30, 45):
@@ -134,6 +136,7 @@ def signed(seed, days=365):
     return pd.DataFrame({"T": warm}, stamps), pd.DataFrame({"d": d, "f1": f}, stamps)
 
 
+@pytest.mark.nightly
 def test_responses_of_any_sign_are_learned_in_any_unit():
     (T, Y), warm = signed(20, 40), pd.DataFrame({"T": [10.0, 30.0]})
     predicted = []

@@ -114,6 +114,7 @@ def test_folds_of_a_compensator_have_means_of_all_records():
     assert by_lags.fit(T.join(F)).estimator_[-1].means_ is None  # lags are the past already
 
 
+@pytest.mark.nightly
 def test_a_chain_chooses_by_its_frequencies():
     stamps = pd.date_range("2023-01-01", periods=500, freq="D")
     random = np.random.default_rng(0)

@@ -154,6 +154,7 @@ class TestFindings:
         first, again, fresh = (self.kinds(make, memory) for memory in (str(tmp_path), str(tmp_path), None))
         assert first == again == fresh == ["few-records"]
 
+    @pytest.mark.nightly
     def test_of_chains(self, tmp_path):
         gaps = F.where(np.random.default_rng(0).uniform(size=F.shape) < 0.4)
         first, again, fresh = (

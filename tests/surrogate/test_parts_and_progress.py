@@ -65,6 +65,7 @@ def test_unknown_parameters_are_named_and_change_nothing(name, message):
     assert fem.mapper is None
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_search_over_parameters_of_default_parts():
     grid = {"inverse__noise": [0.02], "mapper__regressor__ridgecv__alphas": [[1e-3], [1e9]]}

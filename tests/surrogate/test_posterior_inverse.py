@@ -169,6 +169,7 @@ def three_spans():
     return structure.assemble(list(groups), n_modes=5)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("noise", [0.003, 0.01])
 def test_intervals_hold_where_each_parameter_follows_temperature_at_its_own_rate(noise):
     model, held = three_spans(), []
@@ -260,6 +261,7 @@ def test_a_row_does_not_depend_on_the_others():
             np.testing.assert_allclose(part[name], whole[name][rows], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.nightly
 def test_parallel_jobs_give_the_same_bits():
     measured = holed(noisy(drawn(300), 0.01), 0.1)
     one, two = (PosteriorInverse(TRUSS, n_jobs=n_jobs).fit(measured).invert(measured) for n_jobs in (1, 2))

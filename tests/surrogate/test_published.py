@@ -42,7 +42,7 @@ def test_a_network_that_the_paper_has_not_is_refused():
         paper_chain(TRUSS, network="kw51-mapper")
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize("purpose", TABLES.values())
 def test_networks_follow_scikit_learn(purpose):
     small = {"hidden_layer_sizes": (32, 16, 8), "max_iter": 60, "learning_rate_init": 0.01, "batch_size": 16}
@@ -64,6 +64,7 @@ def test_a_step_of_adam_is_against_the_slope_of_the_loss():
                 assert moved[place] - kept == pytest.approx(-0.001 * np.sign(losses[1] - losses[0]), rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_dropout_of_inputs_is_ridge_regression():
     """Without hidden layers, the mean loss over all masks has the ridge penalty rate / (1 - rate) X'X, its diagonal."""
     rate = 0.3
@@ -76,6 +77,7 @@ def test_dropout_of_inputs_is_ridge_regression():
     assert np.abs(linear.set_params(dropout=()).fit(X, Y).coefs_[0] - expected).max() > 0.2
 
 
+@pytest.mark.nightly
 def test_the_rows_that_are_held_out_are_scored():
     """A network that learns pure noise by heart knows four fifths of it."""
     noise = RANDOM.standard_normal((200, 1))
@@ -129,6 +131,7 @@ def test_simulations_as_a_reference_need_an_inverse_that_has_some():
         BiasAligner("simulations").fit(F)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*(no-earlier-records|uncalibrated-model)")
 def test_gaps_of_temperatures_and_frequencies_are_filled_together_so_that_all_rows_train():
     holed_T, holed_F = gappy(T, 0), gappy(F, 1)

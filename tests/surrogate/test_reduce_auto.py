@@ -150,6 +150,7 @@ def test_most_of_many_rows_come_from_a_surface(monkeypatch):
     assert np.isnan(found[2401]).all()
 
 
+@pytest.mark.nightly
 def test_few_rows_full_models_and_growing_damage_have_no_surface(monkeypatch):
     few, exact = simulator_of(USUAL, 1e-5), simulator_of(USUAL, False)
     rows = np.repeat(USUAL, 10, axis=0)

@@ -75,6 +75,7 @@ def narrow(monkeypatch):
         refusing(cls)
 
 
+@pytest.mark.nightly
 def test_one_reduced_model_serves_the_inverse_and_predictions(made):
     T, F = records(0.96, 1.04, 40)
     fem = chain().fit(T, F)

@@ -66,6 +66,7 @@ class TestTheReport:
         assert fitted.report_.parameters.deviations.idxmax() == "vertical"
         assert fitted.report_.parameters.deviations["vertical"] > 5 * fitted.report_.parameters.deviations["bottom"]
 
+    @pytest.mark.nightly
     def test_reasons_for_rows_left_out_are_counted(self):
         air, measured = T.copy(), F.copy()
         air.iloc[5:8] = np.nan
@@ -175,6 +176,7 @@ class TestWarningsOfFit:
         assert outliers.to_numpy().sum() == outliers.iloc[5, 2] == 1
         assert "'f3' is 999 Hz in 1 of 365 rows, 2025-01-06" in repr(fem.report_)
 
+    @pytest.mark.nightly
     def test_only_modes_that_are_far_off_are_taken_for_others(self):
         z24 = make_z24()
         nominal = z24.frequencies(np.ones(4))[0] * [1.02, 1.01, 1.02, 1.023]
@@ -186,6 +188,7 @@ class TestWarningsOfFit:
         assert "['f0', 'f1'] look like other modes" in text
         assert "with_modes([1, 0, 2, 3])" in text
 
+    @pytest.mark.nightly
     @pytest.mark.filterwarnings("ignore:.*(mode-order|uncalibrated-model|outside-bounds|poor-fit)")
     @pytest.mark.parametrize(
         ("offsets", "order", "is_named"),
@@ -206,6 +209,7 @@ class TestWarningsOfFit:
         assert bool(texts) == is_named
         assert not is_named or "with_modes([0, 1, 3, 2])" in texts[0]
 
+    @pytest.mark.nightly
     @pytest.mark.filterwarnings("ignore:.*(uncalibrated-model|few-records)")
     def test_modes_of_the_models_of_measured_bridges_are_in_order(self):
         campaign = make_kw51_campaign(random_state=0)

@@ -129,6 +129,7 @@ def test_with_routing_the_steps_that_request_weights_get_them():
     np.testing.assert_array_equal(last.regressor_[0].knots_, HingeFeatures(2).fit(inputs).knots_)
 
 
+@pytest.mark.nightly
 def test_routing_changes_no_result():
     gaps = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
     fem = DataInformedFEM(TRUSS, random_state=0)

@@ -62,6 +62,7 @@ def flawless():
     return chain(random_state=0).fit(T, F)
 
 
+@pytest.mark.one_case
 @pytest.mark.filterwarnings("ignore:.*not-evaluated")
 @pytest.mark.parametrize("knows_weather", [True, False])
 def test_markov_gaps_come_as_often_and_last_as_long(in_service, spoiled, knows_weather):
@@ -73,6 +74,7 @@ def test_markov_gaps_come_as_often_and_last_as_long(in_service, spoiled, knows_w
     assert abs(lengths.mean() - known.mean()) < 4 * lengths.std() / np.sqrt(len(known))
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_outages_stay_whole_and_gaps_follow_the_weather():
     heat = T.mean(axis=1)
@@ -101,6 +103,7 @@ def test_gaps_are_the_same_whatever_the_noise(in_service):
     assert (in_service.recorder_.gaps(in_service.weather(T), random_state=5)[1] != expected).any()
 
 
+@pytest.mark.nightly
 def test_outliers_come_as_often_in_the_same_mode_and_in_runs(in_service, spoiled):
     noise = [
         in_service.recorder_.noise(in_service.weather(T), gaps="fitted", outliers="fitted", random_state=seed)
@@ -116,6 +119,7 @@ def test_outliers_come_as_often_in_the_same_mode_and_in_runs(in_service, spoiled
     assert 0.75 < lengths.mean() / run_lengths(trained).mean() < 1.25
 
 
+@pytest.mark.nightly
 def test_shares_of_single_gaps_and_outliers(flawless):
     noise = np.vstack(
         [

@@ -148,6 +148,7 @@ def test_missing_modes_and_missing_shapes_are_left_out():
 # What models and parameters may be
 
 
+@pytest.mark.nightly
 def test_reduced_models_and_stored_inversions_give_the_same(tmp_path):
     model = portal(n_modes=3, track=True).with_parameters(["columns", "beams"])
     dofs = [40, 100, 160, 220]

@@ -18,7 +18,7 @@ def weather():
     return make_truss_campaign(random_state=1).temperatures[:60]
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 def test_each_row_may_have_its_own_severity(fem, weather):
     growing = np.linspace(0, 0.5, 60)
     found = fem.simulate(weather, damage={"bottom": growing, "top": 0.1})

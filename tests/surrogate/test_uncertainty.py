@@ -49,6 +49,7 @@ def test_simulations_scatter_like_the_training_records():
     np.testing.assert_allclose(damaged / fem.simulate(T, damage={"top": 0.3}), noisy / clean, rtol=1e-12)
 
 
+@pytest.mark.nightly
 def test_noise_of_shuffled_records_is_that_of_records_in_order_of_time():
     shuffled = T.sample(frac=1, random_state=0)
     expected = fitted().simulate(T, noise="fitted", random_state=0)
@@ -71,6 +72,7 @@ def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
         np.testing.assert_allclose(values, F.iloc[test].to_numpy() / predicted - 1, atol=1e-9)
 
 
+@pytest.mark.nightly
 def test_residuals_do_not_know_the_discrepancy_of_their_own_week():
     """A mode that one week alone moves: what is learned there is not in its residuals."""
     week = np.arange(365) // 7 == 20
@@ -94,6 +96,7 @@ def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week()
         assert block == (max(pd.Timedelta("7D"), np.ceil(rows) * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
 
 
+@pytest.mark.nightly
 def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
     lasting = F * (1 + 0.01 * autoregressive(365, 0.9))
     blocks = [
@@ -160,6 +163,7 @@ def test_pickles_keep_residuals_and_clones_do_not():
 # Standard deviations and intervals
 
 
+@pytest.mark.nightly
 def test_standard_deviations_are_spreads_in_hertz():
     frequencies, std = fitted().predict(T, return_std=True)
     pd.testing.assert_frame_equal(frequencies, fitted().predict(T))
@@ -265,6 +269,7 @@ def test_standard_deviations_add_the_change_by_a_filled_temperature_in_quadratur
     np.testing.assert_allclose(std, predicted * np.hypot(spread, change), rtol=1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*faulty-sensor")
 def test_a_filled_temperature_costs_wherever_a_lag_reaches_it():
     lagged = chain(mapper=make_pipeline(LagFeatures([0, 2]), PLAIN)).fit(T, F)
@@ -277,6 +282,7 @@ def test_a_filled_temperature_costs_wherever_a_lag_reaches_it():
     np.testing.assert_array_equal(np.flatnonzero(wider), np.arange(100, 105))
 
 
+@pytest.mark.nightly
 def test_a_day_whose_lags_reach_back_too_far_is_counted():
     lagged = chain(mapper=make_pipeline(LagFeatures([0, 1, 5], padding="nan"), PLAIN)).fit(T, F)
     day = LATER.temperatures.set_axis(LATER.temperatures.index + pd.Timedelta("900D"))
