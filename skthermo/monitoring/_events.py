@@ -190,7 +190,8 @@ class Events:
     same direction; its kind is the gravest of them. What the owner has called harmless is over: a later alarm is
     another event. No event goes on beyond a new baseline. Values of sensors that have failed have events of their own.
 
-    ``table`` has a row for each event, counted from 1; ``sign`` is its first sign. ``runs`` are those of each event.
+    ``table`` has a row for each event, counted from 1; ``sign`` is its first sign. ``answered`` is the table with what
+    the owner has said of each. ``runs`` are those of each event.
     """
 
     def __init__(
@@ -222,6 +223,7 @@ class Events:
         series = zip(dtypes, map(list, columns), dtypes.values(), strict=True)
         table = pd.DataFrame({name: pd.Series(values, dtype=dtype) for name, values, dtype in series})
         self.table = table.set_axis(pd.RangeIndex(1, len(rows) + 1, name="event"))
+        self.answered = with_acknowledgements(self.table, said)
 
     def _raised(self, persistence: Persistence) -> Iterator[Run]:
         """Runs of alarms and watches."""
@@ -321,9 +323,8 @@ class Events:
         """
         states, numbers = np.full(len(self.times), "healthy", dtype=object), np.zeros(len(self.times), dtype=np.int64)
         ranks = np.full(len(self.times), len(STATES))
-        answers = with_acknowledgements(self.table, self.said)
         for number, runs in self.runs.items():
-            event, ordered = answers.loc[number], sorted(runs, key=lambda run: -RANKED_KINDS.index(run.kind))
+            event, ordered = self.answered.loc[number], sorted(runs, key=lambda run: -RANKED_KINDS.index(run.kind))
             if event["kind"] == FAULT:
                 continue
             for run in ordered:
@@ -352,13 +353,13 @@ class Events:
         The numbers of records without another event become those of faults.
         """
         is_unexplained, is_set_aside = np.zeros((2, len(self.times)), dtype=bool)
-        answers = with_acknowledgements(self.table, self.said)
         for place, run in ((place, run) for place, runs in self.runs.items() for run in runs if run.kind == FAULT):
             rows = np.arange(run.first, run.stop)
             number[rows[number[rows] == 0]] = place
             if (self.decisions["n_held"].to_numpy()[rows] > 0).any():
                 is_set_aside[rows] = True
-                is_over = bool(answers.loc[place, "harmless"]) & (self.times[rows] >= answers.loc[place, "at"])
+                is_harmless, at = self.answered.loc[place, ["harmless", "at"]]
+                is_over = bool(is_harmless) & (self.times[rows] >= at)
                 is_unexplained[rows] |= ~is_over
         return is_unexplained, is_set_aside
 
@@ -370,8 +371,9 @@ def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFr
         end = np.inf if pd.isna(event.end) else event.end.value
         own = said[(said["kind"] == event.kind) & (said["time"] >= event.start.value) & (said["time"] < end)]
         answers.append((True, *own[["harmless", "note", "at"]].iloc[-1]) if len(own) else (False, False, "", 0))
-    table = pd.DataFrame(answers, events.index, ["acknowledged", "harmless", "note", "at"])
-    return events.join(table.astype({"acknowledged": bool, "harmless": bool, "note": object, "at": np.int64}))
+    dtypes = {"acknowledged": bool, "harmless": bool, "note": object, "at": np.int64}
+    columns = zip(dtypes, zip(*answers, strict=True) if answers else [()] * len(dtypes), strict=True)
+    return events.assign(**{name: pd.Series(list(some), events.index, dtypes[name]) for name, some in columns})
 
 
 def evaluations(events: Events, first: int = 0) -> pd.DataFrame:

@@ -59,7 +59,6 @@ from skthermo.monitoring._events import (
     leading,
     lowered,
     rule_of,
-    with_acknowledgements,
 )
 from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
 from skthermo.monitoring._means import MeanTest
@@ -309,7 +308,7 @@ class Monitor(SavesFrames, Estimator):
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1, with what the owner has said of them."""
-        return self._answered().drop(columns=["sign", "at"])
+        return self._events().answered.drop(columns=["sign", "at"])
 
     @property
     def evaluations_(self) -> pd.DataFrame:
@@ -505,10 +504,6 @@ class Monitor(SavesFrames, Estimator):
 
     def _events(self) -> Events:
         return Events(self.decisions_, self.weeks_, self.acknowledgements_, self.persistence, self.restarts_)
-
-    def _answered(self) -> pd.DataFrame:
-        """Events with what the owner has said of them, and their first signs."""
-        return with_acknowledgements(self._events().table, self.acknowledgements_)
 
     def _decisions(self, stamps: pd.DatetimeIndex, **columns: Any) -> pd.DataFrame:
         """A row for each record: its index, the levels of events, and what becomes of it."""
