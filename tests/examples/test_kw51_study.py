@@ -7,6 +7,7 @@ import pytest
 from skthermo.datasets import make_kw51_campaign
 from tests.examples.pages import recipes
 
+pytestmark = pytest.mark.nightly
 study = recipes("kw51")
 
 
@@ -32,7 +33,6 @@ def records():
     )
 
 
-@pytest.mark.nightly
 def test_imputed_records_have_no_gaps_and_keep_what_was_measured(records):
     filled = records.imputed()
     assert filled.frequencies.notna().all(axis=None)

@@ -48,7 +48,8 @@ LOSSES = {"bottom": 0.15, "top": 0.15, "diagonal": 0.1, "bottom ": -0.2}
 @pytest.mark.parametrize(
     ("window", "groups"),
     [
-        (7, ["diagonal", "bottom "]),
+        (7, ["diagonal"]),
+        pytest.param(7, ["bottom "], marks=pytest.mark.nightly),
         pytest.param(None, [*LOSSES], marks=pytest.mark.nightly),
     ],
 )

@@ -74,7 +74,7 @@ SIZES = st.builds(lambda sign, size: float(np.exp(sign * size)), st.sampled_from
 
 
 some = settings(
-    max_examples=by_day(9, at_night=18),
+    max_examples=by_day(4, at_night=18),
     deadline=None,
     derandomize=True,
     phases=[Phase.generate],

@@ -114,7 +114,8 @@ def assert_as_if_never_come(monitor, other):
     assert n_taken[0] == n_taken[1]  # true records that came meanwhile were refused
 
 
-@pytest.mark.parametrize("ahead", [pytest.param("3653D", marks=pytest.mark.nightly), "5D"])
+@pytest.mark.nightly
+@pytest.mark.parametrize("ahead", ["3653D", "5D"])
 def test_discarded_records_are_as_if_they_had_never_come(truss_monitor, records, ahead, tmp_path):
     new = records[FIRST : FIRST + 60]
     wrong = new[40:50].set_axis(new.index[40:50] + pd.Timedelta(ahead)) * [1, 1, 1, *[0.97] * (new.shape[1] - 3)]

@@ -447,11 +447,11 @@ def detection_task(
     >>> year, weather = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1).temperatures
     >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
     >>> scenarios = sweep(fem, (0.03,), ["bottom", "top"])
-    >>> task = detection_task(fem, weather, scenarios, n_repeats=4, random_state=0)
+    >>> task = detection_task(fem, weather, scenarios, n_repeats=2, random_state=0)
     >>> task.X.shape, task.states["scenario"].value_counts().to_dict()
-    ((4745, 9), {'healthy': 1460, 'bottom 3 %': 1460, 'top 3 %': 1460})
+    ((2555, 9), {'healthy': 730, 'bottom 3 %': 730, 'top 3 %': 730})
     >>> single = CompensatedDetector(targets=fem.mode_names_)
-    >>> search = GridSearchCV(single, {"window": [None, 3, 7]}, cv=task.cv, scoring=task.scoring, refit=False)
+    >>> search = GridSearchCV(single, {"window": [None, 7]}, cv=task.cv, scoring=task.scoring, refit=False)
     >>> search.fit(task.X, task.y).best_params_
     {'window': 7}
     >>> later = make_truss_campaign(random_state=2).temperatures
