@@ -99,7 +99,8 @@ class Monitor(SavesFrames, Estimator):
         A fitted chain. With it, slow drift is followed in its parameters; without it, none is.
     false_alarms_per_year : float, default=1.0
         Alarms of a healthy structure in a year, on average: three quarters of them by damage indices, one quarter by
-        the mean of the last 30 days (all by damage indices where the baseline is shorter than half a year).
+        the mean of the last 30 days (all by damage indices where the baseline is shorter than half a year). At most
+        8766, one an hour.
     watch_per_year : float, optional
         A second, lower level: events of kind "watch" that a healthy structure has in a year, more than damage events.
         While one is open, and no damage event is, the state is "watch". By default there is no such level.
@@ -253,8 +254,8 @@ class Monitor(SavesFrames, Estimator):
         "detector": [HasMethods(["fit", "score_samples"]), None],
         "targets": ["array-like", None],
         "fem": [HasMethods(["fit", "predict"]), None],
-        "false_alarms_per_year": [Interval(Real, 0, None, closed="neither")],
-        "watch_per_year": [Interval(Real, 0, None, closed="neither"), None],
+        "false_alarms_per_year": [Interval(Real, 0, 8766, closed="right")],
+        "watch_per_year": [Interval(Real, 0, 8766, closed="right"), None],
         "persistence": "no_validation",  # rule_of does
         "reference": ["array-like", None],
         "max_delay": [str, timedelta, np.timedelta64],
