@@ -108,7 +108,8 @@ class TrainingRecords(SavesFrames):
             # ratios to predictions that are out of fold themselves, so that the model is not solved for each fold
             rows = train[has_theta[train]]
             own_weights = None if weights is None else weights[rows]
-            others = Discrepancy.fitted(model.discrepancy.regressor, inputs[rows], ratios[rows], own_weights)
+            known = model.discrepancy.regressor, inputs[rows], ratios[rows], own_weights
+            others = Discrepancy.fitted(*known, shares=model.discrepancy.shares)
             return lambda test: others.at(inputs[test])
 
         predicted = out_of_fold(learn_parameters, fold_of)

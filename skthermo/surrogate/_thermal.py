@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -35,6 +35,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem.damage import LossKind
+from skthermo.preprocessing.folds import BlockedKFold, Rows, out_of_fold
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import TrainingRange, unpredicted_findings
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
@@ -54,20 +55,21 @@ class LearnedRatios(NamedTuple):
 
     modes: NDArray[np.intp]
     regressor: BaseEstimator
+    level: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
-    Regressors have ``learned`` the ratios from inputs of the ``mapper``, within ``limits``, beyond which it stays as it
-    is there. It is 0 for modes with few records, and for all without a ``regressor``.
+    Regressors have ``learned`` the ratios from inputs of the ``mapper``; changes from their mean level count by the
+    ``shares`` of the modes, by which they agree with records that did not train them. It is 0 for modes with few
+    records, and for all without a ``regressor``.
     """
 
     regressor: BaseEstimator | None
     learned: tuple[LearnedRatios, ...]
-    limits: Array
-    n_modes: int
+    shares: Array
     sensors: SensorRegression | None = None
     mapper: Any = None
 
@@ -79,6 +81,7 @@ class Discrepancy:
         ratios: Array,
         weights: Array | None = None,
         *,
+        shares: Array | None = None,
         sensors: SensorRegression | None = None,
         mapper: Any = None,
         fewest: int = 30,
@@ -88,13 +91,12 @@ class Discrepancy:
         """Learn from ratios, (n_rows, n_modes), beside inputs of M2.
 
         A mode with a ratio ``far`` from its median, in robust deviations of its logarithm, leaves out the row. Modes
-        with the ``fewest`` rows learn, from at ``most`` so many, spread evenly.
+        with the ``fewest`` rows learn, from at ``most`` so many, spread evenly. ``shares`` may be known from more rows.
         """
-        n_modes, n_inputs = ratios.shape[1], inputs.shape[1]
+        found = np.zeros(ratios.shape[1])
         usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
         if regressor is None or not usable.any():
-            return cls(None, (), np.zeros((2, n_inputs)), n_modes, sensors, mapper)
-        limits = np.stack([inputs[usable].min(axis=0), inputs[usable].max(axis=0)])
+            return cls(None, (), found, sensors, mapper)
         logs, learned = np.log(np.where(usable[:, np.newaxis], ratios, np.nan)), []
         with np.errstate(invalid="ignore"):
             is_far = np.abs(logs - median(logs)) > far * robust_deviation(logs)
@@ -106,8 +108,10 @@ class Discrepancy:
                 continue
             values, own = ratios[np.ix_(rows, modes)], None if weights is None else weights[rows]
             values = values[:, 0] if len(modes) == 1 else values
-            learned.append(LearnedRatios(modes, fit_outputs(regressor, inputs[rows], values, own)))
-        return cls(regressor, tuple(learned), limits, n_modes, sensors, mapper)
+            fitted, level = fit_outputs(regressor, inputs[rows], values, own), mean_level(values, own)
+            found[modes] = reliable_shares(regressor, inputs[rows], values, own) if shares is None else shares[modes]
+            learned.append(LearnedRatios(modes, fitted, level))
+        return cls(regressor, tuple(learned), found, sensors, mapper)
 
     def __call__(self, X: Table) -> Array:
         """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
@@ -118,11 +122,31 @@ class Discrepancy:
     def at(self, inputs: Array) -> Array:
         """delta at inputs of M2; NaN in rows in which one is missing."""
         known = ~np.isnan(inputs).any(axis=1)
-        delta = np.full((len(inputs), self.n_modes), np.nan)
+        delta = np.full((len(inputs), len(self.shares)), np.nan)
         delta[known] = 0.0
-        for modes, regressor in self.learned if known.any() else ():
-            delta[np.ix_(known, modes)] = np.log(as_columns(regressor.predict(np.clip(inputs[known], *self.limits))))
+        for modes, regressor, level in self.learned if known.any() else ():
+            change = np.log(as_columns(regressor.predict(inputs[known]))) - level
+            delta[np.ix_(known, modes)] = level + self.shares[modes] * change
         return delta
+
+
+def mean_level(ratios: Array, weights: Array | None) -> Array:
+    """Mean logarithm of ratios, (n_modes,)."""
+    return np.average(np.log(as_columns(ratios)), axis=0, weights=weights)
+
+
+def reliable_shares(regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None) -> Array:
+    """Slopes of changes of ratios over those that a regressor predicts out of fold, from 0 to 1, (n_modes,)."""
+
+    def learn(train: Rows) -> Callable[[Rows], Array]:
+        own = None if weights is None else weights[train]
+        fitted, level = fit_outputs(regressor, inputs[train], ratios[train], own), mean_level(ratios[train], own)
+        return lambda test: np.log(as_columns(fitted.predict(inputs[test]))) - level
+
+    predicted = out_of_fold(learn, BlockedKFold(5).fold_of(inputs))
+    measured = np.log(as_columns(ratios)) - mean_level(ratios, weights)
+    slopes = (predicted * measured).sum(axis=0) / np.maximum((predicted**2).sum(axis=0), np.finfo(float).tiny)
+    return np.clip(slopes, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

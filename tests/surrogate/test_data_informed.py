@@ -14,6 +14,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
+from sklearn.tree import ExtraTreeRegressor
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.exceptions import WeatherWarning
@@ -59,6 +60,13 @@ def test_the_discrepancy_is_what_the_model_cannot_follow():
     truth = LATER.clean_frequencies * np.exp(slope * (LATER.temperatures[["T1"]].to_numpy() - 15))
     errors = [mape(truth, one.predict(LATER.temperatures)).mean() for one in (fem, plain)]
     assert errors[0] < 0.5 * errors[1]
+
+
+def test_a_discrepancy_that_knows_only_noise_costs_little():
+    """Leaves of one record repeat its noise."""
+    fem, plain = (chain(discrepancy=one).fit(T, F) for one in (ExtraTreeRegressor(random_state=0), None))
+    errors = [mape(LATER.clean_frequencies, one.predict(LATER.temperatures)).mean() for one in (fem, plain)]
+    assert errors[0] < 1.2 * errors[1]
 
 
 @pytest.mark.nightly
