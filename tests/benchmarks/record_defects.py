@@ -48,6 +48,7 @@ OUTCOMES = {
 OF_ONE_TABLE = {
     "DataInformedFEM.predict": "temperature",
     "TemperatureMapper.fit": "temperature",
+    "FleetMapper.fit": "temperature",
     "MahalanobisDetector.fit": "frequency",
 }
 OF_ALL = [
