@@ -311,7 +311,7 @@ def fit_fleet(
                 file = file_of(path, known.name)
                 file.replace(file.with_suffix(".replaced"))
                 restarted.append(known.name)
-            if known != before[known.name]:
+            if fitted is not None or known.errors != before[known.name].errors:
                 fleet._put(known, fitted)
     findings = list(fleet._findings(list(estimators), "fit"))
     if restarted:

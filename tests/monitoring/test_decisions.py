@@ -100,7 +100,7 @@ def test_a_number_of_records_is_that_many_of_twice_as_many_less_one():
     (one, answers), (two, same) = (answers_to(indices, persistence=rule) for rule in (3, [3, 5]))
     pd.testing.assert_frame_equal(answers, same)
     pd.testing.assert_frame_equal(one.events_, two.events_)
-    assert one.smallest_changes_ == two.smallest_changes_
+    assert one.smallest_changes_.as_dict() == two.smallest_changes_.as_dict()
 
 
 def test_an_event_closes_a_day_after_its_levels_have_come_within_the_release():
