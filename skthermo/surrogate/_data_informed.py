@@ -728,12 +728,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         records = TrainingRecords(
             T, F, as_floats(inputs), theta, learned, as_floats(usable), modelled, weights, self.parameter_names_
         )
-        parts = {"sensors": self.sensors_, "mapper": self.mapper_}
-        regressor = self._part("discrepancy")
+        parts, order = {"sensors": self.sensors_, "mapper": self.mapper_}, np.argsort(row_times(T), kind="stable")
+        ratios, own = (records.usable / modelled)[order], None if weights is None else weights[order]
         thermal = ThermalModel(
             simulator=simulator,
             aligner=self.aligner_,
-            discrepancy=Discrepancy.fitted(regressor, records.inputs, records.usable / modelled, weights, **parts),
+            discrepancy=Discrepancy.fitted(self._part("discrepancy"), records.inputs[order], ratios, own, **parts),
             training_range=TrainingRange.spanned(inputs, records.trained),
             limits=limits_in_weather(theta),
             parameter_names=self.parameter_names_,
