@@ -85,7 +85,7 @@ def regression(fem, T, F):
     errors = np.array([trend.stderr for trend in trends]) * np.sqrt(memory)
     found = stats.chi2.sf(((change / errors) ** 2).sum(), len(change)) <= LEVEL
     groups = list(AgeingTruss.groups)  # the others hardly move these frequencies
-    slopes = -fem.damage_directions(groups).to_numpy().T
+    slopes = -fem.damage_directions(groups, kind="stiffness").to_numpy().T
     inverse = np.linalg.pinv(slopes / errors[:, np.newaxis])
     at_end, deviations = inverse @ (change / errors), np.sqrt((inverse**2).sum(axis=1))
     frames = (pd.DataFrame(np.outer(share, row), both.index, groups) for row in (at_end, deviations))
