@@ -122,8 +122,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         are there, and other inverses leave them out.
     discrepancy : "auto", regressor or None, default="auto"
         Learns the ratio of measured over modelled frequencies from the inputs of M2, mode by mode, because the FE model
-        cannot follow all of the weather's effects; what it learns counts as far as it holds for records that did not
-        train it. "auto" is a `TemperatureMapper`; None, as in the paper, none.
+        cannot follow all of the weather's effects. Changes of the ratio count as far as they hold for records left out.
+        "auto" is a `TemperatureMapper`; None, as in the paper, none.
     reduce : "auto", bool or float, default="auto"
         Whether predictions, simulations and a `PosteriorInverse` use a reduced model, as its ``reduce`` says, which
         gets this value if its own is "auto" (:doc:`/guide/costs`). An `InverseSurrogate` learns from the full model.
@@ -928,8 +928,8 @@ def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | 
         mapper = with_last_step(fem.mapper_, fit_checked(clone(last_step(fem.mapper_)), inputs, targets, weights))
         learned = possible(mapper.predict(filled))[0]
         modelled = fem.thermal_.frequencies(learned)
-        known, parts = records.usable[rows] / modelled[rows], {"sensors": fem.sensors_, "mapper": mapper}
-        parts["shares"] = fem.discrepancy_.shares
+        known = records.usable[rows] / modelled[rows]
+        parts = {"shares": fem.discrepancy_.shares, "sensors": fem.sensors_, "mapper": mapper}
         discrepancy = Discrepancy.fitted(fem.discrepancy_.regressor, records.inputs[rows], known, weights, **parts)
     thermal = replace(fem.thermal_, mapper=mapper, discrepancy=discrepancy)
     records = replace(records, learned=learned, modelled=modelled)

@@ -62,9 +62,9 @@ class LearnedRatios(NamedTuple):
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
-    Regressors have ``learned`` the ratios from inputs of the ``mapper``; changes from their mean level count by the
-    ``shares`` of the modes, by which they agree with records that did not train them. It is 0 for modes with few
-    records, and for all without a ``regressor``.
+    Regressors have ``learned`` the ratios from inputs of the ``mapper``; changes from their mean ``level`` count by the
+    ``shares`` of the modes (:func:`reliable_shares`). It is 0 for modes with few records, and for all without a
+    ``regressor``.
     """
 
     regressor: BaseEstimator | None
