@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from numbers import Integral
 from typing import Any, TypeAlias
@@ -363,6 +364,36 @@ class Events:
                 is_unexplained[rows] |= ~is_over
         return is_unexplained, is_set_aside
 
+    @cached_property
+    def evaluations(self) -> pd.DataFrame:
+        """State, event and what drives it of each record."""
+        standing, number = self.standing()
+        is_unexplained, is_set_aside = self.set_aside(number)
+        decisions = self.decisions
+        index, n_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy()
+        is_held, has_index = (n_held > 0) | decisions["is_blind"].to_numpy() | is_unexplained, ~np.isnan(index)
+        is_raised = has_index & np.isin(standing, ["alarm", "drift", "watch"])
+        state = np.where((has_index & ~is_held) | is_raised, standing, "not evaluated")
+        state = np.where(is_held & is_set_aside, "alarm", state)
+        is_shown, modes = np.isin(state, ["alarm", "drift", "watch"]), decisions["modes"].to_numpy()
+        modes = np.where((modes == "") & (n_held > 0), decisions["held"].to_numpy(), modes)
+        groups, effects = np.full(len(index), "", dtype=object), decisions.filter(regex="^effect ")
+        names, sizes = [name.removeprefix("effect ") for name in effects], effects.to_numpy()
+        for row in np.flatnonzero(is_shown):
+            groups[row] = leading(dict(zip(names, sizes[row], strict=True)))
+        is_drift = state == "drift"
+        modes[is_drift], groups[is_drift] = self.table.loc[number[is_drift], ["modes", "groups"]].to_numpy().T
+        table = {
+            "state": state,
+            "index": index,
+            "threshold": decisions["threshold"].to_numpy(),
+            "modes": np.where(is_shown, modes, ""),
+            "groups": groups,
+            "reason": decisions["reason"],
+            "event": np.where(has_index | is_held, number, 0),
+        }
+        return pd.DataFrame(table, decisions.index).astype(dict.fromkeys(("state", "modes", "groups"), object))
+
 
 def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFrame:
     """Events with the owner's last answer to each, found by its kind and time, and ``at`` which record it was given."""
@@ -374,36 +405,6 @@ def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFr
     dtypes = {"acknowledged": bool, "harmless": bool, "note": object, "at": np.int64}
     columns = zip(dtypes, zip(*answers, strict=True) if answers else [()] * len(dtypes), strict=True)
     return events.assign(**{name: pd.Series(list(some), events.index, dtypes[name]) for name, some in columns})
-
-
-def evaluations(events: Events, first: int = 0) -> pd.DataFrame:
-    """State, event and what drives it of each record from a position on."""
-    standing, number = events.standing()
-    unexplained = events.set_aside(number)
-    standing, number, is_unexplained, is_set_aside = (one[first:] for one in (standing, number, *unexplained))
-    decisions = events.decisions[first:]
-    index, n_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy()
-    is_held, has_index = (n_held > 0) | decisions["is_blind"].to_numpy() | is_unexplained, ~np.isnan(index)
-    is_raised = has_index & np.isin(standing, ["alarm", "drift", "watch"])
-    state = np.where((has_index & ~is_held) | is_raised, standing, "not evaluated")
-    state = np.where(is_held & is_set_aside, "alarm", state)
-    is_shown, modes = np.isin(state, ["alarm", "drift", "watch"]), decisions["modes"].to_numpy()
-    modes = np.where((modes == "") & (n_held > 0), decisions["held"].to_numpy(), modes)
-    groups, effects = np.full(len(index), "", dtype=object), decisions.filter(regex="^effect ")
-    for row in np.flatnonzero(is_shown) if len(effects.columns) else ():
-        groups[row] = leading(effects.iloc[row].dropna().rename(lambda name: name[7:]))
-    is_drift = state == "drift"
-    modes[is_drift], groups[is_drift] = events.table.loc[number[is_drift], ["modes", "groups"]].to_numpy().T
-    table = {
-        "state": state,
-        "index": index,
-        "threshold": decisions["threshold"].to_numpy(),
-        "modes": np.where(is_shown, modes, ""),
-        "groups": groups,
-        "reason": decisions["reason"],
-        "event": np.where(has_index | is_held, number, 0),
-    }
-    return pd.DataFrame(table, decisions.index).astype(dict.fromkeys(("state", "modes", "groups"), object))
 
 
 def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = 7 * DAY) -> NDArray[np.intp]:

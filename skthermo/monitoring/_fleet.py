@@ -452,9 +452,9 @@ class Fleet:
             If a monitor is not fitted.
         """
         fleet = cls._in(None)
-        for name in monitors:
-            facts = {"n_records": len(monitors[name].baseline_)}
-            fleet._known[name] = KnownBridge(name, is_fitted=True, facts=facts).after(monitors[name])
+        for name, monitor in monitors.items():
+            facts = {"n_records": len(monitor.baseline_)}
+            fleet._known[name] = KnownBridge(name, is_fitted=True, facts=facts).after(monitor)
             fleet._kept[name] = monitors
         for name, error in (errors or {}).items():
             fleet._known[name] = fleet._known.get(name, KnownBridge(name)).failed("update", error)

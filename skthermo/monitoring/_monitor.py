@@ -54,7 +54,6 @@ from skthermo.monitoring._events import (
     EventLevels,
     Events,
     SmallestChanges,
-    evaluations,
     event_changes,
     leading,
     lowered,
@@ -309,17 +308,17 @@ class Monitor(SavesFrames, Estimator):
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1, with what the owner has said of them."""
-        return self._events().answered.drop(columns=["sign", "at"])
+        return self._events.answered.drop(columns=["sign", "at"])
 
     @property
     def evaluations_(self) -> pd.DataFrame:
         """The latest evaluation of each record."""
-        return evaluations(self._events())
+        return self._events.evaluations.copy()
 
     @property
     def days_(self) -> pd.DataFrame:
         """A summary of each day with records."""
-        answers = self.evaluations_
+        answers = self._events.evaluations
         table = pd.DataFrame(
             {
                 "n_records": 1,
@@ -341,7 +340,7 @@ class Monitor(SavesFrames, Estimator):
             "n_records": len(self.decisions_) + n_outside,
             **self.tallies_,
             "n_ahead": len(self.ahead_),
-            "n_not_evaluated": int((self.evaluations_["state"] == "not evaluated").sum()) + n_outside,
+            "n_not_evaluated": int((self._events.evaluations["state"] == "not evaluated").sum()) + n_outside,
             "n_left_out": int(self.decisions_["n_left_out"].sum()),
         }
 
@@ -371,6 +370,7 @@ class Monitor(SavesFrames, Estimator):
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
+        state.pop("_events", None)  # they follow from what is saved
         if "trained_" in state and self.trained_ is self.baseline_:  # most often: saved once
             state["trained_"] = None
         return state
@@ -379,6 +379,8 @@ class Monitor(SavesFrames, Estimator):
         super().__setstate__(state)
         if state.get("trained_", self) is None:
             self.trained_ = self.baseline_
+        if "decisions_" in state:
+            self._tell()
 
     @_fit_context(prefer_skip_nested_validation=False)
     def fit(self, X: pd.DataFrame, y: None = None) -> Monitor:
@@ -451,11 +453,11 @@ class Monitor(SavesFrames, Estimator):
         nothing = self.baseline_.iloc[:0]
         self.records_ = self.ahead_ = nothing
         self.corrected_ = nothing.drop(columns=self.reference_)
-        self.decisions_ = self._decisions(nothing.index)
-        self.means_, self.weeks_ = nothing[self.targets_], self.mean_test_.weeks(nothing[self.targets_], ())
+        self.means_, self.transitions_ = nothing[self.targets_], ()
         kinds = {"kind": object, "time": np.int64, "at": np.int64, "harmless": bool, "note": object}
-        self.acknowledgements_ = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
-        self.transitions_, self.restarts_ = (), ()
+        said = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
+        weeks = self.mean_test_.weeks(self.means_, ())
+        self._tell(decisions_=self._decisions(nothing.index), weeks_=weeks, acknowledgements_=said, restarts_=())
         self.tallies_ = dict.fromkeys(("n_repeated", "n_late", "n_too_late"), 0)
         self._begin_corrections(self.baseline_, fem)
 
@@ -503,8 +505,11 @@ class Monitor(SavesFrames, Estimator):
         vars(twin).update(vars(self))
         return twin
 
-    def _events(self) -> Events:
-        return Events(self.decisions_, self.weeks_, self.acknowledgements_, self.persistence, self.restarts_)
+    def _tell(self, **changed: Any) -> None:
+        """Change the tables of decisions, and tell the events that follow from them."""
+        vars(self).update(changed)
+        tables = self.decisions_, self.weeks_, self.acknowledgements_
+        self._events = Events(*tables, self.persistence, self.restarts_)
 
     def _decisions(self, stamps: pd.DatetimeIndex, **columns: Any) -> pd.DataFrame:
         """A row for each record: its index, the levels of events, and what becomes of it."""
@@ -532,8 +537,9 @@ class Monitor(SavesFrames, Estimator):
             return first
         states = self.corrections_.advanced(begin, raw)
         first = midnight(min([first, *changed_times(self._faults_of(self.states_[-1]), self._faults_of(states[-1]))]))
-        if self.restarts_:  # records that the detector of a new baseline evaluates are in no event from before
-            self.restarts_ = (*self.restarts_[:-1], min(self.restarts_[-1], first.as_unit("ns").value))
+        restarts = self.restarts_
+        if restarts:  # records that the detector of a new baseline evaluates are in no event from before
+            restarts = (*restarts[:-1], min(restarts[-1], first.as_unit("ns").value))
         drifts = self.corrections_.drifts(states, raw.index)
         drifts = pd.concat([self._drifts_before(begin.day, drifts), drifts])
         states = [*(one for one in earlier if one.day < begin.day), *states]
@@ -543,9 +549,10 @@ class Monitor(SavesFrames, Estimator):
         seen, notes = self._corrected(raw, drifts)
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < first], seen])
         new = self._decided(first, notes, drifts)
-        self.decisions_ = pd.concat([self.decisions_[self.decisions_.index < first], new])
         weeks = self.weeks_[self.weeks_.index <= first]
-        self.weeks_ = pd.concat([weeks, self.mean_test_.weeks(self.means_, self._test_times(weeks.index))])
+        weeks = pd.concat([weeks, self.mean_test_.weeks(self.means_, self._test_times(weeks.index))])
+        decisions = pd.concat([self.decisions_[self.decisions_.index < first], new])
+        self._tell(decisions_=decisions, weeks_=weeks, restarts_=restarts)
         self._explain(first)
         return first
 
@@ -627,7 +634,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _explain(self, first: pd.Timestamp) -> None:
         """Name what drives the open events of the records from a stamp on."""
-        is_raised = self._events().is_raised() & self.decisions_["index"].notna().to_numpy()
+        is_raised = self._events.is_raised() & self.decisions_["index"].notna().to_numpy()
         rows = np.flatnonzero(is_raised & (self.decisions_.index >= first))
         if not len(rows):
             return
@@ -644,13 +651,11 @@ class Monitor(SavesFrames, Estimator):
             columns=[*self.decisions_, *found.columns.difference(self.decisions_.columns)]
         )
         decisions.loc[found.index, found.columns] = found
-        self.decisions_ = decisions
+        self._tell(decisions_=decisions)
 
-    def _note(
-        self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any], events: Sequence[Events] | None = None
-    ) -> None:
+    def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
         """Append the changes since a former state to the transitions, after the actions that made them."""
-        tables = [one.table for one in events or (before._events(), self._events())]
+        tables = before._events.table, self._events.table
         old, new = (table[~(table["end"] < first)] for table in tables)
         found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
         for one in [*done, *sorted(found, key=lambda change: change["time"])]:
@@ -705,16 +710,14 @@ class Monitor(SavesFrames, Estimator):
         after.ahead_ = intake.ahead
         reasons = pd.concat([intake.too_late, intake.early])
         refused = self._decisions(reasons.index, reason=reasons.to_numpy())
-        nobody = Events(refused, self.weeks_[:0], self.acknowledgements_, 1)
-        answers = evaluations(nobody).assign(revised=False)
+        answers = Events(refused, self.weeks_[:0], self.acknowledgements_, 1).evaluations.assign(revised=False)
         if len(fresh):
             known = pd.concat([self.records_, intake.fresh])
             after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
             first = after._decide(fresh[0])
-            was, now = self._events(), after._events()
-            after._note(self, fresh[0], events=(was, now))
-            places = (events.decisions.index.searchsorted(first) for events in (was, now))
-            news = _news(*map(evaluations, (was, now), places), fresh)
+            after._note(self, fresh[0])
+            was, now = (one._events.evaluations for one in (self, after))
+            news = _news(was[was.index >= first], now[now.index >= first], fresh)
             answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
         vars(self).update(vars(after))
@@ -839,7 +842,7 @@ class Monitor(SavesFrames, Estimator):
         """Note the owner's answer to the event of a kind at a time, at the time of the newest record."""
         row = {"kind": kind, "time": time.value, "at": self.last_.value, "harmless": harmless, "note": note}
         said = pd.DataFrame([row]).astype(self.acknowledgements_.dtypes)
-        self.acknowledgements_ = pd.concat([self.acknowledgements_, said], ignore_index=True)
+        self._tell(acknowledgements_=pd.concat([self.acknowledgements_, said], ignore_index=True))
 
     def keep_acknowledgements(self, path: str | os.PathLike[str]) -> int:
         """Take over what the owner has said of events, from the file of an earlier monitor of the structure.
@@ -861,7 +864,7 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         said = acknowledgements_in(path).astype(self.acknowledgements_.dtypes)
-        self.acknowledgements_ = pd.concat([said, self.acknowledgements_], ignore_index=True)
+        self._tell(acknowledgements_=pd.concat([said, self.acknowledgements_], ignore_index=True))
         return len(said)
 
     def discard(self, start: Any, end: Any = None) -> int:
@@ -899,7 +902,8 @@ class Monitor(SavesFrames, Estimator):
 
         after = self._twin()
         after.records_, after.ahead_ = others(self.records_), others(self.ahead_)
-        after.corrected_, after.decisions_ = others(self.corrected_), others(self.decisions_)
+        after.corrected_ = others(self.corrected_)
+        after._tell(decisions_=others(self.decisions_))
         n_discarded = len(self.records_) - len(after.records_) + len(self.ahead_) - len(after.ahead_)
         if not n_discarded:
             until = "on" if last is None else f"to {last}"
@@ -998,8 +1002,9 @@ class Monitor(SavesFrames, Estimator):
                 after._say(
                     event["kind"], event["peak_time"], True, f"ended by the new baseline since {retraining.since}"
                 )
-            after.restarts_ = (*self.restarts_, today.as_unit("ns").value)
-            after.means_, after.weeks_ = self.means_[:0], self.weeks_[self.weeks_.index < today]
+            restarts, weeks = (*self.restarts_, today.as_unit("ns").value), self.weeks_[self.weeks_.index < today]
+            after.means_ = self.means_[:0]
+            after._tell(restarts_=restarts, weeks_=weeks)
             raw = pd.concat([self.baseline_, self.records_])[self.reference_]
             T, F = trained.drop(columns=self.targets_), trained[self.targets_]
             fem = None if self.fem is None else clone(self.fem).fit(T, F)  # the chain of the structure as it is now

@@ -117,13 +117,12 @@ class FakeMonitor(Monitor):
         rate = {"expected": false_alarms_per_year, "lowest": 0, "highest": 3, "n_years": 2.0, "missing_season": ""}
         self.false_alarm_estimate_ = replace(real.false_alarm_estimate_, **rate)
         self.smallest_changes_ = smallest_changes(0.01, {"f1": 0.02, "f2": 0.03}, True)
-
-    def _events(self):
-        """What stands after the newest record by the events that are open, and whether a response is set aside."""
         kinds = set(self.events_["kind"][self.events_["end"].isna()])
         states = {"damage": "alarm", "drift": "drift", "watch": "watch"}
-        state = next((state for kind, state in states.items() if kind in kinds), "")
-        return SimpleNamespace(standing=lambda: ([state], [0]), set_aside=lambda number: ([("fault" in kinds)],))
+        standing = next((state for kind, state in states.items() if kind in kinds), "")
+        self._events = SimpleNamespace(
+            standing=lambda: ([standing], [0]), set_aside=lambda number: ([("fault" in kinds)],)
+        )
 
     def get_params(self, deep=True):
         return {name: getattr(self, name) for name in inspect.signature(Monitor).parameters}
