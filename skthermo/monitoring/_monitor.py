@@ -193,9 +193,9 @@ class Monitor(SavesFrames, Estimator):
     versions_ : dict
         Versions of skthermo and scikit-learn by which it was fitted.
     decisions_ : DataFrame
-        What was decided of each record since the baseline, from which ``events_``, ``evaluations_`` and ``days_`` are
-        computed: ``index``, also as it was before sensors at fault were found, levels of the detector in charge then,
-        and what was left out, held or explained.
+        What was decided of each record since the baseline, from which all events follow: ``index``, also as it
+        was before sensors at fault were found, levels of the detector in charge then, and what was left out, held or
+        explained.
     means_, weeks_ : DataFrame
         Mean residuals of each day, and the test of the mean of 30 days at the end of each week: ``level`` (the
         statistic over its limit), ``p_value``, ``modes``, and departures of modes and groups.
@@ -206,6 +206,8 @@ class Monitor(SavesFrames, Estimator):
         (both in nanoseconds), ``harmless`` and ``note``.
     transitions_ : tuple of dict
         As `transitions` gives them.
+    known_events_ : object
+        The events of these decisions, which ``events_`` lists; they are computed anew whenever decisions change.
     restarts_ : tuple of int
         Times (nanoseconds) at which a new baseline has ended all events.
     ahead_ : DataFrame
@@ -308,17 +310,17 @@ class Monitor(SavesFrames, Estimator):
     @property
     def events_(self) -> pd.DataFrame:
         """Events, counted from 1, with what the owner has said of them."""
-        return self._events.answered.drop(columns=["sign", "at"])
+        return self.known_events_.answered.drop(columns=["sign", "at"])
 
     @property
     def evaluations_(self) -> pd.DataFrame:
         """The latest evaluation of each record."""
-        return self._events.evaluations.copy()
+        return self.known_events_.evaluations.copy()
 
     @property
     def days_(self) -> pd.DataFrame:
         """A summary of each day with records."""
-        answers = self._events.evaluations
+        answers = self.known_events_.evaluations
         table = pd.DataFrame(
             {
                 "n_records": 1,
@@ -340,7 +342,7 @@ class Monitor(SavesFrames, Estimator):
             "n_records": len(self.decisions_) + n_outside,
             **self.tallies_,
             "n_ahead": len(self.ahead_),
-            "n_not_evaluated": int((self._events.evaluations["state"] == "not evaluated").sum()) + n_outside,
+            "n_not_evaluated": int((self.known_events_.evaluations["state"] == "not evaluated").sum()) + n_outside,
             "n_left_out": int(self.decisions_["n_left_out"].sum()),
         }
 
@@ -370,7 +372,7 @@ class Monitor(SavesFrames, Estimator):
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__()
-        state.pop("_events", None)  # they follow from what is saved
+        state.pop("known_events_", None)  # they follow from what is saved
         if "trained_" in state and self.trained_ is self.baseline_:  # most often: saved once
             state["trained_"] = None
         return state
@@ -509,7 +511,7 @@ class Monitor(SavesFrames, Estimator):
         """Change the tables of decisions, and tell the events that follow from them."""
         vars(self).update(changed)
         tables = self.decisions_, self.weeks_, self.acknowledgements_
-        self._events = Events(*tables, self.persistence, self.restarts_)
+        self.known_events_ = Events(*tables, self.persistence, self.restarts_)
 
     def _decisions(self, stamps: pd.DatetimeIndex, **columns: Any) -> pd.DataFrame:
         """A row for each record: its index, the levels of events, and what becomes of it."""
@@ -634,7 +636,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _explain(self, first: pd.Timestamp) -> None:
         """Name what drives the open events of the records from a stamp on."""
-        is_raised = self._events.is_raised() & self.decisions_["index"].notna().to_numpy()
+        is_raised = self.known_events_.is_raised() & self.decisions_["index"].notna().to_numpy()
         rows = np.flatnonzero(is_raised & (self.decisions_.index >= first))
         if not len(rows):
             return
@@ -655,7 +657,7 @@ class Monitor(SavesFrames, Estimator):
 
     def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
         """Append the changes since a former state to the transitions, after the actions that made them."""
-        tables = before._events.table, self._events.table
+        tables = before.known_events_.table, self.known_events_.table
         old, new = (table[~(table["end"] < first)] for table in tables)
         found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
         for one in [*done, *sorted(found, key=lambda change: change["time"])]:
@@ -716,7 +718,7 @@ class Monitor(SavesFrames, Estimator):
             after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
             first = after._decide(fresh[0])
             after._note(self, fresh[0])
-            was, now = (one._events.evaluations for one in (self, after))
+            was, now = (one.known_events_.evaluations for one in (self, after))
             news = _news(was[was.index >= first], now[now.index >= first], fresh)
             answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))

@@ -236,7 +236,7 @@ def status_of(monitor: Any) -> MonitorStatus:
     opened["size"] = opened["size"].astype(object).where(opened["size"].notna(), None)
     state = "not evaluated"
     if len(evaluations):
-        found = monitor._events
+        found = monitor.known_events_
         standing, number = found.standing()
         state = state_of(standing[-1], found.set_aside(number)[0][-1], evaluations["state"].iloc[-1])
         opened["acknowledged"] &= (opened["event"] != number[-1]) | (standing[-1] not in ("alarm", "drift"))

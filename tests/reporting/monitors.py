@@ -120,7 +120,7 @@ class FakeMonitor(Monitor):
         kinds = set(self.events_["kind"][self.events_["end"].isna()])
         states = {"damage": "alarm", "drift": "drift", "watch": "watch"}
         standing = next((state for kind, state in states.items() if kind in kinds), "")
-        self._events = SimpleNamespace(
+        self.known_events_ = SimpleNamespace(
             standing=lambda: ([standing], [0]), set_aside=lambda number: ([("fault" in kinds)],)
         )
 
