@@ -187,7 +187,7 @@ def measurement_noise(mapper: BaseEstimator, T: Table, F: Table, *, most: int = 
         fold_of = BlockedKFold(N_FOLDS).fold_of(_safe_indexing(T, rows))
 
     def learn(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
-        learned = Discrepancy.fitted(ratio_regressor(), inputs[train], ratios[train])
+        learned = Discrepancy.fitted(ratio_regressor(), inputs[train], ratios[train], shares=np.ones(ratios.shape[1]))
         return lambda test: learned.at(inputs[test])
 
     return np.minimum(robust_deviation(changes - out_of_fold(learn, fold_of)), 0.1)
