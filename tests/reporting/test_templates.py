@@ -18,8 +18,8 @@ GERMAN = Path(__file__).parent / "german"
 
 
 @pytest.fixture(autouse=True)
-def blank_drawings(monkeypatch):
-    monkeypatch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
+def no_drawings(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
 
 
 @pytest.fixture
