@@ -14,7 +14,7 @@ from skthermo.datasets import load_kw51
 from tests.datasets.kw51_file import CHANNELS, SENSORS, cell, kw51_bytes, kw51_fields, write_kw51
 from tests.nights import by_day
 
-FUZZ = settings(max_examples=by_day(25, at_night=60))
+FUZZ = settings(max_examples=by_day(12, at_night=60))
 NOT_PUBLISHED = pytest.mark.filterwarnings("ignore:.*read-as:UserWarning")
 
 

@@ -34,8 +34,8 @@ FIT = load_tool()
 
 @pytest.fixture(scope="module")
 def box():
-    """Forty points of the box of +-30 %."""
-    return np.random.default_rng(0).uniform(0.7, 1.3, (40, 4))
+    """Twenty points of the box of +-30 %."""
+    return np.random.default_rng(0).uniform(0.7, 1.3, (20, 4))
 
 
 @pytest.fixture(scope="module")
