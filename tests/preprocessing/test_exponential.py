@@ -22,7 +22,7 @@ def naive_mean(column, stamp, half_life):
     return (used * weights).sum() / weights.sum() if len(used) else np.nan
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(
     st.lists(st.integers(0, 300), min_size=2, max_size=25, unique=True),
     st.integers(1, 40),

@@ -47,7 +47,7 @@ def test_missing_values_are_ignored_and_stay_missing():
         np.testing.assert_array_equal(own.isna().all(axis=1), holed[name].isna())
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.integers(1, 6), st.integers(0, 10_000))
 def test_linear_regression_on_hinges_gives_any_piecewise_linear_function(n_knots, seed):
     """Any continuous function with straight pieces between the knots, and beyond the data."""
@@ -68,7 +68,7 @@ def test_linear_regression_on_hinges_gives_any_piecewise_linear_function(n_knots
     np.testing.assert_allclose(model.predict(beyond[:, np.newaxis]), broken(beyond), atol=1e-7)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.integers(1, 6), st.integers(0, 10_000))
 def test_the_weight_of_a_row_is_how_often_it_counts(n_knots, seed):
     rng = np.random.default_rng(seed)

@@ -22,7 +22,7 @@ def naive_lag(frame, stamp, lag, freq, tolerance):
     return past.iloc[-1] if wanted - past.index[-1] <= tolerance else past.iloc[-1] * np.nan
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(
     st.lists(st.integers(0, 200), min_size=2, max_size=25, unique=True),
     st.lists(st.integers(0, 12), min_size=1, max_size=4, unique=True),
@@ -38,7 +38,7 @@ def test_lags_by_time_follow_their_definition(hours, lags, tolerance):
     assert lagged.index.equals(index)
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(st.integers(1, 40), st.integers(1, 8), st.sampled_from(["edge", "nan"]))
 def test_lags_by_row_are_shifts(n_rows, n_lags, padding):
     X = np.random.default_rng(0).standard_normal((n_rows, 2))
