@@ -51,7 +51,7 @@ def chain():
 def study(chain):
     fem, T, _ = chain
     scenarios = [
-        *sweep(fem, (0.05, 0.1, 0.2)),
+        *sweep(fem, (0.05, 0.1, 0.2), [HOSTILE]),
         ProgressiveDamage(f"growing {HOSTILE}", {HOSTILE: 0.2}, onset=40, end=80),
         UncertainDamage("uncertain", pd.DataFrame({QUOTED: [0.1, 0.2]})),
         Scenario("retrofit", mass=[1.0, 0.0, 0.0]),

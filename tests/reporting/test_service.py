@@ -58,7 +58,7 @@ def state_of(page):
 
 @pytest.fixture(scope="module")
 def real():
-    """Two years of the truss, one in service, with gaps in the records and damage at the end."""
+    """Two years of the truss and some weeks in service, with gaps in the records and damage at the end."""
     healthy, damaged = (
         make_truss_campaign(3, noise=0.003, damage=damage, random_state=0) for damage in (None, {"bottom": 0.15})
     )
