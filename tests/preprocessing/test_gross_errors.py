@@ -207,6 +207,8 @@ class TestTables:
         assert kinds(check_records(T[:1], F[:1])) == {"few-records"}
         twice = T.set_axis(["T1", "T1", "T3"], axis=1)
         assert only(check_records(twice, F))[:2] == ("no-table", "T1")
+        assert kinds(check_records(twice[:0], F[:0])) >= {"no-table"}
+        assert kinds(check_records(T.set_axis([1, "a", "b"], axis=1), F)) == {"no-table"}
         tuples = pd.MultiIndex.from_product([["a"], list(T)])
         assert kinds(check_records(T.set_axis(tuples, axis=1), F.set_axis([("f", n) for n in F], axis=1))) == {
             "no-table"
