@@ -116,8 +116,7 @@ def test_predictions_with_intervals_in_time(fem, later):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
-    [(lambda T: T * np.nan, "not-evaluated"), (lambda T: T + 60, "other-weather")],
+    ("change", "said"), [(lambda T: T * np.nan, "not-evaluated"), (lambda T: T + 60, "other-weather")]
 )
 def test_doubts_about_the_weather_are_said_once(fem, later, change, said):
     with pytest.warns(UserWarning, match=said) as caught:

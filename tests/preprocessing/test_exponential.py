@@ -85,8 +85,7 @@ def test_gaps_leave_no_row_out_and_short_ones_no_mean():
     assert not means["deck_mean2h"].isna().any()
     late = gappy.drop(gappy.index[50:60])
     np.testing.assert_allclose(
-        ExponentialMeans(half_lives=["3D"]).fit_transform(late)["air_mean3D"],
-        means["air_mean3D"].drop(T.index[50:60]),
+        ExponentialMeans(half_lives=["3D"]).fit_transform(late)["air_mean3D"], means["air_mean3D"].drop(T.index[50:60])
     )
 
 

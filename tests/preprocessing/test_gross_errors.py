@@ -118,11 +118,7 @@ class TestUnits:
     @often
     def test_one_sensor_in_another_unit_or_of_opposite_sign(self, column):
         name = T.columns[column]
-        for hint, values in (
-            ("Fahrenheit", 1.8 * T[name] + 32),
-            ("as in", 10 * T[name]),
-            ("another sign", -T[name]),
-        ):
+        for hint, values in (("Fahrenheit", 1.8 * T[name] + 32), ("as in", 10 * T[name]), ("another sign", -T[name])):
             found = check_records(T.assign(**{name: values}))
             assert only(found)[:2] == ("wrong-unit", name)
             assert hint in found.table["detail"][0]

@@ -34,9 +34,7 @@ from tests.studies.identified import identified
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*few-records"),
-]
+pytestmark = [pytest.mark.filterwarnings("ignore:.*few-records")]
 STYLE = files("skthermo.reporting").joinpath("page.css").read_text(encoding="utf-8")
 SOMETIMES = "choice"  # the section on several detectors
 ALWAYS = [name for name in sections_in("study.html.j2") if name != SOMETIMES]
