@@ -46,20 +46,12 @@ def steel_of(campaign):
 @pytest.mark.nightly
 def test_records_are_those_of_the_bridge(campaign):
     index = pd.date_range("2018-10-01", periods=11328, freq="h", name="time")
-    for name, columns in {
-        "temperatures": ["tBD31A"],
-        "frequencies": [f"f{i}" for i in range(1, 7)],
-        "clean_frequencies": [f"f{i}" for i in range(1, 7)],
-        "damping": [f"xi{i}" for i in range(1, 7)],
-        "theta": list(campaign.model.parameter_names),
-    }.items():
+    for name in ("temperatures", "frequencies", "clean_frequencies", "damping", "theta", "state"):
         pd.testing.assert_index_equal(campaign[name].index, index)
-        assert list(campaign[name]) == columns
     assert campaign.state.value_counts().to_dict() == {"before": 5424, "during": 3241, "after": 2663}
     assert campaign.state.index[campaign.state == "after"][0] == pd.Timestamp("2019-09-27 01:00")
     assert_array_equal(campaign.damping.isna(), campaign.frequencies.isna())
     assert campaign.damping.stack().dropna().between(0.001, 0.04).all()
-    assert len(campaign.sensors) == 12
     assert "shapes" not in campaign
 
 

@@ -132,11 +132,9 @@ class TestUnits:
         [
             lambda t, f: (t, f),
             lambda t, f: (changed(t, slice(330, None), 1, t.iloc[0, 1]), f),
-            lambda t, f: (changed(t, [4, 9, 200], 0, -999.0), f),
             lambda t, f: (t, f.shift(60)),
             lambda t, f: (t, changed(f, [40, 90], 3, 1.0)),
             lambda t, f: (t.assign(T3=t["T1"]), f),
-            lambda t, f: (t.assign(T3=np.nan), f),
         ],
     )
     def test_findings_are_the_same_in_fahrenheit_but_for_the_unit(self, spoil):

@@ -14,7 +14,7 @@ from sklearn.utils import Bunch
 from skthermo.exceptions import RecordsWarning, UnevaluatedRowsWarning
 from skthermo.fem import mac
 from skthermo.preprocessing import ModeTracker
-from tests.benchmarks.mode_tracker import right, simulated_poles, ways
+from tests.benchmarks.mode_tracker import right, simulated_poles
 from tests.nights import by_day
 
 RNG = np.random.default_rng(0)
@@ -37,13 +37,6 @@ def padded(frequencies=F0, n_records=N, extra=0, noise=0.0, seed=0):
 def test_shapes_find_nearly_all_modes_among_spurious_poles(follow):
     records, true, reference = simulated_poles(700)
     assert right(ModeTracker(reference, follow=follow).fit_transform(records).poles, true) > 99.8
-
-
-@pytest.mark.filterwarnings("ignore:.*mode-order")
-def test_shapes_beat_frequency_and_frequency_beats_sorting():
-    records, true, reference = simulated_poles(500, n_sensors=6)
-    shares = {way: right(poles, true) for way, poles in ways(records, reference, 0.15).items()}
-    assert shares["shapes"] > 99.5 > 85 > shares["frequency"] > shares["sorting"] + 30
 
 
 def test_tables_are_on_the_index_and_hold_the_assigned_poles():
