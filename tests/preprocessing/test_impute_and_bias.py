@@ -44,15 +44,6 @@ def scattered(share, n_donors=5000, n_new=4500):
     return np.where(rng.random(full.shape) < share, np.nan, full), new[~np.isnan(new).all(axis=1)]
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize(("share", "n_neighbors"), [(0.2, 1), (0.5, 10), (0.2, 300)])
-def test_many_records_have_scikit_learns_values(share, n_neighbors):
-    gappy, new = scattered(share)
-    ours, theirs = (imputer(n_neighbors=n_neighbors).fit(gappy) for imputer in (KNNGapImputer, KNNImputer))
-    np.testing.assert_allclose(ours.transform(gappy), theirs.transform(gappy), rtol=1e-10, atol=1e-10)
-    np.testing.assert_allclose(ours.transform(new), theirs.transform(new), rtol=1e-10, atol=1e-10)
-
-
 @pytest.mark.parametrize(
     ("weights", "weigh", "share"),
     [
