@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.preprocessing import LagFeatures, check_records
+from skthermo.preprocessing import check_records
 from tests.nights import by_day
 
 YEAR = make_truss_campaign(random_state=0)
@@ -60,10 +60,8 @@ class TestValues:
 
     def test_a_broken_thermometer_is_no_shift_in_time(self):
         for broken in (484.667, np.random.default_rng(0).uniform(-300, 900, 120)):
-            assert kinds(check_records(changed(T, slice(100, 220), 0, broken), F)) <= {
-                "placeholders",
-                "implausible-values",
-            }
+            found = check_records(changed(T, slice(100, 220), 0, broken), F)
+            assert kinds(found) <= {"placeholders", "implausible-values"}
 
     def test_values_that_bridges_have_are_none(self):
         fire = T.copy()
@@ -105,14 +103,12 @@ class TestValues:
 
 
 class TestUnits:
-    def test_kelvin_everywhere_in_a_sensor_and_in_some_rows(self):
+    def test_tenths_of_a_degree_and_kelvin_everywhere_in_a_sensor_and_in_some_rows(self):
         assert check_records(T + 273.15).table["column"].tolist() == list(T)
+        assert kinds(check_records((10 * T).round())) == {"wrong-unit"}
         assert only(check_records(T.assign(T2=T["T2"] + 273.15)))[:3] == ("wrong-unit", "T2", 365)
-        assert only(check_records(changed(T, slice(0, 100), 1, T.iloc[:100, 1] + 273.15)))[:3] == (
-            "wrong-unit",
-            "T2",
-            100,
-        )
+        some = changed(T, slice(0, 100), 1, T.iloc[:100, 1] + 273.15)
+        assert only(check_records(some))[:3] == ("wrong-unit", "T2", 100)
 
     @given(column=SENSOR)
     @often
@@ -122,9 +118,6 @@ class TestUnits:
             found = check_records(T.assign(**{name: values}))
             assert only(found)[:2] == ("wrong-unit", name)
             assert hint in found.table["detail"][0]
-
-    def test_tenths_of_a_degree(self):
-        assert kinds(check_records((10 * T).round())) == {"wrong-unit"}
 
     @pytest.mark.one_case
     @pytest.mark.parametrize(
@@ -151,14 +144,10 @@ class TestUnits:
         assert only(check_records(None, F.assign(f2=factor * F["f2"]), model=model))[:2] == ("wrong-unit", "f2")
         assert check_records(None, factor * F).table.empty
 
-    @pytest.mark.parametrize("factor", [np.sqrt(1000.0), np.sqrt(1e-3)])
-    def test_a_model_whose_mass_is_in_another_unit(self, factor):
-        found = check_records(None, factor * F, model=make_truss()).table
-        assert (found["what"].tolist(), found["severity"].tolist()) == (["wrong-unit"], ["doubtful"])
-
-    def test_frequencies_of_no_structure_are_doubtful(self):
-        found = check_records(T, 1000 * F)
-        assert (found.table["what"].tolist(), found.table["severity"].tolist()) == (["wrong-unit"], ["doubtful"])
+    def test_units_of_mass_and_frequencies_of_no_structure_are_doubtful(self):
+        for factor, model in ((np.sqrt(1000.0), make_truss()), (np.sqrt(1e-3), make_truss()), (1000, None)):
+            found = check_records(None, factor * F, model=model).table
+            assert (found["what"].tolist(), found["severity"].tolist()) == (["wrong-unit"], ["doubtful"])
         assert check_records(T, 1000 * F, unit="kN").table.empty
 
     def test_periods_and_modes_too_few(self):
@@ -204,19 +193,14 @@ class TestTables:
         assert kinds(check_records(twice[:0], F[:0])) >= {"no-table"}
         assert kinds(check_records(T.set_axis([1, "a", "b"], axis=1), F)) == {"no-table"}
         tuples = pd.MultiIndex.from_product([["a"], list(T)])
-        assert kinds(check_records(T.set_axis(tuples, axis=1), F.set_axis([("f", n) for n in F], axis=1))) == {
-            "no-table"
-        }
+        named = T.set_axis(tuples, axis=1), F.set_axis([("f", n) for n in F], axis=1)
+        assert kinds(check_records(*named)) == {"no-table"}
 
     def test_an_array_beside_a_frame_has_its_times(self):
         found = check_records(T[::-1], changed(F, [10], 0, 30.0).to_numpy()[::-1])
         assert kinds(found) == {"wrong-stamps", "another-level"}
         assert np.argwhere(found.outliers.to_numpy()).tolist() == [[354, 0]]
         assert found.table.iloc[1]["from"] == T.index[10]
-
-    def test_lags_of_a_sensor_are_not_named_again(self):
-        lagged = LagFeatures([0, 2]).fit_transform(changed(T, [4, 9], 0, -999.0))
-        assert check_records(lagged, F).table["column"].tolist() == ["T1_lag0"]
 
 
 ANYTHING = st.one_of(
