@@ -45,15 +45,6 @@ def test_current_values_come_first_and_names_tell_the_means():
     pd.testing.assert_frame_equal(out[["air", "deck"]], T)
 
 
-def test_a_lagging_body_is_the_mean_of_its_past():
-    """A body that takes up heat in proportion to the difference has the exponentially weighted mean."""
-    hours = pd.date_range("2025-01-01", periods=24 * 200, freq="h")
-    air = pd.DataFrame({"air": 10 * np.sin(np.arange(len(hours)) / 500)}, hours)
-    body = air["air"].ewm(halflife=pd.Timedelta("7D"), times=hours).mean()
-    mean = ExponentialMeans(half_lives=["7D"]).fit_transform(air)["air_mean7D"]
-    assert np.abs(mean - body)[24 * 50 :].max() < 0.4 < np.abs(air["air"] - body)[24 * 50 :].max()
-
-
 @pytest.mark.parametrize("rows", [slice(399, 400), slice(300, 400), slice(120, 140)])
 def test_batches_have_the_means_that_they_have_among_all_records(rows):
     whole = ExponentialMeans(half_lives=["5h", "2D"]).fit_transform(T)

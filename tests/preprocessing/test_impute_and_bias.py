@@ -67,9 +67,8 @@ def test_neighbours_are_the_same_far_from_zero():
     np.testing.assert_allclose(far, near, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize("n_records", [80, pytest.param(8000, marks=pytest.mark.nightly)])
-def test_rows_without_any_value_indicators_and_empty_columns(n_records):
-    holed = pd.concat([GAPPY] * (n_records // 80))
+def test_rows_without_any_value_indicators_and_empty_columns():
+    holed = GAPPY.copy()
     holed += 1e-3 * np.random.default_rng(2).standard_normal(holed.shape)
     holed.iloc[5] = np.nan
     filled = KNNGapImputer().fit_transform(holed)
