@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from skthermo.exceptions import FewRecordsWarning
@@ -30,6 +30,7 @@ def naive_lag(column, stamp, lag, tolerance, padding):
     st.sampled_from(["edge", "nan"]),
     st.integers(0, 24),
 )
+@example([0, 24], [0, 1], 1, "edge", 24)
 def test_lags_by_time_follow_their_definition(hours, lags, tolerance, padding, missing):
     index = pd.Timestamp("2025-03-01") + pd.to_timedelta(hours, unit="h")
     frame = pd.DataFrame({"a": np.arange(len(hours), dtype=float)}, index=index)
