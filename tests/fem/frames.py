@@ -1,5 +1,7 @@
 """A space frame for tests, as fine as wanted."""
 
+import functools
+
 import numpy as np
 
 from skthermo.fem import Beam, PointMass, Spring, Structure
@@ -35,6 +37,14 @@ def portal(n_elements=8, **options):
 
 
 FRAME = portal()
+
+
+@functools.cache
+def frame(*, track=False, is_reduced=False):
+    """The sparse frame, as it is or reduced; no test changes it."""
+    if is_reduced:
+        return frame(track=track).reduced(0.3, random_state=0)
+    return portal(track=True) if track else FRAME
 
 
 def local_shapes(model, row, dofs=None):

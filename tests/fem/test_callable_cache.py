@@ -48,8 +48,7 @@ def test_the_second_model_solves_only_what_is_new(folder):
     np.testing.assert_array_equal(second.rows, THETA[:14:-1])
 
 
-@pytest.mark.parametrize("cached", [False, True])
-@pytest.mark.parametrize("vectorized", [False, True])
+@pytest.mark.parametrize(("cached", "vectorized"), [(False, False), (True, True)])
 def test_repeated_rows_are_solved_once(folder, cached, vectorized):
     seen = []
 
@@ -76,8 +75,7 @@ def test_what_is_not_a_number_is_kept_bit_by_bit(folder):
     assert np.isnan(second[:, :2]).all()
 
 
-@pytest.mark.parametrize("vectorized", [False, True])
-@pytest.mark.parametrize("value", [-1.0, 0.0, np.inf])
+@pytest.mark.parametrize(("value", "vectorized"), [(-1.0, False), (0.0, True), (np.inf, False)])
 def test_what_is_no_frequency_is_a_failure_of_its_row(folder, value, vectorized):
     def wrong_at_the_eighth(theta):
         result = np.array([three_modes(row) for row in np.atleast_2d(theta)])

@@ -5,7 +5,7 @@ import pytest
 
 from skthermo.fem import AffineModel, Beam, Structure
 
-MESHES = [((1.0, 0.0, 0.0), 500), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
+MESHES = [((1.0, 0.0, 0.0), 300), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
 
 
 def cantilever(n_beams, supports, *, direction=(1.0, 2.0, 3.0)):
@@ -26,7 +26,7 @@ def test_a_fine_mesh_is_no_mechanism(direction, n_beams):
 
 @pytest.mark.parametrize(("direction", "finest"), MESHES)
 def test_a_mechanism_is_one_in_every_mesh(direction, finest):
-    for n_beams in (5, 100):
+    for n_beams in (5, 50):
         for ends in ({}, {0: "xyz"}, {0: "xyz", n_beams: "xyz"}):
             with pytest.raises(ValueError, match="the structure is a mechanism"):
                 cantilever(n_beams, ends, direction=direction)

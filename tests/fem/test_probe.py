@@ -47,21 +47,22 @@ def test_one_call_for_each_term_and_one_for_each_check():
     assert set(model.groups) == {"E", "A"}
 
 
+PROBED = probe(affine_program, NAMES, random_state=0)
+
+
 @settings(max_examples=20)
 @given(theta=st.lists(st.floats(0.2, 5), min_size=3, max_size=3))
 def test_the_models_matrices_are_the_programs(theta):
-    model = probe(affine_program, NAMES, random_state=0)
-    for ours, theirs in zip(model.matrices(theta), affine_program(theta), strict=True):
+    for ours, theirs in zip(PROBED.matrices(theta), affine_program(theta), strict=True):
         theirs = theirs.toarray()
         np.testing.assert_allclose(ours.toarray(), theirs, rtol=1e-12, atol=1e-12 * theirs.max())
 
 
 def test_sparse_stays_sparse_and_dense_gives_the_same():
-    model = probe(affine_program, NAMES, random_state=0)
-    assert all(matrix.nnz <= 3 * N for matrix in model.matrices(np.ones(3)))
+    assert all(matrix.nnz <= 3 * N for matrix in PROBED.matrices(np.ones(3)))
     dense = probe(lambda row: tuple(m.toarray() for m in affine_program(row)), NAMES, random_state=0)
     theta = np.random.default_rng(0).uniform(0.5, 2, (4, 3))
-    np.testing.assert_array_equal(dense.frequencies(theta), model.frequencies(theta))
+    np.testing.assert_array_equal(dense.frequencies(theta), PROBED.frequencies(theta))
 
 
 def test_rounding_makes_no_term():

@@ -10,7 +10,7 @@ from skthermo.datasets import make_truss, make_z24
 from skthermo.fem import AffineModel, mac, match_modes, sample
 
 TRUSS, Z24 = make_truss(8), make_z24(6)
-BOX = sample(Z24, 0.2, 12, random_state=0).theta
+BOX = sample(Z24, 0.2, 4, random_state=0).theta
 MODES = [3, 0, 5]
 
 
@@ -32,7 +32,7 @@ def model(request, reduced):
 
 @pytest.mark.one_case
 def test_chosen_modes_are_columns_of_the_model_with_all_modes(model):
-    theta = BOX if model.track else sample(TRUSS, 0.05, 12, random_state=0).theta
+    theta = BOX if model.track else sample(TRUSS, 0.05, 4, random_state=0).theta
     chosen = model.with_modes(MODES)
     assert chosen.n_modes == 3
     np.testing.assert_allclose(chosen.frequencies(theta), model.frequencies(theta)[:, MODES], rtol=1e-5)

@@ -9,7 +9,7 @@ import scipy.sparse.linalg
 
 from skthermo.fem import AffineModel, Beam, Structure
 from skthermo.fem.modal import ShiftInvertSolver
-from tests.fem.frames import FRAME, SECTION, portal
+from tests.fem.frames import FRAME, SECTION, frame
 
 THETA = np.random.default_rng(0).uniform(0.6, 1.5, (6, 4))
 
@@ -24,13 +24,12 @@ def dense_frequencies(model, theta):
     return np.array(found)
 
 
-def test_the_frame_is_solved_sparsely():
+def test_sparse_frequencies_agree_with_a_dense_solver_alone_and_among_others():
     assert FRAME.n_dof > 200
     assert isinstance(FRAME._core.solver, ShiftInvertSolver)
-
-
-def test_sparse_frequencies_agree_with_a_dense_solver():
-    np.testing.assert_allclose(FRAME.frequencies(THETA), dense_frequencies(FRAME, THETA), rtol=1e-9)
+    found = FRAME.frequencies(THETA[:3])
+    np.testing.assert_allclose(found, dense_frequencies(FRAME, THETA[:3]), rtol=1e-9)
+    np.testing.assert_array_equal(found, np.concatenate([FRAME.frequencies([row]) for row in THETA[:3]]))
 
 
 def test_sparse_shapes_have_unit_modal_mass_and_solve_the_eigenproblem():
@@ -45,30 +44,25 @@ def test_sparse_shapes_have_unit_modal_mass_and_solve_the_eigenproblem():
 @pytest.mark.one_case
 @pytest.mark.parametrize("track", [False, True])
 def test_sparse_jacobian_equals_central_differences(track):
-    model, step = portal(track=track), 1e-4
+    model, theta, step = frame(track=track), THETA[:2], 1e-4
     differences = [
-        (model.frequencies(THETA + step * unit) - model.frequencies(THETA - step * unit)) / (2 * step)
+        (model.frequencies(theta + step * unit) - model.frequencies(theta - step * unit)) / (2 * step)
         for unit in np.eye(4)
     ]
-    np.testing.assert_allclose(model.jacobian(THETA), np.stack(differences, axis=2), atol=1e-5)
+    np.testing.assert_allclose(model.jacobian(theta), np.stack(differences, axis=2), atol=1e-5)
 
 
 def chain(n_dof):
     return scipy.sparse.diags_array([np.full(n_dof, 2.0), *-np.ones((2, n_dof - 1))], offsets=[0, 1, -1]).tocsc()
 
 
-@pytest.mark.parametrize(("copies", "n_dof"), [(2, 100), (3, 100), (6, 100), (5, 200)])
+@pytest.mark.parametrize(("copies", "n_dof"), [(3, 100), (5, 200)])
 def test_repeated_eigenvalues_are_all_found(copies, n_dof):
     """Equal chains side by side; that of one has frequencies sin(j pi / (2 n + 2)) / pi."""
     stiffness = scipy.sparse.block_diag([chain(n_dof)] * copies).tocsc()
     model = AffineModel({("k",): stiffness}, scipy.sparse.eye_array(n_dof * copies), n_modes=2 * copies)
     expected = np.repeat(np.sin(np.array([1, 2]) * np.pi / (2 * n_dof + 2)) / np.pi, copies)
     np.testing.assert_allclose(model.frequencies([[1.0]])[0], expected, rtol=1e-10)
-
-
-def test_the_same_theta_gives_the_same_bits_alone_and_among_others():
-    alone = np.concatenate([FRAME.frequencies([row]) for row in THETA])
-    np.testing.assert_array_equal(FRAME.frequencies(THETA), alone)
 
 
 def test_sparse_massless_degrees_of_freedom_have_no_modes():
