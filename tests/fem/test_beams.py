@@ -15,9 +15,9 @@ FIXED = np.array([4.7300407449, 7.8532046241, 10.9956078380])
 PINNED = np.pi * np.arange(1, 4)
 
 
-def line(n_elements, supports, first=(), last=(), direction=(1.0, 0.0, 0.0), **options):
+def line(n_elements, supports, first=(), last=(), **options):
     """Beams in a row, of which the first and last may be released."""
-    points = LENGTH * np.linspace(0, 1, n_elements + 1)[:, np.newaxis] * np.asarray(direction)
+    points = LENGTH * np.linspace(0, 1, n_elements + 1)[:, np.newaxis] * [1.0, 0.0, 0.0]
     beams = {}
     for i in range(n_elements):
         ends = {"release_start": first if i == 0 else (), "release_end": last if i == n_elements - 1 else ()}
@@ -42,20 +42,14 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_bending_about_both_axes(case):
+def test_bending_about_both_axes_converges_at_fourth_order(case):
     roots, supports = CASES[case]
-    expected = np.sort(np.concatenate([bending(roots, SECTION[i])[:2] for i in ("I_yy", "I_zz")]))[:3]
-    np.testing.assert_allclose(frequencies(line(24, supports), 3), expected, rtol=1e-5)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_bending_converges_at_fourth_order(case):
-    roots, supports = CASES[case]
-    exact = bending(roots, SECTION["I_zz"])[0]
-    sizes = np.array([4, 8, 16])
-    errors = np.array([frequencies(line(n, supports), 1)[0] / exact - 1 for n in sizes])
+    exact = np.sort(np.concatenate([bending(roots, SECTION[i])[:2] for i in ("I_yy", "I_zz")]))[:3]
+    sizes = np.array([6, 12, 24])
+    errors = np.array([frequencies(line(n, supports), 3) / exact - 1 for n in sizes])
     assert (errors > 0).all()
-    np.testing.assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(1 / sizes)), 4.0, atol=0.1)
+    assert errors[-1].max() < 1e-5
+    np.testing.assert_allclose(np.diff(np.log(errors[:, 0])) / np.diff(np.log(1 / sizes)), 4.0, atol=0.1)
 
 
 def test_torsion_and_tension():
@@ -63,26 +57,18 @@ def test_torsion_and_tension():
     shaft = line(40, (CLAMPED, "yz ry rz"), I_p=7e-5)
     twist = np.sqrt(SECTION["G"] * SECTION["J"] / (SECTION["density"] * 7e-5)) / (4 * LENGTH)
     stretch = np.sqrt(SECTION["E"] / SECTION["density"]) / (4 * LENGTH)
-    model = Structure(
-        {0: (0, 0, 0), 1: (LENGTH, 0, 0)},
-        {"beam": Beam(0, 1, **SECTION, I_p=7e-5)},
-        {0: CLAMPED, 1: "yz ry rz"},
-        {"all": ["beam"]},
-    ).assemble(["all"], n_modes=2)
-    np.testing.assert_allclose(model.frequencies([[1.0]])[0], np.array([twist, stretch]) * 4 * np.sqrt(3) / (2 * np.pi))
+    alone = frequencies(line(1, (CLAMPED, "yz ry rz"), I_p=7e-5), 2)
+    np.testing.assert_allclose(alone, np.array([twist, stretch]) * 4 * np.sqrt(3) / (2 * np.pi))
     fine = frequencies(shaft, 20)
     for exact in (twist, stretch):
         assert np.abs(fine / exact - 1).min() < 1e-3
 
 
-def test_lumped_mass_is_half_at_either_end():
+def test_lumped_mass_is_half_at_either_end_and_a_lumped_cantilever_converges_from_below():
     model = line(1, (CLAMPED, "xy rx ry rz"), lumped=True)
     stiffness = 12 * SECTION["E"] * SECTION["I_yy"] / LENGTH**3
     mass = SECTION["density"] * SECTION["A"] * LENGTH / 2
     np.testing.assert_allclose(frequencies(model, 1), np.sqrt(stiffness / mass) / (2 * np.pi), rtol=1e-12)
-
-
-def test_lumped_cantilever_converges_from_below():
     coarse, fine = (frequencies(line(n, (CLAMPED, ""), lumped=True), 1)[0] for n in (8, 32))
     exact = bending(CANTILEVER, SECTION["I_zz"])[0]
     assert coarse < fine < exact
@@ -90,14 +76,9 @@ def test_lumped_cantilever_converges_from_below():
 
 
 def test_ends_released_from_clamped_nodes_are_simply_supported():
-    released = line(16, (CLAMPED, CLAMPED), first=("ry", "rz"), last=("ry", "rz"))
-    supported = line(16, ("xyz rx", "xyz rx"))
-    np.testing.assert_allclose(frequencies(released, 4), frequencies(supported, 4), rtol=1e-3)
-    np.testing.assert_allclose(
-        frequencies(line(64, (CLAMPED, CLAMPED), first=("ry", "rz"), last=("ry", "rz")), 4),
-        frequencies(line(64, ("xyz rx", "xyz rx")), 4),
-        rtol=1e-5,
-    )
+    released = line(64, (CLAMPED, CLAMPED), first=("ry", "rz"), last=("ry", "rz"))
+    supported = line(64, ("xyz rx", "xyz rx"))
+    np.testing.assert_allclose(frequencies(released, 4), frequencies(supported, 4), rtol=1e-5)
 
 
 def test_a_beam_released_in_all_bending_is_a_bar():
@@ -119,7 +100,7 @@ def rigid_motions(points):
     return motions
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_rigid_motion_strains_nothing_and_carries_the_mass(seed):
     rng = np.random.default_rng(seed)
     points, arms = rng.normal(size=(2, 3)), rng.normal(size=(2, 3))
@@ -176,13 +157,13 @@ def portal(rotation=None):
     )
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_frames_do_not_know_where_north_is(seed):
-    turned = portal(Rotation.random(random_state=seed)).assemble(["beam", "columns"])
-    theta = [[0.9, 1.2]]
-    np.testing.assert_allclose(
-        turned.frequencies(theta), portal().assemble(["beam", "columns"]).frequencies(theta), rtol=1e-8
+    own, turned = (
+        portal(turn).assemble(["beam", "columns"]).frequencies([[0.9, 1.2]])
+        for turn in (None, Rotation.random(random_state=seed))
     )
+    np.testing.assert_allclose(turned, own, rtol=1e-8)
 
 
 def every_parameter():

@@ -1,4 +1,4 @@
-"""Losses of cross-section, which take stiffness and mass away."""
+"""Losses of cross-section, which take stiffness and mass away, and directions in which small losses move modes."""
 
 import pickle
 from dataclasses import replace
@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skthermo.datasets import make_truss, truss_structure
+from skthermo.datasets import make_truss, make_truss_campaign, truss_structure
 from skthermo.fem import AffineModel, Bar, Beam, CallableModel, ImportedStructure, PointMass, Spring, Structure
+from skthermo.surrogate import DataInformedFEM
 
 TRUSS = make_truss()
 NAMES = ["bottom", "top", "diagonal", "vertical"]
@@ -47,35 +48,29 @@ def frame(n=12):
 
 
 def test_the_truss_is_one_with_smaller_members():
-    smaller = lost(truss_structure(), LOSS).assemble(NAMES, n_modes=6)
-    exact = smaller.frequencies(THETA)
+    own = truss_structure()
     damaged = TRUSS.damaged(LOSS, kind="section")
-    assert damaged.frequencies(THETA) == pytest.approx(exact, rel=1e-10)
-    areas = truss_structure()
     members = {
-        name: replace(bar, A=bar.A * np.prod([1 - loss for group, loss in LOSS.items() if name in areas.groups[group]]))
-        for name, bar in areas.members.items()
+        name: replace(bar, A=bar.A * np.prod([1 - loss for group, loss in LOSS.items() if name in own.groups[group]]))
+        for name, bar in own.members.items()
     }
-    rebuilt = Structure(areas.nodes, members, areas.supports, areas.groups).assemble(NAMES, n_modes=6)
-    assert damaged.frequencies(THETA) == pytest.approx(rebuilt.frequencies(THETA), rel=1e-10)
+    for smaller in (lost(own, LOSS), Structure(own.nodes, members, own.supports, own.groups)):
+        exact = smaller.assemble(NAMES, n_modes=6).frequencies(THETA)
+        assert damaged.frequencies(THETA) == pytest.approx(exact, rel=1e-10)
     assert (damaged.frequencies(NOMINAL) > TRUSS.damaged(LOSS).frequencies(NOMINAL)).all()
 
 
-@pytest.mark.parametrize("n", [12, 60])  # dense and sparse
-@pytest.mark.parametrize("track", [False, True])
+@pytest.mark.parametrize(("n", "track"), [(12, True), (60, False)])  # dense and sparse
 def test_beams_overlapping_groups_and_parameters_of_the_mass(n, track):
     structure, loss = frame(n), {"west": 0.3, "middle": 0.2, "ties": 0.5, "springs": 0.1}
     parameters = {"E_west": ("E", "west"), "mass of the middle": ("density", "middle"), "ties": "ties"}
     model, smaller = (one.assemble(parameters, n_modes=4, track=track) for one in (structure, lost(structure, loss)))
-    theta = THETA[:3, :3]
-    assert model.damaged(loss, kind="section").frequencies(theta) == pytest.approx(
-        smaller.frequencies(theta), rel=1e-10
-    )
+    damaged, theta = model.damaged(loss, kind="section"), THETA[:3, :3]
+    assert damaged.frequencies(theta) == pytest.approx(smaller.frequencies(theta), rel=1e-10)
     masses, members = model.group_mass, structure.members
     assert masses["springs"].nnz == 0
     whole = sum(2.0 * members["beam", i].density * members["beam", i].A for i in range(n // 2))
-    along_z = [place for place, (_, direction) in enumerate(model.dofs) if direction == "z"]
-    rigid = np.isin(np.arange(model.n_dof), along_z).astype(float)
+    rigid = np.array([float(direction == "z") for _, direction in model.dofs])
     assert rigid @ masses["west"] @ rigid == pytest.approx(whole)  # without the point mass
 
 
@@ -97,10 +92,9 @@ def changed_models():
     yield varied.with_parameters(["diagonal"]), smaller.with_parameters(["diagonal"]), THETA[:, :1]
 
 
-@pytest.mark.parametrize("case", range(8))
-def test_other_changes_of_a_model_and_losses_of_section_go_together(case):
-    model, expected, theta = list(changed_models())[case]
-    assert model.frequencies(theta) == pytest.approx(expected.frequencies(theta), rel=1e-10)
+def test_other_changes_of_a_model_and_losses_of_section_go_together():
+    for model, expected, theta in changed_models():
+        assert model.frequencies(theta) == pytest.approx(expected.frequencies(theta), rel=1e-10)
 
 
 def test_a_reduced_model_loses_section():
@@ -135,14 +129,30 @@ def test_derivatives_are_those_of_differences():
 def test_directions_are_slopes_of_both_kinds():
     directions = TRUSS.damage_directions()
     assert list(directions.index) == [*NAMES, *(f"{name}, section" for name in NAMES)]
+    program = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6, vectorized=True)
     for kind in ("stiffness", "section"):
         alone = TRUSS.damage_directions(["top", "bottom"], kind=kind)
         for group, row in zip(["top", "bottom"], alone.to_numpy(), strict=True):
             logs = [np.log(TRUSS.damaged({group: s}, kind=kind).frequencies(NOMINAL)[0]) for s in (1e-4, -1e-4)]
             assert row == pytest.approx((logs[0] - logs[1]) / 2e-4, abs=1e-6)
         assert alone.to_numpy() == pytest.approx(directions.loc[alone.index].to_numpy(), abs=1e-12)
+    assert program.damage_directions().to_numpy() == pytest.approx(directions.loc[NAMES].to_numpy(), abs=1e-5)
     on_springs = frame().assemble(["west"], groups=["west", "springs"], n_modes=4).damage_directions()
     assert list(on_springs.index) == ["west", "springs", "west, section"]
+
+
+def test_directions_of_a_chain_have_the_names_of_its_modes():
+    campaign = make_truss_campaign(samples_per_year=90, random_state=0)
+    fem = DataInformedFEM(TRUSS, random_state=0).fit(campaign.temperatures, campaign.frequencies)
+    directions = fem.damage_directions(["diagonal"])
+    assert list(directions.columns) == list(fem.mode_names_)
+    theta = fem.parameters_.mean().to_numpy()[np.newaxis]
+    for name, kind in (("diagonal", "stiffness"), ("diagonal, section", "section")):
+        healthy, damaged = (
+            fem.aligner_.inverse_transform(model.frequencies(theta))[0]
+            for model in (TRUSS, TRUSS.damaged({"diagonal": 1e-4}, kind=kind))
+        )
+        assert directions.loc[name].to_numpy() == pytest.approx(np.log(damaged / healthy) / 1e-4, abs=1e-4)
 
 
 def test_a_loss_of_stiffness_is_what_it_was():
@@ -229,23 +239,26 @@ def test_an_imported_structure_knows_the_masses_of_its_members():
                 assembled.damaged({"chords": 0.2}, kind="section")
 
 
-def test_what_is_wrong_is_named():
-    with pytest.raises(ValueError, match=r"does not know the mass of the groups \['k'\]"):
-        springs().damaged({"k": 0.2}, kind="section")
-    with pytest.raises(ValueError, match=r"does not know the mass of the groups \['c'\]"):
-        springs(group_mass={"k": 0.5 * np.eye(2)}).with_damage_parameters(["k", "c"], kind="section")
-    with pytest.raises(ValueError, match="does not know the mass"):
-        springs().damage_directions(kind="section")
-    with pytest.raises(ValueError, match="expected 'stiffness' or 'section'"):
-        TRUSS.damaged({"top": 0.1}, kind="area")
-    with pytest.raises(ValueError, match="does not know the mass"):
-        CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6).damaged({"top": 0.1}, kind="section")
-    for masses, what in (
-        ({"x": np.eye(2)}, "expected a mapping of some of"),
-        ({"k": 2 * np.eye(2)}, "more than the model's mass"),
-        ({"k": -np.eye(2)}, "below 0"),
-        ({"k": np.eye(3)}, "expected"),
-        ({"k": {("z",): 0.1 * np.eye(2)}}, "name"),
-    ):
-        with pytest.raises(ValueError, match=what):
-            springs(group_mass=masses)
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda: springs().damaged({"k": 0.2}, kind="section"), r"does not know the mass of the groups \['k'\]"),
+        (
+            lambda: springs(group_mass={"k": 0.5 * np.eye(2)}).with_damage_parameters(["k", "c"], kind="section"),
+            r"does not know the mass of the groups \['c'\]",
+        ),
+        (lambda: springs().damage_directions(kind="section"), "does not know the mass"),
+        (lambda: TRUSS.damaged({"top": 0.1}, kind="area"), "expected 'stiffness' or 'section'"),
+        (lambda: CallableModel(np.sqrt, ["top"], 1).damaged({"top": 0.1}, kind="section"), "does not know the mass"),
+        (lambda: CallableModel(lambda row: [1.0, 2.0], ["E"], 2).damage_directions(), "no loss of the groups"),
+        (lambda: TRUSS.damage_directions(["sideways"]), "unknown damage groups"),
+        (lambda: springs(group_mass={"x": np.eye(2)}), "expected a mapping of some of"),
+        (lambda: springs(group_mass={"k": 2 * np.eye(2)}), "more than the model's mass"),
+        (lambda: springs(group_mass={"k": -np.eye(2)}), "below 0"),
+        (lambda: springs(group_mass={"k": np.eye(3)}), "expected"),
+        (lambda: springs(group_mass={"k": {("z",): 0.1 * np.eye(2)}}), "name"),
+    ],
+)
+def test_what_is_wrong_is_named(wrong, message):
+    with pytest.raises(ValueError, match=message):
+        wrong()
