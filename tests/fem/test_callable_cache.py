@@ -41,9 +41,8 @@ def folder(tmp_path):
 def test_the_second_model_solves_only_what_is_new(folder):
     first, second = Counted(), Counted()
     np.testing.assert_array_equal(CallableModel(first, NAMES, 3, cache=folder).frequencies(THETA[:15]), PLAIN[:15])
-    np.testing.assert_array_equal(
-        CallableModel(second, NAMES, 3, cache=str(folder)).frequencies(THETA[::-1]), PLAIN[::-1]
-    )
+    again = CallableModel(second, NAMES, 3, cache=str(folder))
+    np.testing.assert_array_equal(again.frequencies(THETA[::-1]), PLAIN[::-1])
     np.testing.assert_array_equal(first.rows, THETA[:15])
     np.testing.assert_array_equal(second.rows, THETA[:14:-1])
 
@@ -163,15 +162,11 @@ def test_a_function_that_fails_everywhere_is_an_error(folder):
 
 @pytest.mark.nightly
 def test_workers_share_one_folder(folder):
-    model = CallableModel(three_modes, NAMES, 3, cache=folder)
+    model, counted = CallableModel(three_modes, NAMES, 3, cache=folder), Counted()
     with joblib.parallel_config("loky"):
-        spread = sample(model, 0.3, 300, n_jobs=2, random_state=0)
-    np.testing.assert_array_equal(
-        spread.frequencies, sample(CallableModel(three_modes, NAMES, 3), 0.3, 300, random_state=0).frequencies
-    )
-    counted = Counted()
-    again = sample(CallableModel(counted, NAMES, 3, cache=folder), 0.3, 300, random_state=0)
-    np.testing.assert_array_equal(again.frequencies, spread.frequencies)
+        spread = sample(model, 0.3, 300, n_jobs=2, random_state=0).frequencies
+    for other in (CallableModel(three_modes, NAMES, 3), CallableModel(counted, NAMES, 3, cache=folder)):
+        np.testing.assert_array_equal(sample(other, 0.3, 300, random_state=0).frequencies, spread)
     assert not counted.rows
 
 
@@ -190,40 +185,26 @@ def program(folder, log, stall):
     CallableModel(slow, NAMES, 3, cache=folder).frequencies(MANY)
 
 
-def run_program(folder, log, stall=0):
-    process = PROCESSES.Process(target=program, args=(folder, log, stall))
-    process.start()
-    return process
-
-
-def ended(process):
-    process.join()
-    return process.exitcode
-
-
 def begun(log):
     return np.frombuffer(log.read_bytes() if log.exists() else b"").reshape(-1, 2)
-
-
-def check_all_solved(folder):
-    counted = Counted()
-    result = CallableModel(counted, NAMES, 3, cache=folder).frequencies(MANY)
-    assert not counted.rows
-    np.testing.assert_array_equal(result, CallableModel(three_modes, NAMES, 3).frequencies(MANY))
 
 
 @pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of multiprocessing, from Python 3.12 on
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
 def test_killed_in_the_middle_of_solves(folder, tmp_path):
-    log = tmp_path / "log"
-    for solved, stall in ((30, 30), (70, 0)):  # first within a solve, then wherever it is
-        process = run_program(folder, log, stall)
-        while process.is_alive() and len(begun(log)) < solved:
+    log, counted = tmp_path / "log", Counted()
+    for solved, stall in ((30, 30), (70, 0), (None, 0)):  # within a solve, wherever it is, not at all
+        process = PROCESSES.Process(target=program, args=(folder, log, stall))
+        process.start()
+        while solved and process.is_alive() and len(begun(log)) < solved:
             time.sleep(0.005)
-        process.kill()
-        assert ended(process) == -signal.SIGKILL or not stall
-    assert ended(run_program(folder, log)) == 0
+        if solved:
+            process.kill()
+        process.join()
+        assert process.exitcode == (-signal.SIGKILL if solved else 0) or solved == 70
     assert len(np.unique(begun(log), axis=0)) == 100
     assert 100 < len(begun(log)) <= 102  # again only what was under way
-    check_all_solved(folder)
+    result = CallableModel(counted, NAMES, 3, cache=folder).frequencies(MANY)
+    assert not counted.rows
+    np.testing.assert_array_equal(result, CallableModel(three_modes, NAMES, 3).frequencies(MANY))
