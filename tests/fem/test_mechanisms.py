@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from skthermo.fem import AffineModel, Beam, Structure
+from tests.fem.test_beams import SECTION
 
 MESHES = [((1.0, 0.0, 0.0), 300), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
 
 
 def cantilever(n_beams, supports, *, direction=(1.0, 2.0, 3.0)):
     """A line of beams, 10 m long."""
-    section = {"E": 210e9, "G": 81e9, "A": 0.02, "I_yy": 4e-5, "I_zz": 1e-5, "J": 3e-5, "density": 7850.0}
     along = np.array(direction) / np.linalg.norm(direction)
     nodes = {i: tuple(along * 10 * i / n_beams) for i in range(n_beams + 1)}
-    beams = {f"beam {i}": Beam(i, i + 1, **section) for i in range(n_beams)}
+    beams = {f"beam {i}": Beam(i, i + 1, **SECTION) for i in range(n_beams)}
     return Structure(nodes, beams, supports, {"all": list(beams)}).assemble(["all"], n_modes=2)
 
 

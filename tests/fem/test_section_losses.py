@@ -100,30 +100,28 @@ def test_other_changes_of_a_model_and_losses_of_section_go_together():
 def test_a_reduced_model_loses_section():
     exact = lost(truss_structure(), LOSS).assemble(NAMES, n_modes=6).frequencies(THETA)
     reduced = TRUSS.reduced(0.25, random_state=0)
-    assert reduced.damaged(LOSS, kind="section").frequencies(THETA) == pytest.approx(exact, rel=1e-5)
     varied = reduced.with_damage_parameters(list(LOSS), kind="section")
     rows = np.hstack([THETA, np.tile([0.7, 0.9], (len(THETA), 1))])
+    assert reduced.damaged(LOSS, kind="section").frequencies(THETA) == pytest.approx(exact, rel=1e-5)
     assert varied.frequencies(rows) == pytest.approx(exact, rel=1e-5)
     assert varied.full.frequencies(rows) == pytest.approx(exact, rel=1e-10)
 
 
 def test_a_tracked_mode_is_followed_where_mass_goes():
     tracked = frame().assemble(["west", "ties"], groups=["west", "ties"], n_modes=4, track=True)
-    severities = np.linspace(0, 0.9, 19)
-    varied = tracked.with_damage_parameters(["west", "ties"], kind="section")
-    rows = np.column_stack([np.ones((19, 2)), 1 - severities, 1 - severities])
+    severities = np.linspace(0, 0.9, 7)
+    rows = np.column_stack([np.ones((7, 2)), 1 - severities, 1 - severities])
+    varied = tracked.with_damage_parameters(["west", "ties"], kind="section").frequencies(rows)
     each = [tracked.damaged({"west": s, "ties": s}, kind="section").frequencies([[1.0, 1.0]])[0] for s in severities]
-    assert varied.frequencies(rows) == pytest.approx(np.array(each), rel=1e-10)
+    assert varied == pytest.approx(np.array(each), rel=1e-10)
 
 
 def test_derivatives_are_those_of_differences():
     parameters = {"E_west": ("E", "west"), "m_middle": ("density", "middle")}
     model = frame().assemble(parameters, n_modes=4).with_damage_parameters(["west", "middle"], kind="section")
-    theta, step = np.array([[1.1, 0.9, 0.8, 0.95]]), 1e-5
-    jacobian = model.jacobian(theta)[0]
-    for column, unit in enumerate(np.eye(4)):
-        slope = (model.frequencies(theta + step * unit) - model.frequencies(theta - step * unit))[0] / (2 * step)
-        assert jacobian[:, column] == pytest.approx(slope, rel=1e-5, abs=1e-5)
+    theta, step = np.array([[1.1, 0.9, 0.8, 0.95]]), 1e-5 * np.eye(4)
+    slopes = (model.frequencies(theta + step) - model.frequencies(theta - step)) / 2e-5
+    assert model.jacobian(theta)[0] == pytest.approx(slopes.T, rel=1e-5, abs=1e-5)
 
 
 def test_directions_are_slopes_of_both_kinds():
@@ -169,33 +167,29 @@ def test_a_loss_of_stiffness_is_what_it_was():
 
 
 def test_a_group_made_of_two_loses_as_both():
-    chords = truss_structure()
-    groups = chords.groups | {"chords": chords.groups["bottom"] | chords.groups["top"]}
-    model = Structure(chords.nodes, chords.members, chords.supports, groups).assemble(NAMES, n_modes=6)
-    one, two = {"chords": 0.2}, {"bottom": 0.2, "top": 0.2}
-    for kind in ("stiffness", "section"):
-        frequencies = [model.damaged(loss, kind=kind).frequencies(THETA) for loss in (one, two)]
+    own = truss_structure()
+    groups = own.groups | {"chords": own.groups["bottom"] | own.groups["top"]}
+    model = Structure(own.nodes, own.members, own.supports, groups).assemble(NAMES, n_modes=6)
+    one, two, again = {"chords": 0.2}, {"bottom": 0.2, "top": 0.2}, {"bottom": 0.2, "top": 1 - 0.8 * 0.9}
+    for kind, losses in (("stiffness", (one, two)), ("section", (one, two)), ("section", (one | {"top": 0.1}, again))):
+        frequencies = [model.damaged(loss, kind=kind).frequencies(THETA) for loss in losses]
         assert frequencies[0] == pytest.approx(frequencies[1], rel=1e-12)
     assert abs(model.group_mass["chords"] - model.group_mass["bottom"] - model.group_mass["top"]).max() < 1e-9
-    again = {"chords": 0.2, "top": 0.1}
-    expected = {"bottom": 0.2, "top": 1 - 0.8 * 0.9}
-    frequencies = [model.damaged(loss, kind="section").frequencies(THETA) for loss in (again, expected)]
-    assert frequencies[0] == pytest.approx(frequencies[1], rel=1e-12)
 
 
 def test_members_of_a_divided_group_lose_their_own_mass():
-    structure = frame()
-    model = structure.assemble(["west", "ties"], n_modes=4)
+    structure, theta = frame(), THETA[:, :2]
     parts = {"west": {"first": [("beam", 0), ("beam", 1)]}, "springs": {"left": [("spring", 0)]}}
-    divided = structure.divide(model, parts)
-    fewer = Structure(structure.nodes, structure.members, structure.supports, structure.groups | {
-        "first": [("beam", 0), ("beam", 1)], "left": [("spring", 0)]
-    })  # fmt: skip
-    loss = {"first": 0.4, "middle": 0.1, "left": 0.2}
-    exact = lost(fewer, loss).assemble(["west", "ties"], n_modes=4).frequencies(THETA[:, :2])
-    assert divided.damaged(loss, kind="section").frequencies(THETA[:, :2]) == pytest.approx(exact, rel=1e-10)
-    reduced = structure.divide(model.reduced(0.25, random_state=0), parts).damaged(loss, kind="section")
-    assert reduced.frequencies(THETA[:, :2]) == pytest.approx(exact, rel=1e-5)
+    groups = structure.groups | parts["west"] | parts["springs"]
+    fewer, loss = (
+        Structure(structure.nodes, structure.members, structure.supports, groups),
+        {"first": 0.4, "middle": 0.1, "left": 0.2},
+    )
+    exact = lost(fewer, loss).assemble(["west", "ties"], n_modes=4).frequencies(theta)
+    model = structure.assemble(["west", "ties"], n_modes=4)
+    for one, tolerance in ((model, 1e-10), (model.reduced(0.25, random_state=0), 1e-5)):
+        damaged = structure.divide(one, parts).damaged(loss, kind="section")
+        assert damaged.frequencies(theta) == pytest.approx(exact, rel=tolerance)
 
 
 def springs(**options):
@@ -216,27 +210,28 @@ def test_masses_of_other_programs():
     assert rescaled.frequencies(NOMINAL[:, :3]) == pytest.approx(damaged.frequencies(theta), rel=1e-12)
 
 
-def test_an_imported_structure_knows_the_masses_of_its_members():
-    structure = truss_structure()
-    exported = structure.assemble({name: name for name in structure.groups if name in NAMES}, groups=NAMES, n_modes=6)
-    mass = exported.matrices(np.ones(4))[1]
+@pytest.mark.parametrize("is_known", [True, False])
+def test_an_imported_structure_knows_the_masses_of_its_members(is_known):
+    own = truss_structure()
+    exported = own.assemble({name: name for name in own.groups if name in NAMES}, groups=NAMES, n_modes=6)
     terms = {(name,): exported.stiffness_terms[place] for name, (place,) in exported.groups.items()}
-    rest = sum(exported.stiffness_terms) - sum(terms.values())
-    nodes, members = {0: (0.0, 0.0), 1: (1.0, 0.0)}, dict.fromkeys(NAMES, (0, 1))
-    for masses, is_known in ((exported.group_mass, True), (None, False)):
-        model = AffineModel({**terms, (): rest}, mass, n_modes=6, group_mass=masses)
-        imported = ImportedStructure(model, nodes, members, {"chords": ["bottom", "top"], "rest": NAMES[2:]})
-        assembled = imported.assemble(["chords", "rest"], n_modes=6)
-        if is_known:
-            loss = {"bottom": 0.2, "top": 0.2}
-            frequencies = assembled.damaged({"chords": 0.2}, kind="section").frequencies(NOMINAL[:, :2])
-            assert frequencies == pytest.approx(exported.damaged(loss, kind="section").frequencies(NOMINAL), rel=1e-10)
-            divided = imported.divide(assembled, {"chords": {"upper": ["top"]}}).damaged({"upper": 0.3}, kind="section")
-            expected = exported.damaged({"top": 0.3}, kind="section").frequencies(NOMINAL)
-            assert divided.frequencies(NOMINAL[:, :2]) == pytest.approx(expected, rel=1e-10)
-        else:
-            with pytest.raises(ValueError, match="does not know the mass"):
-                assembled.damaged({"chords": 0.2}, kind="section")
+    terms[()] = sum(exported.stiffness_terms) - sum(terms.values())
+    masses, theta = exported.group_mass if is_known else None, NOMINAL[:, :2]
+    model = AffineModel(terms, exported.matrices(np.ones(4))[1], n_modes=6, group_mass=masses)
+    members, groups = dict.fromkeys(NAMES, (0, 1)), {"chords": ["bottom", "top"], "rest": NAMES[2:]}
+    imported = ImportedStructure(model, {0: (0.0, 0.0), 1: (1.0, 0.0)}, members, groups)
+    assembled = imported.assemble(["chords", "rest"], n_modes=6)
+    if is_known:
+        divided = imported.divide(assembled, {"chords": {"upper": ["top"]}})
+        for model, loss, same in (
+            (assembled, {"chords": 0.2}, {"bottom": 0.2, "top": 0.2}),
+            (divided, {"upper": 0.3}, {"top": 0.3}),
+        ):
+            expected = exported.damaged(same, kind="section").frequencies(NOMINAL)
+            assert model.damaged(loss, kind="section").frequencies(theta) == pytest.approx(expected, rel=1e-10)
+    else:
+        with pytest.raises(ValueError, match="does not know the mass"):
+            assembled.damaged({"chords": 0.2}, kind="section")
 
 
 @pytest.mark.parametrize(
