@@ -232,11 +232,14 @@ BAD = {
         (r"^DMIG +KAAX.*\n", "", "line 1: matrix 'KAAX' has no entry that states its form"),
         (r"D\+03", "Q+03", r"line \d+: .*Q.03' is not a number"),
         (r"^\* .*\n", lambda found: found.group() * 2, "more than once"),
+        (r"^DMIG( |\n|.)*", "DMIGS\n", "no DMIG entry"),
     ],
     "OP4, strings": [
         (r"\n +7 +1 +1\n.*\n$", "\n", "line 1: no end after 6 columns: the file seems to be cut off"),
         (r"327681|196609|458753", "196610", r"line 3 states 2 words; 2 values follow"),
         (r"E\+03", "x+03", r"line \d+: .* is not a number"),
+        (r"1P,3E", "1P,2E", r"line \d+ holds 3 values; expected a column's number or at most 2 values"),
+        (r"(\n +1 +0 +\d+\n)", r"\n 1 2 3 4\1", "starts neither a column nor a string"),
     ],
     "Abaqus matrix input, half": [
         (r"3,1, 3,1,", "3,1, 3,", r"line \d+ holds 4 words; expected 5"),

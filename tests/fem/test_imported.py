@@ -31,8 +31,13 @@ def imported_from(structure, model):
 
 
 @pytest.fixture(scope="module")
-def imported(own):
-    return imported_from(own, by_member(own))
+def exported(own):
+    return by_member(own)
+
+
+@pytest.fixture(scope="module")
+def imported(own, exported):
+    return imported_from(own, exported)
 
 
 def test_the_models_are_the_same(own, imported):
@@ -59,8 +64,8 @@ def test_so_are_divided_ones(own, imported, is_changed):
         assert theirs == pytest.approx(ours, rel=1e-9)
 
 
-def test_from_a_folder_with_a_file_for_each_member(own, imported, tmp_path):
-    model = by_member(own)
+def test_from_a_folder_with_a_file_for_each_member(own, exported, imported, tmp_path):
+    model = exported
     mass = model.matrices(np.ones(len(model.parameter_names)))[1]
     scipy.sparse.save_npz(tmp_path / "M.npz", mass)
     for name, matrix in zip(model.parameter_names, model.stiffness_terms, strict=True):
@@ -107,8 +112,8 @@ def test_a_node_may_be_named_by_a_tuple():
     assert [member.nodes for member in imported.members.values()] == [(("deck", 0),), (("deck", 0), ("deck", 2))]
 
 
-def test_what_does_not_fit_is_named(own, imported):
-    model, nodes = by_member(own), own.nodes
+def test_what_does_not_fit_is_named(own, exported, imported):
+    model, nodes = exported, own.nodes
     first, second = list(nodes)[:2]
     product = AffineModel({("a", "b"): np.eye(2)}, np.eye(2), n_modes=1)
     for message, arguments in (

@@ -6,7 +6,7 @@ import pytest
 from skthermo.fem import AffineModel, Beam, Structure
 from tests.fem.test_beams import SECTION
 
-MESHES = [((1.0, 0.0, 0.0), 300), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
+MESHES = [((1.0, 0.0, 0.0), 250), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
 
 
 def cantilever(n_beams, supports, *, direction=(1.0, 2.0, 3.0)):
