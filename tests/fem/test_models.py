@@ -13,10 +13,6 @@ from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, FEModel, add_noise, mac, sample
 
 
-def row_model(row):
-    return np.sqrt(row @ [1.0, 2.0]) * np.array([1.0, 2.0])
-
-
 def test_clone_shares_and_pickle_copies_and_damaged_leaves_the_model_as_it_was():
     truss, theta = make_truss(), [[0.9, 1.0, 1.1, 1.2]]
     before = truss.frequencies(theta)
@@ -66,15 +62,6 @@ def test_same_bits_however_samples_of_a_large_model_are_spread(n_dof):
     np.testing.assert_array_equal(spread.frequencies, alone.frequencies)
 
 
-def test_third_party_programs_run_row_by_row_or_all_at_once():
-    rows = np.random.default_rng(0).uniform(0.8, 1.2, (300, 2))
-    by_row = CallableModel(row_model, ["a", "b"], 2)
-    at_once = CallableModel(lambda theta: [row_model(row) for row in theta], ["a", "b"], 2, vectorized=True)
-    np.testing.assert_allclose(by_row.frequencies(rows), at_once.frequencies(rows), rtol=1e-15)
-    assert clone(by_row) is by_row
-    assert isinstance(by_row, FEModel)
-
-
 def test_a_program_is_damaged_by_its_parameters(tmp_path):
     """As the affine model with the same stiffness: severities multiply parameters, one after the other."""
     truss = make_truss()
@@ -88,6 +75,8 @@ def test_a_program_is_damaged_by_its_parameters(tmp_path):
     names, cache = truss.parameter_names, tmp_path / "solved"
     model = CallableModel(program, names, 6, vectorized=True, cache=cache)
     assert list(model.groups) == list(names)
+    assert clone(model) is model
+    assert isinstance(model, FEModel)
     for damage in ({"bottom": 0.2}, {"top": -0.15, "diagonal": 0.4}, {}):
         expected = truss.damaged(damage).frequencies(rows)
         np.testing.assert_array_equal(model.damaged(damage).frequencies(rows), expected)

@@ -122,8 +122,7 @@ def test_rows_elsewhere_and_rows_with_gaps_are_not_served():
 def test_the_same_rows_give_the_same_bits():
     theta = weather_rows(1)
     one, other = (FrequencySurface(TRUSS.frequencies, theta) for _ in range(2))
-    copied = pickle.loads(pickle.dumps(other))
-    np.testing.assert_array_equal(one.frequencies(theta)[0], copied.frequencies(theta)[0])
+    np.testing.assert_array_equal(one.frequencies(theta)[0], pickle.loads(pickle.dumps(other)).frequencies(theta)[0])
 
 
 def test_more_solves_allow_a_higher_degree_and_with_too_low_a_one_nothing_is_solved():
