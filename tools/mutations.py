@@ -172,7 +172,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("a part too many in a file", "len(parts) != n_values", "len(parts) < n_values"),
         ("unsorted rows in a file", "if not matrix.has_canonical_format", "if False"),
     ],
-    ("fem/external/_texts.py", "fem/test_triplets.py"): [
+    ("fem/external/_texts.py", "fem/test_exported_texts.py"): [
         ("entries on both sides in a file", "if paired or in_order", "if paired"),
     ],
     ("preprocessing/_poles.py", "preprocessing/test_mode_tracker.py"): [
