@@ -9,7 +9,7 @@ from sklearn.linear_model import Ridge
 
 from skthermo.preprocessing import HampelFilter
 from skthermo.surrogate import TemperatureMapper, resampled
-from tests.surrogate.chains import F, T, chain
+from tests.surrogate.chains import F, T, chain, fitted
 
 
 def lasting(n_records, share, length, seed):
@@ -57,17 +57,12 @@ def in_service(spoiled):
         return chain(random_state=0).fit(*spoiled)
 
 
-@pytest.fixture(scope="module")
-def flawless():
-    return chain(random_state=0).fit(T, F)
-
-
 @pytest.mark.one_case
 @pytest.mark.filterwarnings("ignore:.*not-evaluated")
 @pytest.mark.parametrize("knows_weather", [True, False])
 def test_markov_gaps_come_as_often_and_last_as_long(in_service, spoiled, knows_weather):
     weather = T if knows_weather else without(T, np.arange(len(T)) % 3 > 0)
-    drawn, trained = drawn_gaps(in_service, weather, 60)[..., 1], spoiled[1]["f2"].isna()
+    drawn, trained = drawn_gaps(in_service, weather, 30)[..., 1], spoiled[1]["f2"].isna()
     shares, lengths = drawn.mean(axis=1), np.concatenate([run_lengths(one) for one in drawn])
     assert abs(shares.mean() - trained.mean()) < 4 * shares.std() / np.sqrt(len(drawn))
     known = run_lengths(trained)
@@ -120,17 +115,17 @@ def test_outliers_come_as_often_in_the_same_mode_and_in_runs(in_service, spoiled
 
 
 @pytest.mark.nightly
-def test_shares_of_single_gaps_and_outliers(flawless):
+def test_shares_of_single_gaps_and_outliers():
     noise = np.vstack(
         [
-            flawless.recorder_.noise(flawless.weather(T), 0.01, gaps=0.1, outliers=0.05, random_state=seed)
+            fitted().recorder_.noise(fitted().weather(T), 0.01, gaps=0.1, outliers=0.05, random_state=seed)
             for seed in range(5)
         ]
     )
     assert np.isnan(noise).mean() == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / noise.size))
     known = noise[~np.isnan(noise)]
     assert np.mean(known**2) == pytest.approx(0.01**2 * (1 + 0.05 * 99), rel=0.15)
-    assert not np.isnan(flawless.recorder_.noise(flawless.weather(T), 0.01, gaps=0, random_state=0)).any()
+    assert not np.isnan(fitted().recorder_.noise(fitted().weather(T), 0.01, gaps=0, random_state=0)).any()
 
 
 def test_fitted_noise_without_gaps_or_outliers(in_service):
@@ -142,11 +137,11 @@ def test_fitted_noise_without_gaps_or_outliers(in_service):
     np.testing.assert_allclose(ratio, 1, atol=0.15)
 
 
-def test_complete_records_have_no_gaps_and_the_same_noise(flawless):
-    expected = flawless.simulate(T, noise="fitted", random_state=0)
-    found = flawless.simulate(T, noise="fitted", gaps="fitted", outliers="fitted", random_state=0)
+def test_complete_records_have_no_gaps_and_the_same_noise():
+    expected = fitted().simulate(T, noise="fitted", random_state=0)
+    found = fitted().simulate(T, noise="fitted", gaps="fitted", outliers="fitted", random_state=0)
     pd.testing.assert_frame_equal(found, expected)
-    assert not np.hstack(flawless.recorder_.gaps(flawless.weather(T), random_state=0)).any()
+    assert not np.hstack(fitted().recorder_.gaps(fitted().weather(T), random_state=0)).any()
 
 
 @pytest.mark.nightly
@@ -190,17 +185,14 @@ def test_resampled_chains_have_the_gaps_and_outliers_of_the_records(in_service):
         ({"outliers": F.set_axis(F.index[::-1])}, "have different indices"),
     ],
 )
-def test_what_is_no_share_is_refused(flawless, options, message):
+def test_what_is_no_share_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
-        flawless.simulate(T, **options)
+        fitted().simulate(T, **options)
 
 
-def test_no_gaps_are_drawn_for_none(flawless):
+def test_records_are_known_by_the_frequencies_of_fit_alone():
+    for known in (0.1, "fitted", F[:10]):
+        with pytest.raises(ValueError, match="expected"):
+            fitted().recorder_.service_of(known)
     with pytest.raises(ValueError, match="gaps is None; expected 'fitted'"):
-        flawless.recorder_.gaps(flawless.weather(T), None)
-
-
-@pytest.mark.parametrize("known", [0.1, "fitted", F[:10]])
-def test_records_are_known_by_the_frequencies_of_fit_alone(flawless, known):
-    with pytest.raises(ValueError, match="expected"):
-        flawless.recorder_.service_of(known)
+        fitted().recorder_.gaps(fitted().weather(T), None)
