@@ -154,18 +154,6 @@ class TestFindings:
         first, again, fresh = (self.kinds(make, memory) for memory in (str(tmp_path), str(tmp_path), None))
         assert first == again == fresh == ["few-records"]
 
-    @pytest.mark.nightly
-    def test_of_chains(self, tmp_path):
-        gaps = F.where(np.random.default_rng(0).uniform(size=F.shape) < 0.4)
-        first, again, fresh = (
-            self.kinds(
-                lambda memory: chain(memory, inverse=inverse(model=None, noise=0.0005, prior=0.3)).fit(T, gaps), memory
-            )
-            for memory in (str(tmp_path), str(tmp_path), None)
-        )
-        assert first == again == fresh
-        assert "few-records" in first
-
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
 def test_without_a_seed_what_is_kept_is_always_the_same(tmp_path):

@@ -4,6 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.metrics import r2_score
+from sklearn.model_selection import GridSearchCV, ShuffleSplit
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
@@ -12,8 +14,8 @@ from sklearn.preprocessing import PolynomialFeatures
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, CallableModel, add_noise, sample
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.surrogate.chains import TRUSS, YEAR
 
-TRUSS = make_truss()
 QUADRATIC = make_pipeline(PolynomialFeatures(2), Ridge(1e-6))
 
 
@@ -77,7 +79,7 @@ def test_frames_in_frames_out_and_nan_flows_through():
     assert theta.drop(index=index[5]).notna().all(axis=None)
 
 
-ONE = make_truss().frequencies(np.ones((1, 4)))
+ONE = TRUSS.frequencies(np.ones((1, 4)))
 
 
 def test_the_round_trip_is_what_inversion_and_solution_leave():
@@ -156,18 +158,13 @@ def test_linear_regression_of_logarithms_is_exact_where_all_stiffness_scales_tog
     np.testing.assert_allclose(inverse.transform(model.frequencies(theta)), theta, rtol=1e-9)
 
 
-def test_frequencies_that_are_not_positive_are_named():
-    inverse = InverseSurrogate(make_truss(), LinearRegression(), n_samples=20, bounds=0.1, random_state=0).fit()
-    F = make_truss().frequencies(np.ones((3, 4)))
-    F[1, 2] = 0.0
-    with pytest.raises(ValueError, match=r"row 1 of 'f3' is 0; expected positive frequencies in Hz, NaN where"):
-        inverse.transform(F)
-
-
-def test_a_frame_is_welcome_after_a_fit_that_saw_no_frequencies():
-    inverse = InverseSurrogate(make_truss(), LinearRegression(), n_samples=20, bounds=0.1, random_state=0).fit()
-    F = pd.DataFrame(make_truss().frequencies(np.ones((3, 4))), columns=list("abcdef"))
+def test_after_a_fit_that_saw_no_frequencies_frames_are_welcome_and_numbers_must_be_positive():
+    inverse = InverseSurrogate(TRUSS, LinearRegression(), n_samples=20, bounds=0.1, random_state=0).fit()
+    F = pd.DataFrame(TRUSS.frequencies(np.ones((3, 4))), columns=list("abcdef"))
     np.testing.assert_array_equal(inverse.transform(F), inverse.transform(F.to_numpy()))
+    F.iloc[1, 2] = 0.0
+    with pytest.raises(ValueError, match=r"row 1 of 'c' is 0; expected positive frequencies in Hz, NaN where"):
+        inverse.transform(F)
 
 
 def test_in_a_pipeline_the_labels_are_for_the_last_step():
@@ -189,3 +186,37 @@ def test_bounds_go_by_name():
     np.testing.assert_allclose(drawn.theta.max(axis=0), [1.2, 1.3, 1.1, 2.0], atol=0.01)
     with pytest.raises(ValueError, match=r"bounds: \['vertical'\] are missing; expected each of the parameters"):
         InverseSurrogate(TRUSS, bounds={"top": 0.3, "bottom": 0.2, "diagonal": 0.1}).fit()
+
+
+# Scores without targets, by which searches compare regressors
+
+
+ONE_FOLD = ShuffleSplit(1, random_state=0)
+REGRESSORS = {"regressor": [KNeighborsRegressor(), LinearRegression(), QUADRATIC]}
+
+
+def scored(**options):
+    return InverseSurrogate(**({"model": TRUSS, "bounds": 0.2, "n_samples": 300, "random_state": 0} | options))
+
+
+@pytest.mark.one_case
+@pytest.mark.parametrize("noise", ["auto", 0.0, 0.002])
+def test_a_search_chooses_the_regressor_that_errs_least_on_new_simulations(noise):
+    search = GridSearchCV(scored(noise=noise), REGRESSORS, cv=ONE_FOLD, refit=False).fit(YEAR.frequencies)
+    scores, new = search.cv_results_["mean_test_score"], sample(TRUSS, 0.2, 2000, random_state=9)
+    stated = 0.0 if noise == "auto" else noise
+    measured = add_noise(new.frequencies, stated, random_state=9)
+    true = [
+        r2_score(np.log(new.theta), np.log(scored(regressor=one, noise=noise).fit().predict(measured)))
+        for one in REGRESSORS["regressor"]
+    ]
+    np.testing.assert_allclose(scores, true, atol=0.03)
+    assert list(np.argsort(scores)) == list(np.argsort(true)) == [0, 1, 2]
+
+
+def test_an_inverse_of_given_parameters_needs_targets():
+    given = sample(TRUSS, 0.2, 100, random_state=0)
+    learned = InverseSurrogate(regressor=LinearRegression()).fit(given.frequencies, given.theta)
+    with pytest.raises(ValueError, match="expected y to score"):
+        learned.score(given.frequencies)
+    assert learned.score(given.frequencies, given.theta) > 0.5
