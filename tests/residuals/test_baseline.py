@@ -11,7 +11,7 @@ from tests.residuals.series import autoregressive, residuals
 # Order statistics and correlation times
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=60), st.floats(0.05, 0.95))
 def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, confidence):
     scores = np.array(scores)
@@ -21,7 +21,7 @@ def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, 
 
 @pytest.mark.parametrize("share_missing", [0.0, 0.3])
 def test_correlation_time_of_an_autoregressive_series(share_missing):
-    series = autoregressive(20_000, 0.8)[:, 0]
+    series = autoregressive(8000, 0.8)[:, 0]
     series[np.random.default_rng(1).random(len(series)) < share_missing] = np.nan
     weather = np.random.default_rng(2).uniform(size=len(series))
     found = residuals(weather, series).correlation_time
@@ -168,6 +168,7 @@ def test_standard_deviations_of_normal_residuals_are_known_to_a_root_of_their_nu
 # Many records
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 60))
 def test_of_many_records_the_most_complete_one_of_each_part_counts_for_all_modes(seed, n_records, most):
     random = np.random.default_rng(seed)
@@ -200,7 +201,7 @@ def test_few_of_many_records_tell_as_much(monkeypatch):
 @pytest.mark.parametrize("numbers", [1, 700])
 def test_results_do_not_depend_on_how_many_rows_are_held_in_memory(monkeypatch, numbers):
     rng = np.random.default_rng(0)
-    weather, wanted = rng.uniform(-10, 30, (300, 2)), rng.uniform(-10, 30, (50, 2))
+    weather, wanted = rng.uniform(-10, 30, (300, 2)), rng.uniform(-10, 30, (20, 2))
     values = np.where(rng.random((300, 3)) < 0.2, np.nan, rng.standard_normal((300, 3)))
     found = residuals(weather, values)
 

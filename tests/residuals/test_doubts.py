@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.distance import cdist
-from scipy.stats import multivariate_normal
 
 from skthermo.residuals.gaussian import Gaussian, check_invertible
 from skthermo.residuals.sensors import SensorRegression, filled_findings
@@ -18,7 +17,7 @@ from skthermo.residuals.weather import (
     unpredicted_findings,
     unseen_weather,
 )
-from tests.gappy_rows import COVARIANCE, MEAN, records, with_gaps
+from tests.gappy_rows import records
 
 RANDOM = np.random.default_rng(0)
 PLACES, WANTED = RANDOM.normal(size=(60, 2)), RANDOM.normal(size=(25, 2))
@@ -123,16 +122,6 @@ def test_errors_of_filled_values_move_predictions_by_their_deviation():
     (finding,) = filled_findings(deviations, T.columns, "Errors grow")
     assert (finding.kind, "'cable'" in str(finding)) == ("faulty-sensor", False)
     assert filled_findings(0 * deviations, T.columns, "") == []
-
-
-def test_densities_of_gappy_rows_are_those_of_the_modes_that_are_there():
-    rows, normal = with_gaps(records(50)), Gaussian(MEAN, COVARIANCE)
-    expected = np.zeros(50)
-    for place, row in enumerate(rows):
-        there = ~np.isnan(row)
-        if there.any():
-            expected[place] = multivariate_normal.logpdf(row[there], MEAN[there], COVARIANCE[np.ix_(there, there)])
-    np.testing.assert_allclose(normal.log_densities(rows), expected, atol=1e-9)
 
 
 def test_the_distribution_without_some_rows_is_that_of_the_others():

@@ -66,7 +66,7 @@ def means(values, window, regime=None, share=0.5, index=None):
     return learned, learned(table, regime, is_baseline=True)
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(st.integers(1, 12), st.integers(0, 1000))
 def test_means_are_those_of_the_last_records_without_outliers(window, seed):
     values = np.random.default_rng(seed).uniform(-1, 1, (60, 2))  # within four robust deviations
@@ -99,8 +99,7 @@ def test_more_change_of_any_record_never_moves_a_mean_back():
         found = moved
 
 
-@pytest.mark.parametrize("window", [1, 2, 5, 24])
-@pytest.mark.parametrize("size", [-1e4, -30.0, 30.0, 1e4])
+@pytest.mark.parametrize(("window", "size"), [(1, -30.0), (2, 1e4), (5, -1e4), (24, 30.0)])
 def test_a_change_that_lasts_counts_in_full(window, size):
     values = np.random.default_rng(0).normal(size=(200, 2))
     learned, found = means(values, window)
@@ -134,6 +133,7 @@ def frosty(seed, factor):
     return weather, 0.01 * scale * random.normal(size=(730, 3)), np.arange(730) // 14 % 5
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("seed", range(3))
 def test_a_change_of_scatter_is_found_where_it_is_and_nowhere_else(seed):
     column, value = change_of_scatter(*frosty(seed, 3.0))

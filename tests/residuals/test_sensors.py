@@ -6,11 +6,11 @@ import pytest
 from scipy.signal import lfilter
 from sklearn.linear_model import LinearRegression
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning
 from skthermo.residuals.sensors import SensorRegression
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+from tests.surrogate.chains import YEAR, F, T, fitted
 
 
 def records(n_rows, seed=0):
@@ -104,22 +104,11 @@ def test_weather_that_training_does_not_know_says_nothing_of_sensors():
     assert not SensorRegression.fitted(new[["air"]]).doubts(new[["air"]] + 40)
 
 
-LINEAR_CHAIN = DataInformedFEM(
-    make_truss(),
-    inverse=PosteriorInverse(make_truss()),
-    mapper=TemperatureMapper(LinearRegression()),
-    random_state=0,
-)
-
-
 def test_compensator_and_chain_warn_of_a_sensor_that_departs():
-    year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-    records, new = (one.temperatures.join(one.frequencies) for one in (year, later))
-    compensator = TemperatureCompensator(LinearRegression(), targets=list(year.frequencies)).fit(records)
-    chain = LINEAR_CHAIN.fit(year.temperatures, year.frequencies)
-    name = records.columns[0]
+    records, new = (one.temperatures.join(one.frequencies) for one in (YEAR, make_truss_campaign(random_state=1)))
+    compensator = TemperatureCompensator(LinearRegression(), targets=list(F)).fit(records)
     new.iloc[200:, 0] += 15
-    for evaluate in (lambda: compensator.transform(new), lambda: chain.predict(new[year.temperatures.columns])):
-        with pytest.warns(RecordsWarning, match=f"'{name}'") as caught:
+    for evaluate in (lambda: compensator.transform(new), lambda: fitted().predict(new[list(T)])):
+        with pytest.warns(RecordsWarning, match=f"'{records.columns[0]}'") as caught:
             evaluate()
         assert sum(warning.message.kind == "faulty-sensor" for warning in caught) == 1

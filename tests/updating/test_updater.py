@@ -18,6 +18,11 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*poor-fit")
 TRUSS = make_truss()
 TRUTH = np.array([0.9, 1.1, 0.95, 1.05])
 METHODS = ("least_squares", "lbfgs")
+OF_MODELS = pytest.mark.parametrize(
+    ("model", "method"),
+    [(TRUSS, "lbfgs"), (FRAME, "least_squares"), (FRAME.reduced(0.3, random_state=0), "lbfgs")],
+    ids=["truss", "frame", "reduced"],
+)
 
 
 def measured(model, truth, dofs=None):
@@ -26,8 +31,7 @@ def measured(model, truth, dofs=None):
     return frequencies[0], shapes[0] if dofs is None else shapes[0][dofs]
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("model", [TRUSS, FRAME, FRAME.reduced(0.3, random_state=0)], ids=["truss", "frame", "reduced"])
+@OF_MODELS
 def test_frequencies_alone_recover_the_parameters(model, method):
     updater = ModelUpdater(model, method=method).fit(model.frequencies([TRUTH]))
     np.testing.assert_allclose(updater.theta_, TRUTH, atol=1e-4)
@@ -40,8 +44,7 @@ def test_frequencies_alone_recover_the_parameters(model, method):
     assert updater.starts_["success"].all()
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("model", [TRUSS, FRAME, FRAME.reduced(0.3, random_state=0)], ids=["truss", "frame", "reduced"])
+@OF_MODELS
 def test_shapes_at_a_few_degrees_of_freedom_recover_what_two_frequencies_do_not(model, method):
     dofs = np.random.default_rng(3).choice(model.n_dof, 8, replace=False)
     frequencies, shapes = measured(model, TRUTH, dofs)
@@ -55,8 +58,7 @@ def test_shapes_at_a_few_degrees_of_freedom_recover_what_two_frequencies_do_not(
     assert updater.table_["measured"].isna().sum() == 4
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("model", [TRUSS, portal(3)], ids=["truss", "frame"])
+@pytest.mark.parametrize(("model", "method"), [(TRUSS, "least_squares"), (portal(3), "lbfgs")], ids=["truss", "frame"])
 def test_the_documented_objective_is_least_where_a_search_ends(model, method):
     """What is measured cannot be explained, so that gradients of frequencies, shapes and prior balance."""
     dofs, prior, std = np.arange(0, 20, 3), 0.1, 0.01
@@ -195,8 +197,8 @@ def test_the_updated_model_composes_with_the_chain():
     year = make_truss_campaign(random_state=0)
     updater = ModelUpdater(TRUSS).fit(year.frequencies)
     np.testing.assert_allclose(updater.model_.frequencies([np.ones(4)])[0], year.frequencies.mean(), rtol=5e-3)
-    fem = DataInformedFEM(updater.model_, random_state=0)
-    assert fem.fit(year.temperatures, year.frequencies).score(year.temperatures, year.frequencies) > 0.8
+    T, F = year.temperatures[::3], year.frequencies[::3]
+    assert DataInformedFEM(updater.model_, random_state=0).fit(T, F).score(T, F) > 0.8
     np.testing.assert_allclose(sensitivity(updater.model_), sensitivity(TRUSS, updater.theta_), atol=1e-9)
     damaged = TRUSS.damaged({"bottom": 0.5}).frequencies([updater.theta_])
     np.testing.assert_allclose(updater.model_.damaged({"bottom": 0.5}).frequencies([np.ones(4)]), damaged, rtol=1e-9)
@@ -233,9 +235,22 @@ def test_where_a_reduced_model_searches_the_optimum_is_the_full_models(dofs):
     F, shapes = measured(FRAME, truth, dofs)
     given = {} if dofs is None else {"shapes": shapes, "dofs": dofs}
     weight = 0.0 if dofs is None else 0.1
-    settings = {"bounds": 0.2, "n_starts": 4, "prior": 0.1, "shape_weight": weight, "random_state": 0}
+    settings = {"bounds": 0.2, "n_starts": 2, "prior": 0.1, "shape_weight": weight, "random_state": 0}
     reduced, full = (ModelUpdater(FRAME, reduce=reduce, **settings).fit(F, **given) for reduce in (True, False))
     np.testing.assert_allclose(reduced.theta_, full.theta_, rtol=1e-5)
     assert reduced.starts_["objective"].min() <= full.starts_["objective"].min() * (1 + 1e-6)
-    assert len(reduced.starts_) == 4
+    assert len(reduced.starts_) == 2
     assert FRAME.reduction_pays(10_000)
+
+
+@pytest.mark.parametrize(
+    ("F", "shapes", "message"),
+    [
+        (np.ones((1, 12)), np.eye(5, 6), "F has 12 columns; expected the 6 modes"),
+        (np.ones((1, 6)), np.eye(5, 6), "shape of 'f6' is zero throughout"),
+        (np.ones((1, 6)), np.where(np.eye(5, 6) == 1, np.nan, 1), "shape of 'f1' is NaN in row 0 but not in all"),
+    ],
+)
+def test_measurements_that_cannot_be(F, shapes, message):
+    with pytest.raises(ValueError, match=message):
+        ModelUpdater(TRUSS).fit(F, shapes=shapes, dofs=range(5))
