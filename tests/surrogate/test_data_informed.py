@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import lfilter
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
-from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import cross_val_predict
 from sklearn.pipeline import make_pipeline
@@ -158,18 +157,6 @@ def test_parts_without_a_model_get_that_of_the_chain():
     nested = chain(inverse=make_pipeline(inverse(model=None))).fit(T[::4], F[::4])
     assert nested.inverse_[0].model is TRUSS
     np.testing.assert_array_equal(nested.predict(T), bare.predict(T))
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
-def test_an_outer_seed_leaves_a_seeded_parts_inside_to_that_part():
-    trees = ExtraTreesRegressor(3)
-    parts = {
-        "inverse": InverseSurrogate(TRUSS, trees, bounds=0.2, n_samples=50, random_state=1),
-        "mapper": TemperatureMapper(trees, random_state=2),
-    }
-    first, second = (chain(**parts, random_state=seed).fit(T, F).predict(T) for seed in (0, 9))
-    pd.testing.assert_frame_equal(first, second)
 
 
 @pytest.mark.nightly

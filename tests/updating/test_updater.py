@@ -167,22 +167,6 @@ def test_starts_report_local_optima():
     np.testing.assert_allclose(updater.model_.frequencies([[1.0]]), F, atol=1e-4)
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("model", [TRUSS, FRAME], ids=["threads", "processes"])
-def test_the_same_bits_whatever_the_number_of_jobs(model):
-    dofs = np.arange(0, 20, 3)
-    frequencies, shapes = measured(model, TRUTH, dofs)
-    fits = [
-        ModelUpdater(model, shape_weight=10.0, n_starts=2, n_jobs=n_jobs, random_state=0).fit(
-            frequencies * [1.01, 0.99, 1, 1, 1, 1], shapes=shapes, dofs=dofs
-        )
-        for n_jobs in (1, 2)
-    ]
-    for one, other in zip(*(np.stack(updater.starts_["theta"]) for updater in fits), strict=True):
-        np.testing.assert_array_equal(one, other)
-    pd.testing.assert_frame_equal(fits[0].table_, fits[1].table_)
-
-
 def test_models_without_derivatives_are_differenced():
     model = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6, vectorized=True)
     updater = ModelUpdater(model).fit(TRUSS.frequencies([TRUTH]))
