@@ -82,18 +82,6 @@ def drawn_records(found, weather, seed=0):
     return taken
 
 
-def test_noise_is_whole_records_gaps_included():
-    rng = np.random.default_rng(0)
-    values = rng.normal(size=(400, 3))
-    values[:, 1:][rng.random((400, 2)) < 0.3] = np.nan
-    found = residuals(rng.uniform(-10, 30, (400, 2)), values)
-    weather = rng.uniform(-10, 30, (500, 2))
-    taken = drawn_records(found, weather)
-    np.testing.assert_array_equal(taken, drawn_records(found, weather))
-    assert (taken != drawn_records(found, weather, seed=1)).mean() > 0.5
-    assert len(set(taken)) > 150
-
-
 def test_noise_comes_from_similar_weather():
     rng = np.random.default_rng(0)
     weather, wanted = rng.uniform(-10, 30, 600), rng.uniform(-10, 30, 300)

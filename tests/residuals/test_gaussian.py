@@ -89,16 +89,6 @@ def test_distances_and_densities_are_those_of_the_modes_that_are_there():
     assert np.isnan(LEARNED.distances(np.full((1, 3), np.nan))[0])
 
 
-def test_completed_gaps_are_conditional_means_with_their_deviations():
-    filled, deviations = Gaussian(MEAN, COVARIANCE).completed(np.array([[4.1, np.nan, 12.1], [np.nan] * 3]))
-    there, gap = [0, 2], [1]
-    gain = COVARIANCE[np.ix_(gap, there)] @ np.linalg.inv(COVARIANCE[np.ix_(there, there)])
-    assert filled[0, 1] == pytest.approx(MEAN[1] + (gain @ [0.1, 0.1])[0])
-    assert deviations[0, 1] ** 2 == pytest.approx((COVARIANCE[1, 1] - gain @ COVARIANCE[np.ix_(there, gap)])[0, 0])
-    assert (deviations[0, there] == 0).all()
-    assert np.isnan(filled[1]).all()
-
-
 def test_modes_that_are_never_there_together_leave_the_rest_as_it_is():
     """Records do not say how the two are correlated: any number that fits the rest is as likely, and one is taken."""
     rows = records(20_000)

@@ -3,13 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.signal import lfilter
 from sklearn.linear_model import LinearRegression
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning
 from skthermo.residuals.sensors import SensorRegression
+from tests.residuals.series import autoregressive
 from tests.surrogate.chains import YEAR, F, T, fitted
 
 
@@ -40,20 +40,10 @@ def test_what_no_sensor_tells_stays_missing():
     assert np.isnan(filled[1]).tolist() == [False, False, False, True]
 
 
-def test_gaps_while_learning_do_not_matter():
-    T = records(3000)
-    gappy = np.where(np.random.default_rng(2).uniform(size=T.shape) < 0.2, np.nan, T)
-    new = records(20, seed=3)
-    new[:, 2] = np.nan
-    full, half = (SensorRegression.fitted(table).fill(new)[0][:, 2] for table in (T, gappy))
-    assert half == pytest.approx(full, abs=0.5)
-
-
 def dependent_records(n_rows, seed):
     """Records whose departures are autoregressive, as those of sun and shade are, beside a season."""
-    rng = np.random.default_rng(seed)
     season = 10 - 10 * np.cos(2 * np.pi * np.arange(n_rows) / n_rows)
-    departures = lfilter([1], [1, -0.9], rng.normal(0, 0.5, (n_rows, 3)), axis=0)
+    departures = 0.5 / np.sqrt(1 - 0.9**2) * autoregressive(n_rows, 0.9, seed, 3)
     return pd.DataFrame(season[:, np.newaxis] * [1.0, 0.8, 1.2] + departures, columns=["air", "girder", "cable"])
 
 

@@ -8,14 +8,13 @@ from scipy.signal import lfilter
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 from sklearn.tree import ExtraTreeRegressor
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.exceptions import WeatherWarning
-from skthermo.fem import AffineModel, CallableModel
+from skthermo.fem import CallableModel
 from skthermo.metrics import mape
 from skthermo.preprocessing import BiasAligner
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
@@ -169,26 +168,6 @@ def test_same_seed_same_bits():
             np.testing.assert_array_equal(spread, alone)
     other = clone(model).set_params(random_state=1).fit(T, F).predict(T)
     assert not np.array_equal(other, alone)
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
-def test_large_models_work_in_worker_processes():
-    """Matrices above 1 MB reach workers as read-only memory maps."""
-    n = 380
-    chain_of_springs = np.diag(np.full(n, 2.0)) - np.diag(np.ones(n - 1), 1) - np.diag(np.ones(n - 1), -1)
-    model = AffineModel({("k",): 1e4 * chain_of_springs, ("g",): np.eye(n)}, np.eye(n), n_modes=2)
-    warm = pd.DataFrame({"T": np.linspace(0, 30, 40)})
-    measured = model.frequencies(np.column_stack([1 - 0.005 * warm["T"], 1 + 0 * warm["T"]]))
-    estimator = DataInformedFEM(
-        model,
-        inverse=InverseSurrogate(regressor=LinearRegression(), n_samples=30, bounds=0.2),
-        mapper=TemperatureMapper(LinearRegression()),
-        random_state=0,
-    )
-    alone, spread = (cross_val_predict(estimator, warm, measured, cv=2, n_jobs=n_jobs) for n_jobs in (1, 2))
-    np.testing.assert_array_equal(spread, alone)
-    np.testing.assert_allclose(alone, measured, rtol=0.02)
 
 
 def test_parameters_in_unseen_weather_stay_where_records_have_shown_them_or_near_nominal():

@@ -52,14 +52,6 @@ def test_inverse_transform_is_the_fe_model():
         inverse.inverse_transform(frame.fillna(-1.0))
 
 
-@pytest.mark.nightly
-def test_noise_in_training_damps_the_noise_of_estimates():
-    noisy = add_noise(HELD_OUT.frequencies, 0.01, random_state=1)
-    inverses = (InverseSurrogate(TRUSS, QUADRATIC, bounds=0.2, noise=noise, random_state=0) for noise in (0.0, 0.01))
-    exact, damped = (np.abs(one.fit().predict(noisy) - HELD_OUT.theta).mean() for one in inverses)
-    assert damped < 0.8 * exact
-
-
 def test_noise_by_mode_reaches_that_mode_only():
     """A mode that is pure noise in training is ignored: its coefficients vanish."""
     noise = [0, 0, 0, 0, 0, 0.9]
@@ -177,15 +169,6 @@ def test_in_a_pipeline_the_labels_are_for_the_last_step():
     np.testing.assert_allclose(pipeline.predict(F), severities, atol=0.01)
     taken = InverseSurrogate(None, LinearRegression()).fit_transform(F, 1 - severities)
     np.testing.assert_allclose(taken[:, 0], 1 - severities, atol=0.01)
-
-
-def test_bounds_go_by_name():
-    by_name = {"vertical": (0.5, 2.0), "top": 0.3, "bottom": 0.2, "diagonal": 0.1}
-    drawn = InverseSurrogate(TRUSS, LinearRegression(), bounds=by_name, n_samples=500, random_state=0).fit().samples_
-    np.testing.assert_allclose(drawn.theta.min(axis=0), [0.8, 0.7, 0.9, 0.5], atol=0.01)
-    np.testing.assert_allclose(drawn.theta.max(axis=0), [1.2, 1.3, 1.1, 2.0], atol=0.01)
-    with pytest.raises(ValueError, match=r"bounds: \['vertical'\] are missing; expected each of the parameters"):
-        InverseSurrogate(TRUSS, bounds={"top": 0.3, "bottom": 0.2, "diagonal": 0.1}).fit()
 
 
 # Scores without targets, by which searches compare regressors
