@@ -41,10 +41,8 @@ def test_parameters_of_default_parts_put_the_part_in_place():
     ("name", "message"),
     [
         ("inverse__samples", r"Invalid parameter 'samples' for estimator PosteriorInverse\(\). Valid parameters are"),
-        ("mapper__regressor__depth", "Invalid parameter 'depth' for estimator Pipeline"),
         ("mapping__regressor", "Invalid parameter 'mapping' for estimator DataInformedFEM"),
         ("imputer__n_neighbors", "imputer is 'passthrough', without parameters such as 'n_neighbors'; expected an"),
-        ("random_state__seed", "random_state is None, without parameters such as 'seed'; expected an estimator"),
         ("model__E", r"model is AffineModel\(.*\), without parameters such as 'E'"),
     ],
 )
@@ -52,8 +50,7 @@ def test_unknown_parameters_are_named_and_change_nothing(name, message):
     fem = DataInformedFEM(TRUSS)
     with pytest.raises(ValueError, match=message):
         fem.set_params(**{name: 1})
-    assert fem.inverse is None
-    assert fem.mapper is None
+    assert fem.inverse is fem.mapper is None
 
 
 def lines_of(text):

@@ -49,9 +49,6 @@ def test_simulations_scatter_like_the_training_records():
     np.testing.assert_allclose(damaged / fem.simulate(T, damage={"top": 0.3}), noisy / clean, rtol=1e-12)
 
 
-# Residuals of the chain
-
-
 def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
     fem = any_chain(inverse=trained(), mapper=PLAIN, discrepancy=None).fit(T, F)
     folds = BlockedKFold(block="7D")
@@ -151,9 +148,6 @@ def test_pickles_keep_residuals_and_clones_do_not():
     assert len(twin.fit(T[:200], F[:200]).recorder_.residuals.values) == 200
 
 
-# Standard deviations and intervals
-
-
 def test_standard_deviations_are_spreads_in_hertz():
     frequencies, std = fitted().predict(T, return_std=True)
     pd.testing.assert_frame_equal(frequencies, fitted().predict(T))
@@ -197,9 +191,6 @@ def test_intervals_widen_beyond_the_training_weather():
     middle, beyond = T.mean().to_frame().T, T.max().to_frame().T + 30
     widths = [(highest / lowest).to_numpy() for lowest, highest in map(fitted().predict_interval, (middle, beyond))]
     assert (widths[1] > widths[0]).all()
-
-
-# Missing temperatures
 
 
 def without(sensor):
