@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 from skthermo.residuals.baseline import compared, order_statistic
 from tests.residuals.series import autoregressive, residuals
 
-# Order statistics and correlation times
-
 
 @settings(max_examples=40)
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=60), st.floats(0.05, 0.95))
@@ -35,30 +33,19 @@ def test_correlation_time_of_series_without_memory_is_one():
     assert residuals(weather, np.ones(5000)).correlation_time == 1
 
 
-# Spread
-
-
-def test_spread_of_few_records_is_their_root_mean_square():
-    rng = np.random.default_rng(0)
-    weather, values = np.linspace(0, 20, 60), rng.normal(size=(60, 2))
-    values[::3, 1] = np.nan
-    spread = residuals(weather, values).spread(np.array([[0.0], [13.0], [30.0], [-10.0]]))
-    rms = np.sqrt(np.nanmean(values**2, axis=0))
-    np.testing.assert_allclose(spread, np.outer([1, 1, 1.5, 1.5], rms))
+def test_spread_of_few_records_is_their_root_mean_square_and_that_of_a_missing_mode_infinite():
+    values = np.random.default_rng(0).normal(size=(60, 3))
+    values[::3, 1] = values[:, 2] = np.nan
+    spread = residuals(np.linspace(0, 20, 60), values).spread(np.array([[0.0], [13.0], [30.0], [-10.0]]))
+    rms = np.sqrt(np.nanmean(values[:, :2] ** 2, axis=0))
+    np.testing.assert_allclose(spread, np.outer([1, 1, 1.5, 1.5], [*rms, np.inf]))
 
 
 def test_spread_follows_the_weather():
     weather = np.random.default_rng(0).uniform(-10, 30, 1500)
-    scale = np.where(weather < 0, 0.02, 0.005)
-    spread = residuals(weather, scale * np.random.default_rng(1).standard_normal(1500)).spread(
-        np.array([[-6.0], [20.0]])
-    )
+    values = np.where(weather < 0, 0.02, 0.005) * np.random.default_rng(1).standard_normal(1500)
+    spread = residuals(weather, values).spread(np.array([[-6.0], [20.0]]))
     np.testing.assert_allclose(spread[:, 0], [0.02, 0.005], rtol=0.25)
-
-
-def test_spread_of_a_mode_that_is_always_missing_is_infinite():
-    values = np.column_stack([np.ones(50), np.full(50, np.nan)])
-    np.testing.assert_array_equal(residuals(np.arange(50.0), values).spread(np.array([[3.0]])), [[1, np.inf]])
 
 
 def test_quantiles_measure_each_period_by_the_others():
@@ -69,9 +56,6 @@ def test_quantiles_measure_each_period_by_the_others():
     others = np.sqrt((30 + 4 * 10) / 40)
     np.testing.assert_allclose(found.quantiles(0.5), 1 / others)
     np.testing.assert_allclose(found.quantiles(0.95), 2.0)
-
-
-# Realistic noise
 
 
 def drawn_records(found, weather, seed=0):
@@ -115,8 +99,7 @@ def test_means_of_a_week_scatter_as_those_of_the_records_whatever_the_weather_do
 
 
 def test_runs_of_noise_are_scaled_to_the_weather_of_the_rows():
-    rng = np.random.default_rng(0)
-    weather, later = rng.uniform(-10, 30, (3000, 1)), rng.uniform(-10, 30, (3000, 1))
+    weather, later = np.random.default_rng(0).uniform(-10, 30, (2, 3000, 1))
     deviation = 1 + (weather < 0)  # twice as large in frost, whatever the record before
     found = residuals(weather, deviation * autoregressive(3000, 0.5))
     drawn = found.draw(later, np.random.RandomState(0))
@@ -151,9 +134,6 @@ def test_standard_deviations_of_normal_residuals_are_known_to_a_root_of_their_nu
     found = residuals(np.random.default_rng(1).uniform(size=2000), values)
     np.testing.assert_allclose(found.level_errors, 1 / np.sqrt(2 * 2000), rtol=0.15)
     assert np.isnan(found.outliers).mean() > 0.98
-
-
-# Many records
 
 
 @settings(max_examples=40)

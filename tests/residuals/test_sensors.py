@@ -19,7 +19,7 @@ def records(n_rows, seed=0):
     return np.column_stack([air, 0.8 * air + rng.normal(2, 1, n_rows), 0.5 * air + rng.normal(0, 2, n_rows)])
 
 
-def test_a_gap_is_filled_as_by_a_linear_regression_on_the_other_sensors():
+def test_gaps_are_filled_and_departures_measured_by_a_linear_regression_on_the_other_sensors():
     T, new = records(500), records(50, seed=1)
     wanted = LinearRegression().fit(T[:, [0, 2]], T[:, 1])
     new[:, 1] = np.nan
@@ -28,6 +28,11 @@ def test_a_gap_is_filled_as_by_a_linear_regression_on_the_other_sensors():
     assert deviations[:, 1] == pytest.approx(np.std(T[:, 1] - wanted.predict(T[:, [0, 2]])))
     assert (filled[:, [0, 2]] == new[:, [0, 2]]).all()
     assert (deviations[:, [0, 2]] == 0).all()
+    new = records(50, seed=2)
+    departures = SensorRegression.fitted(T).departures(new)
+    assert departures[:, 1] == pytest.approx(new[:, 1] - wanted.predict(new[:, [0, 2]]), abs=1e-6)
+    new[:, [0, 2]] = np.nan
+    assert np.isnan(SensorRegression.fitted(T).departures(new)).all()
 
 
 def test_what_no_sensor_tells_stays_missing():
@@ -47,15 +52,6 @@ def dependent_records(n_rows, seed):
     return pd.DataFrame(season[:, np.newaxis] * [1.0, 0.8, 1.2] + departures, columns=["air", "girder", "cable"])
 
 
-def test_departures_are_those_from_a_linear_regression_on_the_other_sensors():
-    T, new = records(500), records(50, seed=1)
-    wanted = LinearRegression().fit(T[:, [0, 2]], T[:, 1])
-    departures = SensorRegression.fitted(T).departures(new)
-    assert departures[:, 1] == pytest.approx(new[:, 1] - wanted.predict(new[:, [0, 2]]), abs=1e-6)
-    new[:, [0, 2]] = np.nan
-    assert np.isnan(SensorRegression.fitted(T).departures(new)).all()
-
-
 @pytest.mark.parametrize("n_rows", [40, 400, 3000])
 def test_healthy_sensors_are_not_warned_of(n_rows):
     for seed in range(10):
@@ -68,19 +64,15 @@ def departing(sensors, T):
     return [str(one).split("'")[1] for one in sensors.doubts(T) if one.kind == "faulty-sensor"]
 
 
-def test_a_sensor_that_drifts_is_named():
+def test_sensors_that_drift_or_are_stuck_are_named():
     sensors, new = SensorRegression.fitted(dependent_records(3000, 0)), dependent_records(3000, 1)
+    stuck = new.assign(air=new["air"].where(new.index < 1500, new.loc[1500, "air"]))
+    assert departing(sensors, stuck) == ["air"]
     new["girder"] += np.linspace(0, 6, len(new))
     assert departing(sensors, new) == ["girder"]
     assert departing(sensors, new[:300]) == []
     backwards = new.set_axis(pd.date_range("2024", periods=len(new), freq="h"))[::-1]
     assert departing(sensors, backwards) == ["girder"]
-
-
-def test_a_sensor_that_is_stuck_is_named():
-    sensors, new = SensorRegression.fitted(dependent_records(3000, 0)), dependent_records(3000, 1)
-    new.loc[1500:, "air"] = new.loc[1500, "air"]
-    assert departing(sensors, new) == ["air"]
 
 
 def test_weather_that_training_does_not_know_says_nothing_of_sensors():

@@ -15,16 +15,10 @@ from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMap
 from tests.bayesian import MEAN as FLEET_MEAN
 from tests.bayesian import NOISE, WIDTH, BayesianLogs, Logs, basis, weather
 
-pytestmark = [
-    pytest.mark.filterwarnings(f"ignore:.*{message}")
-    for message in (
-        "outside-(prior|training-weather)",
-        "other-weather",
-        "few-records",
-        "uncalibrated-model",
-        "few-(independent|baseline)-records",
-    )
-]
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*(outside-prior|outside-training-weather|other-weather|few-records|uncalibrated-model)",
+    "ignore:.*few-(independent|baseline)-records",
+)
 
 MODEL = AffineModel(
     {("deck",): [[300.0, -100.0], [-100.0, 100.0]], ("pier",): [[200.0, 0.0], [0.0, 0.0]]}, np.eye(2), n_modes=2

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*outside-bounds")
 
 LATER = make_truss_campaign(random_state=1)
 PLAIN = TemperatureMapper(LinearRegression())
+SEARCHED = GridSearchCV(TemperatureMapper(Ridge()), {"regressor__alpha": [0.1, 1.0]}, cv=2)
 
 
 def chain(mapper=PLAIN, **options):
@@ -69,29 +70,23 @@ def test_residuals_do_not_know_the_discrepancy_of_their_own_week():
     np.testing.assert_allclose(of_week.mean(), 0.02, atol=0.002)
 
 
-def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week():
-    hours = pd.date_range("2025", periods=5000, freq="h")
-    for rho, table in (
-        (0.5, pd.DataFrame(index=hours)),
-        (0.99, pd.DataFrame(index=hours)),
-        (0.99, np.empty((5000, 1))),
-    ):
-        time = (1 + rho) / (1 - rho)
-        rows = 5 * residuals(np.random.default_rng(1).uniform(size=5000), autoregressive(5000, rho)).correlation_time
-        assert rows == pytest.approx(5 * time, rel=0.4)
-        block = BlockedKFold().remembering(table, rows).length(table)
-        is_timed, rows = isinstance(table, pd.DataFrame), min(rows, 5000 // 10)  # each fold keeps two blocks
-        assert block == (max(pd.Timedelta("7D"), np.ceil(rows) * pd.Timedelta("1h")) if is_timed else np.ceil(rows))
+@pytest.mark.parametrize("rho", [0.5, 0.99])
+def test_blocks_are_five_correlation_times_long_where_that_is_more_than_a_week(rho):
+    hours = pd.DataFrame(index=pd.date_range("2025", periods=5000, freq="h"))
+    rows = 5 * residuals(np.random.default_rng(1).uniform(size=5000), autoregressive(5000, rho)).correlation_time
+    assert rows == pytest.approx(5 * (1 + rho) / (1 - rho), rel=0.4)
+    lasting, own = np.ceil(min(rows, 5000 // 10)), BlockedKFold().remembering  # each fold keeps two blocks
+    assert own(hours, rows).length(hours) == max(pd.Timedelta("7D"), lasting * pd.Timedelta("1h"))
+    untimed = np.zeros((5000, 1))
+    assert own(untimed, rows).length(untimed) == max(BlockedKFold().length(untimed), lasting)
 
 
 @pytest.mark.nightly
 def test_blocks_of_a_chain_are_longer_than_a_week_where_noise_lasts():
     lasting = F * (1 + 0.01 * autoregressive(365, 0.9))
-    blocks = [
-        np.diff(np.flatnonzero(np.diff(one.recorder_.residuals.folds))) for one in (fitted(), chain().fit(T, lasting))
-    ]
-    assert set(blocks[0]) == {7}
-    assert min(blocks[1]) > 20
+    usual, longer = (one.recorder_.residuals.folds for one in (fitted(), chain().fit(T, lasting)))
+    assert set(np.diff(np.flatnonzero(np.diff(usual)))) == {7}
+    assert min(np.diff(np.flatnonzero(np.diff(longer)))) > 20
 
 
 def test_folds_in_unseen_weather_are_named(monkeypatch):
@@ -114,14 +109,7 @@ def test_residuals_and_noise_do_not_depend_on_the_order_of_rows():
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize(
-    "mapper",
-    [
-        make_pipeline(LagFeatures(2, padding="nan"), PLAIN),
-        GridSearchCV(TemperatureMapper(Ridge()), {"regressor__alpha": [0.1, 1.0]}, cv=2),
-        LinearRegression(),
-    ],
-)
+@pytest.mark.parametrize("mapper", [make_pipeline(LagFeatures(2, padding="nan"), PLAIN), SEARCHED, LinearRegression()])
 def test_any_mapper_has_residuals(mapper):
     fem = chain(mapper=mapper).fit(T, F)
     lagged = 1 if hasattr(mapper, "steps") else 0
@@ -223,10 +211,8 @@ def test_standard_deviations_add_the_change_by_a_filled_temperature_in_quadratur
     weather = without("T2")
     filled, deviations = fitted().sensors_.fill(weather)
     predicted, std = fitted().predict(weather, return_std=True)
-    moved = [
-        fitted().predict(pd.DataFrame(filled + side, weather.index, weather.columns))
-        for side in (-deviations, deviations)
-    ]
+    sides = (pd.DataFrame(filled + side, T.index, T.columns) for side in (-deviations, deviations))
+    moved = [fitted().predict(side.set_axis(weather.index)) for side in sides]
     change = np.sqrt(np.mean([np.log(one / predicted) ** 2 for one in moved], axis=0))
     spread = fitted().recorder_.residuals.spread(filled)
     np.testing.assert_allclose(std, predicted * np.hypot(spread, change), rtol=1e-9)

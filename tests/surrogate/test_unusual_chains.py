@@ -62,9 +62,6 @@ def test_records_with_hardly_any_mode_are_named():
         DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.001), mapper=PLAIN).fit(T, F.mask(gaps))
 
 
-# Parameters that the records do not determine
-
-
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_predictions_are_free_of_the_shrinkage_of_the_prior():
     truth = 0.85 * np.exp(-0.002 * (T.to_numpy()[:, :1] - 10)) * np.ones(4)
@@ -98,9 +95,6 @@ def test_parameters_that_no_mode_tells_apart_stay_near_each_other():
     assert mape(model.frequencies(truth), chain.predict(temperatures)).max() < 0.2
     theta = chain.predict_parameters(temperatures)
     assert np.abs(np.log(theta[:, 1] / theta[:, 2])).mean() < 0.05
-
-
-# One mode, learned from a vector as scikit-learn's regressors do
 
 
 WEATHER, FIRST = T[::4], F[::4]["f1"]
