@@ -45,21 +45,21 @@ def test_rows_that_never_had_frequencies_are_counted_and_weigh_a_number(place):
 def test_a_chain_that_misses_its_own_records_by_more_than_their_mean_says_so():
     paper = {"aligner": "passthrough", "discrepancy": None}
     fem = DataInformedFEM(TRUSS, mapper=PLAIN, random_state=0, **paper)
-    with pytest.warns(UserWarning, match="by more than their mean does.*uncalibrated-model"):
-        fem.fit(T, F * [1.08, 0.94, 1.07, 0.95, 1.06, 0.94])
+    with pytest.warns(UserWarning, match="15 %: 'f1'.* by more than their mean does.*uncalibrated-model"):
+        fem.fit(T[::3], F[::3] * [1.18, 0.94, 1.07, 0.95, 1.06, 0.94])
 
 
 def test_labels_that_have_no_order():
-    labels = [f"r{row}" if row % 2 else row for row in range(365)]
-    fem = DataInformedFEM(TRUSS, mapper=PLAIN, random_state=0)
-    assert len(fem.fit(T.set_axis(labels), F.set_axis(labels)).recorder_.residuals.values) == 365
+    labels = [f"r{row}" if row % 2 else row for row in range(120)]
+    fem = DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.01, prior=0.05), mapper=PLAIN, random_state=0)
+    assert len(fem.fit(T[:120].set_axis(labels), F[:120].set_axis(labels)).recorder_.residuals.values) == 120
 
 
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 def test_records_with_hardly_any_mode_are_named():
-    gaps = np.random.default_rng(0).random(F.shape) < 0.85
+    gaps = np.random.default_rng(0).random(F[::3].shape) < 0.85
     with pytest.warns(UserWarning, match="few-records"):
-        DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.001), mapper=PLAIN).fit(T, F.mask(gaps))
+        DataInformedFEM(TRUSS, inverse=PosteriorInverse(noise=0.001), mapper=PLAIN).fit(T[::3], F[::3].mask(gaps))
 
 
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
@@ -98,7 +98,8 @@ def test_parameters_that_no_mode_tells_apart_stay_near_each_other():
 
 
 WEATHER, FIRST = T[::4], F[::4]["f1"]
-CHAIN = DataInformedFEM(AffineModel({("stiffness",): [[(15 * np.pi) ** 2]]}, [[1.0]], n_modes=1), random_state=0)
+SPRING = AffineModel({("stiffness",): [[(15 * np.pi) ** 2]]}, [[1.0]], n_modes=1)
+CHAIN = DataInformedFEM(SPRING, inverse=PosteriorInverse(noise=0.01, prior=0.05), random_state=0)
 
 
 @cache
@@ -119,11 +120,8 @@ def test_a_vector_gives_the_vectors_of_a_table_of_one_column():
         assert type(vector) is np.ndarray
         assert list(table) == ["f1"]
         np.testing.assert_array_equal(vector, table["f1"])
-    for one, other in (
-        (of_vector(), of_table()),
-        (refitted(of_vector()), refitted(of_table())),
-        (resampled(of_vector(), 0), resampled(of_table(), 0)),
-    ):
+    for change in (lambda fem: fem, refitted, lambda fem: resampled(fem, 0)):
+        one, other = change(of_vector()), change(of_table())
         np.testing.assert_array_equal(one.predict(WEATHER), other.predict(WEATHER)["f1"])
     pd.testing.assert_frame_equal(of_vector().simulate(WEATHER), of_table().simulate(WEATHER))
 
@@ -136,10 +134,9 @@ def test_names_come_from_the_series():
 
 
 def test_compensators_and_displays_take_it():
-    compensated = TemperatureCompensator(CHAIN, targets=["f1"], cv=KFold(2, shuffle=True, random_state=0)).fit(
-        WEATHER.join(FIRST.to_frame())
-    )
-    counted = compensated.transform(WEATHER.join(FIRST.to_frame()))["f1"] / np.log(FIRST / of_vector().predict(WEATHER))
+    records, folds = WEATHER.join(FIRST), KFold(2, shuffle=True, random_state=0)
+    compensated = TemperatureCompensator(CHAIN, targets=["f1"], cv=folds).fit(records)
+    counted = compensated.transform(records)["f1"] / np.log(FIRST / of_vector().predict(WEATHER))
     assert (counted < 1 + 1e-9).all()  # less where the chain is less certain than usual
     assert (counted > 1 - 1e-9).mean() > 0.5
     PredictionDisplay.from_estimator(of_vector(), WEATHER, FIRST, confidence=0.9)
