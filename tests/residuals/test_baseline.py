@@ -19,7 +19,7 @@ def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, 
 
 @pytest.mark.parametrize("share_missing", [0.0, 0.3])
 def test_correlation_time_of_an_autoregressive_series(share_missing):
-    series = autoregressive(8000, 0.8)[:, 0]
+    series = autoregressive(16_000, 0.8)[:, 0]
     series[np.random.default_rng(1).random(len(series)) < share_missing] = np.nan
     weather = np.random.default_rng(2).uniform(size=len(series))
     found = residuals(weather, series).correlation_time
