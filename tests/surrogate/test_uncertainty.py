@@ -36,20 +36,6 @@ def fitted():
     return chain().fit(T, F)
 
 
-@pytest.mark.nightly
-def test_simulations_scatter_like_the_training_records():
-    holed = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
-    fem = chain().fit(T, holed)
-    clean, noisy = fem.predict(T), fem.simulate(T, noise="fitted", random_state=0)
-    records = fem.recorder_.residuals.values
-    assert {tuple(row) for row in np.isnan(noisy.to_numpy())} <= {tuple(row) for row in np.isnan(records)}
-    pd.testing.assert_frame_equal(noisy, fem.simulate(T, noise="fitted", random_state=0))
-    assert noisy.isna().mean(axis=None) == pytest.approx(0.1, abs=0.03)
-    np.testing.assert_allclose((noisy / clean).std(), np.nanstd(records, axis=0), rtol=0.2)
-    damaged = fem.simulate(T, damage={"top": 0.3}, noise="fitted", random_state=0)
-    np.testing.assert_allclose(damaged / fem.simulate(T, damage={"top": 0.3}), noisy / clean, rtol=1e-12)
-
-
 def test_residuals_are_those_of_mappers_fitted_to_other_weeks():
     fem = any_chain(inverse=trained(), mapper=PLAIN, discrepancy=None).fit(T, F)
     folds = BlockedKFold(block="7D")

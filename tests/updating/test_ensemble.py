@@ -60,17 +60,6 @@ def test_draws_of_a_linear_model_have_the_posterior_mean_and_covariance():
     np.testing.assert_allclose(updater.theta_, mean, rtol=1e-6)
 
 
-@pytest.mark.nightly
-def test_what_frequencies_do_not_determine_stays_as_wide_as_the_prior_and_the_rest_as_measured():
-    models = calibrated(noise=0.005).sample_models(150, random_state=0)
-    scatter = multipliers(models).std(axis=0)
-    assert scatter[NAMES.index("vertical")] == pytest.approx(0.15, rel=0.17)
-    assert scatter[NAMES.index("diagonal")] < 0.02
-    six = np.array([m.frequencies(ONE)[0] / MEASURED for m in models])
-    assert (six.std(axis=0) < 1.15 * 0.005).all()
-    assert six.std(axis=0).mean() > 0.5 * 0.005
-
-
 def test_stiffness_is_drawn_alike_whether_a_parameter_or_a_damage_group_scales_it():
     models = calibrated().sample_models(5, spread=0.15, random_state=0)
     others = calibrated(TRUSS.with_parameters(["bottom", "top"])).sample_models(5, spread=0.15, random_state=0)
@@ -83,12 +72,9 @@ def test_stiffness_is_drawn_alike_whether_a_parameter_or_a_damage_group_scales_i
     np.testing.assert_allclose(damaged, [m.damaged({"vertical": 0.5}).frequencies(ONE) for m in models], rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    "model",
-    [TRUSS.reduced(0.7, random_state=0), TRUSS.with_parameters(["top"]).reduced(0.7, random_state=0)],
-    ids=["all parameters", "one parameter"],
-)
-def test_models_drawn_from_a_reduced_model_are_those_of_the_full_one(model):
+@pytest.mark.parametrize("names", [NAMES, ["top"]])
+def test_models_drawn_from_a_reduced_model_are_those_of_the_full_one(names):
+    model = TRUSS.with_parameters(names).reduced(0.7, random_state=0)
     models = calibrated(model).sample_models(3, random_state=0)
     full = calibrated(TRUSS.with_parameters(model.parameter_names)).sample_models(3, random_state=0)
     for drawn, same in zip(models, full, strict=True):
@@ -123,10 +109,9 @@ def test_a_warning_counts_models_in_which_sorted_modes_swap_places():
 
 
 def test_same_seed_same_models_whatever_the_number_of_jobs():
-    found = [
-        [m.frequencies(ONE) for m in calibrated(n_jobs=n_jobs).sample_models(4, random_state=seed)]
-        for n_jobs, seed in ((None, 0), (2, 0), (None, 1))
-    ]
+    jobs_and_seeds = (None, 0), (2, 0), (None, 1)
+    drawn = (calibrated(n_jobs=n_jobs).sample_models(3, random_state=seed) for n_jobs, seed in jobs_and_seeds)
+    found = [[model.frequencies(ONE) for model in models] for models in drawn]
     np.testing.assert_array_equal(found[0], found[1])
     assert not np.allclose(found[0], found[2], rtol=1e-4)
 

@@ -62,11 +62,8 @@ def test_shapes_tell_more_parameters_apart_than_there_are_modes(n_modes):
 
 
 def test_what_only_some_parameters_share_leaves_the_others_known():
-    model = AffineModel(
-        {("a",): np.diag([1.0, 0, 0]), ("twin",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 3.0, 5.0])},
-        np.eye(3),
-        n_modes=3,
-    )
+    terms = {("a",): np.diag([1.0, 0, 0]), ("twin",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 3.0, 5.0])}
+    model = AffineModel(terms, np.eye(3), n_modes=3)
     known = identifiability(model, noise=0.001)
     assert np.isinf(known.deviations[["a", "twin"]]).all()
     assert known.collinear == [["a", "twin"]]

@@ -124,9 +124,8 @@ def test_complex_shapes_of_random_phase_are_made_real():
 
 @pytest.mark.filterwarnings("ignore:.*undetermined")
 def test_a_prior_holds_what_cannot_be_identified():
-    model = AffineModel(
-        {("a",): np.diag([1.0, 0]), ("b",): np.diag([0, 3.0]), ("c",): np.diag([0, 1e-12])}, np.eye(2), n_modes=2
-    )
+    terms = {("a",): np.diag([1.0, 0]), ("b",): np.diag([0, 3.0]), ("c",): np.diag([0, 1e-12])}
+    model = AffineModel(terms, np.eye(2), n_modes=2)
     frequencies = model.frequencies([[1.2, 0.8, 1.0]])
     with pytest.warns(UserWarning, match=r"3 parameters .*2 residuals.*\[undetermined\]"):
         free = ModelUpdater(model).fit(frequencies)
@@ -194,10 +193,9 @@ def test_covariance_is_the_noise_that_fits_pass_on_and_the_cramer_rao_bound():
     noise, share, truth = 0.002, 0.1, np.array([0.95, 1.05, 1.0, 0.98])
     frequencies, _ = measured(TRUSS, truth)
     updater = ModelUpdater(TRUSS, bounds=[[0.2, 3.0]] * 4)
-    fits = [
-        updater.fit(F, frequency_std=noise * frequencies).theta_ for F in frequencies * (1 + share * noise * np.eye(6))
-    ]
-    deviations = np.sqrt(np.diag(updater.fit(frequencies, frequency_std=noise * frequencies).covariance_))
+    std, changed = noise * frequencies, frequencies * (1 + share * noise * np.eye(6))
+    fits = [updater.fit(F, frequency_std=std).theta_ for F in changed]
+    deviations = np.sqrt(np.diag(updater.fit(frequencies, frequency_std=std).covariance_))
     bound = identifiability(TRUSS, truth, noise=noise).deviations.to_numpy() * truth
     np.testing.assert_allclose(deviations, bound, rtol=1e-4)
     identifiable = bound < 0.1  # where the model is linear over the noise
