@@ -51,6 +51,7 @@ def drawn(n_rows, half_width=0.2, seed=1, model=TRUSS):
 INVERSE = posterior()
 THETA = drawn(40)
 MEASURED = measured(THETA)
+X = columns(*MEASURED)
 
 
 def test_exact_rows_come_back_from_shapes_alone_and_from_both():
@@ -66,7 +67,7 @@ def test_exact_rows_come_back_from_shapes_alone_and_from_both():
 
 def test_estimates_are_what_an_independent_optimiser_finds():
     F, shapes = MEASURED
-    found = INVERSE.invert(columns(F, shapes)[:3])
+    found = INVERSE.invert(X[:3])
 
     def residuals(x, f, u):
         frequencies, phi = evaluate_modes(TRUSS, np.exp(x)[np.newaxis], DOFS)
@@ -93,12 +94,12 @@ def test_errors_are_those_that_cramer_rao_allows():
 
 
 def test_rows_do_not_depend_on_other_rows_nor_on_scale_and_sign():
-    X = columns(*MEASURED)[:20]
-    whole, deviations = INVERSE.transform(X, return_std=True)
-    single = np.vstack([INVERSE.transform(row[np.newaxis]) for row in X])
+    rows = X[:20]
+    whole, deviations = INVERSE.transform(rows, return_std=True)
+    single = np.vstack([INVERSE.transform(row[np.newaxis]) for row in rows])
     assert (np.abs(single - whole) < 1e-3 * deviations).all()  # the share of the deviation at which steps end
     factors = np.random.default_rng(0).choice([-3.0, 0.2, 50.0], (20, 6))
-    turned = np.hstack([X[:, :6], X[:, 6:] * np.repeat(factors, len(DOFS), axis=1)])
+    turned = np.hstack([rows[:, :6], rows[:, 6:] * np.repeat(factors, len(DOFS), axis=1)])
     assert (np.abs(INVERSE.transform(turned) - whole) < 1e-3 * deviations).all()
 
 
@@ -113,8 +114,8 @@ def test_modes_that_exchange_their_shapes_are_found():
 
 
 def test_missing_modes_and_missing_shapes_are_left_out():
-    F, shapes = (array[:40].copy() for array in MEASURED)
-    complete = INVERSE.invert(columns(F, shapes))
+    F, shapes = (array.copy() for array in MEASURED)
+    complete = INVERSE.invert(X)
     no_shapes = INVERSE.invert(columns(F, np.full_like(shapes, np.nan)))
     alone = posterior(dofs=None).invert(F)
     assert (np.abs(no_shapes.theta - alone.theta) < 2e-3 * alone.std).all()
@@ -145,7 +146,7 @@ def test_reduced_models_and_stored_inversions_give_the_same(tmp_path):
 
 
 def test_clones_pickles_and_names():
-    frame = pd.DataFrame(columns(*MEASURED)[:5]).add_prefix("x")
+    frame = pd.DataFrame(X[:5]).add_prefix("x")
     fitted = clone(INVERSE).fit(frame)
     assert list(fitted.transform(frame)) == list(TRUSS.parameter_names)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(fitted)).transform(frame), fitted.transform(frame))
@@ -162,14 +163,9 @@ PROGRAM = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6)
 @pytest.mark.parametrize(
     ("model", "options", "X", "message"),
     [
-        (TRUSS, {"dofs": [1, 99]}, columns(*MEASURED), "dofs holds 99; expected 0 to 22"),
-        (
-            TRUSS,
-            {"shape_noise": [0.01, 0.0]},
-            columns(*MEASURED),
-            r"\[0.01 0.  \]; expected standard deviations between",
-        ),
-        (PROGRAM, {}, columns(*MEASURED), "has no method 'modes'; expected a model that"),
+        (TRUSS, {"dofs": [1, 99]}, X, "dofs holds 99; expected 0 to 22"),
+        (TRUSS, {"shape_noise": [0.01, 0.0]}, X, r"\[0.01 0.  \]; expected standard deviations between"),
+        (PROGRAM, {}, X, "has no method 'modes'; expected a model that"),
         (TRUSS, {}, MEASURED[0], r"X has 6 columns; expected the 6 modes of .* at 4 sensors, 30 columns"),
         (BEAM, {"dofs": [0]}, np.ones((3, 4)), r"mode 1 does not move the degrees of freedom \[0\]"),
     ],

@@ -315,7 +315,7 @@ FAILING = {
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("method", "model"), FAILING.values(), ids=FAILING)
-def test_a_program_that_fails_at_many_theta_gives_one_warning_where_its_optimum_is_there(method, model):
+def test_a_program_that_fails_beside_the_optimum_or_there_gives_one_warning_at_most(method, model):
     updater = ModelUpdater(model, method=method, n_starts=3, random_state=0).fit(TRUSS.frequencies([INSIDE]))
     np.testing.assert_allclose(updater.theta_, INSIDE, atol=1e-4)
     starts = updater.starts_
