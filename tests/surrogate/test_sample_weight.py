@@ -74,8 +74,7 @@ def test_a_record_of_weight_0_counts_as_left_out():
 def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
     with config_context(enable_metadata_routing=routing):
         series = pd.Series(WEIGHTS, T.index).sample(frac=1, random_state=0)
-        by_name = chain().fit(T, F, sample_weight=series)
-        by_position = chain().fit(T, F, sample_weight=WEIGHTS)
+        by_name, by_position = (chain().fit(T, F, sample_weight=weights) for weights in (series, WEIGHTS))
     np.testing.assert_array_equal(by_name.predict(T), by_position.predict(T))
     assert by_name.score(T, F, sample_weight=series) == complete_r2(F, by_name.predict(T), WEIGHTS)
     assert by_name.score(T, F, sample_weight=series) != by_name.score(T, F)
@@ -93,10 +92,9 @@ def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
     ],
 )
 def test_wrong_weights_are_named(weights, mapper, message):
-    with pytest.raises(ValueError, match=message):
-        chain(mapper).fit(T, F, sample_weight=weights)
-    with config_context(enable_metadata_routing=True), pytest.raises(ValueError, match=message):
-        chain(mapper).fit(T, F, sample_weight=weights)
+    for routing in (False, True):
+        with config_context(enable_metadata_routing=routing), pytest.raises(ValueError, match=message):
+            chain(mapper).fit(T, F, sample_weight=weights)
 
 
 def test_with_routing_the_steps_that_request_weights_get_them():
