@@ -198,29 +198,36 @@ def in_float32(table):
     return table.to_numpy().astype(np.float32)
 
 
+def in_rows(table):
+    """A copy in C order."""
+    return table.to_numpy().copy(order="C")
+
+
+def frame_in_rows(table):
+    return framed(in_rows(table), table)
+
+
 ARRAYS = {  # equal to an array in C order
-    "again": lambda table: table.to_numpy().copy(order="C"),
-    "part of a larger array": within,
-    "backwards in memory": lambda table: table.to_numpy()[::-1].copy()[::-1],
     "Fortran order": lambda table: np.asfortranarray(table.to_numpy()),
+    "part of a larger array": within,
     "lists": lambda table: table.to_numpy().tolist(),
-    "pickled": lambda table: pickle.loads(pickle.dumps(table.to_numpy().copy(order="C"))),
-    "frame": lambda table: framed(table.to_numpy().copy(order="C"), table),
+    "frame": frame_in_rows,
+    "backwards in memory": lambda table: table.to_numpy()[::-1].copy()[::-1],
 }
 FRAMES = {  # equal to a frame in C order
-    "again": lambda table: framed(table.to_numpy().copy(order="C"), table),
-    "part of a larger array": lambda table: framed(within(table), table),
-    "Fortran": lambda table: framed(np.asfortranarray(table.to_numpy()), table),
     "columns of their own": lambda table: pd.DataFrame({name: table[name].copy() for name in table}),
-    "pickled": lambda table: pickle.loads(pickle.dumps(framed(table.to_numpy().copy(order="C"), table))),
     "CSV": from_csv,
+    "Fortran": lambda table: framed(np.asfortranarray(table.to_numpy()), table),
+    "part of an array": lambda table: framed(within(table), table),
+    "pickled": lambda table: pickle.loads(pickle.dumps(frame_in_rows(table))),
     "Parquet": from_parquet,
 }
-IN_SHORT = {"Fortran order", "lists", "columns of their own", "float32", "polars"}  # of cases that are slow
+AT_NIGHT = {"backwards in memory", "CSV", "Fortran", "part of an array", "pickled", "Parquet"}
+IN_SHORT = {"Fortran order", "columns of their own"}  # of cases that are slow
 
 
 def marked(case, form):
-    is_nightly = CASES[case].is_slow and form not in IN_SHORT
+    is_nightly = form in AT_NIGHT or (CASES[case].is_slow and form not in IN_SHORT)
     return pytest.param(case, form, id=f"{case}, {form}", marks=[pytest.mark.nightly] * is_nightly)
 
 
@@ -232,12 +239,12 @@ def each(forms, needs_frames=False):
 
 @functools.cache
 def of_arrays(case):
-    return CASES[case].results(ARRAYS["again"])
+    return CASES[case].results(in_rows)
 
 
 @functools.cache
 def of_frames(case):
-    return CASES[case].results(FRAMES["again"])
+    return CASES[case].results(frame_in_rows)
 
 
 def assert_same(found, expected, **tolerance):
@@ -281,10 +288,10 @@ def test_polars_frames_give_equal_results(case, form):
     assert_same(CASES[case].results(in_polars), of_frames(case), rtol=1e-9)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_another_thread_gives_equal_results(case):
+@each(["in a thread"], needs_frames=True)
+def test_another_thread_gives_equal_results(case, form):
     found = []
-    thread = threading.Thread(target=lambda: found.append(CASES[case].results(FRAMES["again"])))
+    thread = threading.Thread(target=lambda: found.append(CASES[case].results(frame_in_rows)))
     thread.start()
     thread.join()
     assert_same(found[0], of_frames(case))
@@ -293,18 +300,17 @@ def test_another_thread_gives_equal_results(case):
 PROGRAM = """
 import pickle, sys, warnings
 warnings.simplefilter("ignore")
-from tests.test_equal_inputs import CASES, FRAMES
-found = {name: case.results(FRAMES["again"]) for name, case in CASES.items()}
+from tests.test_equal_inputs import CASES, frame_in_rows
+found = {name: CASES[name].results(frame_in_rows) for name in CASES}
 sys.stdout.buffer.write(pickle.dumps(found))
 """
 
 
+@pytest.mark.nightly
 def test_another_process_gives_equal_results():
     paths = os.pathsep.join([str(ROOT), *filter(None, sys.path)])
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=os.environ | {"PYTHONPATH": paths}, capture_output=True, check=True
-    )
-    found = pickle.loads(done.stdout)
+    command, env = [sys.executable, "-c", PROGRAM], os.environ | {"PYTHONPATH": paths}
+    found = pickle.loads(subprocess.run(command, env=env, capture_output=True, check=True).stdout)
     for case in CASES:
         assert_same(found[case], of_frames(case))
 
@@ -312,7 +318,7 @@ def test_another_process_gives_equal_results():
 @pytest.mark.parametrize("form", [*FRAMES, "polars"])
 def test_checks_of_equal_records_find_the_same(form):
     convert = in_polars if form == "polars" else FRAMES[form]
-    found, expected = (check_records(*map(one, (T, GAPPED))) for one in (convert, FRAMES["again"]))
+    found, expected = (check_records(*map(one, (T, GAPPED))) for one in (convert, frame_in_rows))
     pd.testing.assert_frame_equal(found.table, expected.table)
     np.testing.assert_array_equal(found.outliers, expected.outliers)
     pd.testing.assert_frame_equal(found.frequencies, expected.frequencies, check_freq=False)
@@ -330,7 +336,6 @@ def residuals():
 
 
 COPIES = {
-    "copied": lambda R: R.copy(),
     "pickled": lambda R: pickle.loads(pickle.dumps(R)),
     "CSV": from_csv,
     "array": lambda R: R.to_numpy(copy=True),
