@@ -125,14 +125,15 @@ ARGUMENTS = {  # of estimators that need some, or are slow without
     CompensatedDetector: CompensatedDetector(MahalanobisDetector(), Ridge(), targets=[1]),
     DirectionalDetector: InHundredths(),
     ExponentialMeans: ExponentialMeans(half_lives=[3]),
-    InverseSurrogate: InverseSurrogate(
-        regressor=MLPRegressor(hidden_layer_sizes=(8,), learning_rate_init=0.01, max_iter=1000, tol=0.001)
-    ),
+    InverseSurrogate: InverseSurrogate(regressor=Ridge()),
     OutlierDetector: OutlierDetector(OneClassSVM()),
     TemperatureCompensator: TemperatureCompensator(Ridge(), targets=[1]),
 }
 ESTIMATORS = [made(kind, ARGUMENTS) for kind in public_estimators() if kind not in OF_MODELS]
 OTHER_SETTINGS = [
+    InverseSurrogate(
+        regressor=MLPRegressor(hidden_layer_sizes=(8,), learning_rate_init=0.01, max_iter=1000, tol=0.001)
+    ),
     HampelFilter(targets=[0]),
     BiasAligner(method="scale"),
     MahalanobisDetector(threshold="quantile"),
