@@ -171,6 +171,7 @@ def test_every_public_property_has_a_summary():
     assert_none(wrong, "write a summary that ends with a full stop")
 
 
+source_of = functools.cache(inspect.getsource)
 ASSIGNED = re.compile(r"self\.([a-z]\w*_)\b(?=[^=\n]*=[^=])")  # self.a_, self.b_ = ...
 
 
@@ -178,7 +179,7 @@ def test_every_fitted_attribute_is_documented():
     wrong = []
     for name, thing in CLASSES:
         ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
-        sources = [re.sub(r" +(>>>|\.\.\.) .*", "", inspect.getsource(base)) for base in ours]  # without examples
+        sources = [re.sub(r" +(>>>|\.\.\.) .*", "", source_of(base)) for base in ours]  # without examples
         fitted = {attribute for source in sources for attribute in ASSIGNED.findall(source)}
         documented = {part.strip() for entry in ClassDoc(thing)["Attributes"] for part in entry.name.split(",")}
         wrong += [f"{name}: {attribute}" for attribute in sorted(fitted - documented)]
