@@ -32,13 +32,7 @@ from skthermo.detection import (
     TemperatureCompensator,
 )
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import (
-    BiasAligner,
-    ExponentialMeans,
-    HampelFilter,
-    LagFeatures,
-    ModeTracker,
-)
+from skthermo.preprocessing import BiasAligner, ExponentialMeans, HampelFilter, LagFeatures, ModeTracker
 from skthermo.studies import DetectabilityStudy, sweep
 from skthermo.surrogate import DataInformedFEM, FleetMapper, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater

@@ -15,7 +15,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MOST_SIDE_BY_SIDE = 15  # modules of a package, beside its __init__.py
 SHORT = 40
 SHORT_FILES = {  # private files of fewer lines, and why they stand alone
-    "fem/_samples.py": "it imports scikit-learn, which importing fem must not",
+    "fem/_samples.py": "it imports scikit-learn, which importing fem must not"
 }
 
 

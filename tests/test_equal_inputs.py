@@ -335,11 +335,7 @@ def residuals():
     return compensator.fit_transform(BOTH), compensator.transform(later.temperatures.join(later.frequencies))
 
 
-COPIES = {
-    "pickled": lambda R: pickle.loads(pickle.dumps(R)),
-    "CSV": from_csv,
-    "array": lambda R: R.to_numpy(copy=True),
-}
+COPIES = {"pickled": lambda R: pickle.loads(pickle.dumps(R)), "CSV": from_csv, "array": lambda R: R.to_numpy(copy=True)}
 DETECTORS = {
     "Mahalanobis": MahalanobisDetector(),
     "softening": DirectionalDetector(),

@@ -24,7 +24,7 @@ from tests.source import (
 PACKAGE = Path(skthermo.__file__).parent
 WARNS = "skthermo/_core/warnings.py"  # finds the user's line, and collects the warnings of parts
 ALLOWED = {
-    WARNS: {"the caller's frames", "filters of warnings"},  # one function finds the user's line
+    WARNS: {"the caller's frames", "filters of warnings"}  # one function finds the user's line
 }
 AT_MOST = {
     "constants": 300,

@@ -28,7 +28,7 @@ from tests.bad_input.registry import (
     Example,
     fitted,
     is_registered,
-    method,
+    methods,
     use,
 )
 from tests.bad_input.values import (
@@ -180,9 +180,8 @@ for owner in (TRUSS, REDUCED):
     kind = type(owner).__name__
     rows = table(THETA, nan=False, positive=True, rows=False, but=("no rows",))
     one = table(ROW, nan=False, positive=True, rows=False, but=())
-    for name in ("frequencies", "modes", "jacobian", "linearised"):
-        method(f"fem.{kind}.{name}", owner, theta=(THETA, rows))
-    method(f"fem.{kind}.linearised_modes", owner, usual="dofs", theta=(THETA, rows))
+    methods(owner, "frequencies modes jacobian linearised", theta=(THETA, rows))
+    methods(owner, "linearised_modes", usual="dofs", theta=(THETA, rows))
     use(
         f"fem.{kind}.local_modes",
         lambda owner=owner, **a: owner.local_modes(**a).shapes(DOFS),
@@ -218,9 +217,9 @@ for owner in (TRUSS, REDUCED):
         usual="tol random_state",
         bounds=(0.1, BOUNDED),
     )
-    method(
-        f"fem.{kind}.nominal_mac",
+    methods(
         owner,
+        "nominal_mac",
         shapes=(
             TRUSS.modes(np.ones((1, 4)))[1],
             bad(None, "x", np.ones((23, 2)), np.ones((1, 5, 2)))
@@ -230,8 +229,8 @@ for owner in (TRUSS, REDUCED):
 FULL = {"full": (TRUSS, models()), "bounds": (0.1, BOUNDED)}
 use("fem.ReducedModel", lambda **a: solved(fem.ReducedModel(**a)), usual="tol random_state", **FULL)
 LOCAL = TRUSS.local_modes(ROW)
-method("fem.modal.LocalModes.shapes", LOCAL, usual="dofs")
-method("fem.modal.LocalModes.derivatives", LOCAL, usual="dofs", columns=([0, 1], integers(6)))
+use("fem.modal.LocalModes.shapes", LOCAL.shapes, usual="dofs")
+use("fem.modal.LocalModes.derivatives", LOCAL.derivatives, usual="dofs", columns=([0, 1], integers(6)))
 
 
 def member(cls, **extra):
@@ -378,10 +377,10 @@ use(
 )
 SOFT = pd.DataFrame({"k": [1.0, 1.1]})
 PROGRAMMED = fem.CallableModel(lambda theta: [theta[0] ** 0.5], ["k"], 1)
-method("fem.CallableModel.damaged", PROGRAMMED, damage=({"k": 0.1}, by_key({"k": 0.1}, wrong=(20, 1.0, -15))))
-method(
-    "fem.CallableModel.frequencies",
+methods(PROGRAMMED, "damaged", damage=({"k": 0.1}, by_key({"k": 0.1}, wrong=(20, 1.0, -15))))
+methods(
     PROGRAMMED,
+    "frequencies",
     theta=(SOFT, table(SOFT, nan=False, positive=True, rows=False, but=("no rows", "columns in another order"))),
 )
 use(
@@ -513,19 +512,14 @@ fitted(
 )
 ALIGNED = BiasAligner(TRUSS).fit(F)
 SAME = table(F, rows=False)
-method("preprocessing.BiasAligner.transform", ALIGNED, X=(F, SAME))
-method("preprocessing.BiasAligner.inverse_transform", ALIGNED, X=(F, SAME))
+methods(ALIGNED, "transform inverse_transform", X=(F, SAME))
 use(
     "preprocessing.BlockedKFold",
     lambda **a: preprocessing.BlockedKFold(**a).fold_of(F),
     n_splits=(3, count(1, 10**6)),
     block=("7D", durations()),
 )
-method(
-    "preprocessing.BlockedKFold.fold_of",
-    preprocessing.BlockedKFold(3),
-    X=(F, bad(None, 3, True, F[:2], F[:0], pd.DataFrame)),
-)
+methods(preprocessing.BlockedKFold(3), "fold_of", X=(F, bad(None, 3, True, F[:2], F[:0], pd.DataFrame)))
 fitted(
     preprocessing.HingeFeatures,
     (T, table(T, fixed=False, rows=False, fitting=True, but=("constant",))),
@@ -540,7 +534,7 @@ use(
         vector(np.ones(len(T)), size=None, but=("zero inside",)) | bad(pd.Series(1.0, T.index.shift(1)), np.ones(3)),
     ),
 )
-method("preprocessing.HingeFeatures.transform", preprocessing.HingeFeatures().fit(T), X=(T, table(T, rows=False)))
+methods(preprocessing.HingeFeatures().fit(T), "transform", X=(T, table(T, rows=False)))
 GAPPY = F.mask(np.arange(len(F))[:, np.newaxis] % 7 == np.arange(6))
 fitted(
     KNNGapImputer,
@@ -548,11 +542,7 @@ fitted(
     usual="n_neighbors weights metric copy add_indicator keep_empty_features",
     missing_values=(NAN, bad("missing", [NAN], float, STAMP, True, b"x")),
 )
-method(
-    "preprocessing.KNNGapImputer.transform",
-    KNNGapImputer().fit(GAPPY),
-    X=(GAPPY, table(GAPPY, rows=False)),
-)
+methods(KNNGapImputer().fit(GAPPY), "transform", X=(GAPPY, table(GAPPY, rows=False)))
 fitted(
     LagFeatures,
     (
@@ -569,11 +559,7 @@ fitted(
     tolerance=("3h", durations()),
     padding=("nan", choice()),
 )
-method(
-    "preprocessing.LagFeatures.transform",
-    LagFeatures(2).fit(HOURLY),
-    X=(HOURLY, table(HOURLY, rows=False)),
-)
+methods(LagFeatures(2).fit(HOURLY), "transform", X=(HOURLY, table(HOURLY, rows=False)))
 POLES = {"frequencies": np.array([[2.0, 2.2], [2.1, 2.15]]), "shapes": np.array([[[1, 2.0, 1], [1, 0, -1]]] * 2)}
 REFERENCE = (np.array([2.0, 2.2]), np.array([[1.0, 1], [2, 0], [1, -1]]))
 POLED = {
@@ -601,9 +587,7 @@ REFERRED |= {
 }
 use(
     "preprocessing.ModeTracker",
-    lambda **a: (
-        preprocessing.ModeTracker(**{k: v for k, v in a.items() if k != "X"}).fit().transform(a["X"]).frequencies
-    ),
+    lambda X, **a: preprocessing.ModeTracker(**a).fit().transform(X).frequencies,
     X=(POLES, POLED | bad(None, "poles", 3, True, {}, dict)),
     reference=(REFERENCE, REFERRED),
     max_shift=(0.15, number(0, 1, 15, -0.1)),
@@ -617,17 +601,10 @@ use(
 PREDICTING = weather(T, rows=False)
 WEATHER = weather(T, rows=True, fixed=False, fitting=True)
 MEASURED = frequencies(F, rows=True, fitting=True, but=("unknown names", "columns in another order"))
-
-
-def chain_of(**values):
-    X, y = values.pop("X"), values.pop("y")
-    return surrogate.DataInformedFEM(**values).fit(X, y).predict(T)
-
-
 PARTS = {"inverse": surrogate.InverseSurrogate(**INVERSE), "mapper": surrogate.TemperatureMapper(Ridge())}
 use(
     "surrogate.DataInformedFEM",
-    chain_of,
+    lambda X, y, **a: surrogate.DataInformedFEM(**a).fit(X, y).predict(T),
     usual="model n_jobs random_state",
     inverse=(PARTS["inverse"], estimators()),
     mapper=(PARTS["mapper"], estimators()),
@@ -644,26 +621,23 @@ use(
     y=(F, MEASURED),
     shapes=(None, bad("x", 3, True, SHAPES, np.full((120, 6, 3), STAMP), np.ones((120, 6, 3)))),
 )
-for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "weather"):
-    usual = {"predict": "return_std", "predict_interval": "confidence"}.get(name, "")
-    method(f"surrogate.DataInformedFEM.{name}", CHAIN, usual=usual, X=(T, PREDICTING))
-method(
-    "surrogate.DataInformedFEM.score", CHAIN, X=(T, weather(T, rows=True)), y=(F, table(F, rows=True, positive=True))
-)
-use(
-    "surrogate.DataInformedFEM.estimate_parameters",
-    CHAIN.estimate_parameters,
-    F=(F, frequencies(F, rows=False)),
-    shapes=(None, bad("x", 3, True, SHAPES)),
-)
+methods(CHAIN, "predict_parameters extrapolation_distance weather", X=(T, PREDICTING))
+methods(CHAIN, "predict", usual="return_std", X=(T, PREDICTING))
+methods(CHAIN, "predict_interval", usual="confidence", X=(T, PREDICTING))
+methods(CHAIN, "score", X=(T, weather(T, rows=True)), y=(F, table(F, rows=True, positive=True)))
+NO_SHAPES = (None, bad("x", 3, True, SHAPES))
+methods(CHAIN, "estimate_parameters", F=(F, frequencies(F, rows=False)), shapes=NO_SHAPES)
 CHANGES = {
     "damage": (
         {"top": 0.1},
-        by_key({"top": 0.1}, wrong=(20, 1.0, -15))
+        DAMAGE
         | {
-            "rows too few": {"top": np.full(3, 0.1)},
-            "texts": {"top": np.full(120, "0.1")},
-            "booleans": {"top": np.ones(120, dtype=bool)},
+            cause: {"top": values}
+            for cause, values in (
+                ("rows too few", np.full(3, 0.1)),
+                ("texts", ["0.1"] * 120),
+                ("booleans", [True] * 120),
+            )
         },
     ),
     "parameters": ({"top": 1.02}, PARAMETERS),
@@ -674,7 +648,7 @@ FAULTS = {
     "gaps": (0.1, SHARE_OF_VALUES | bad("often")),
     "outliers": (0.01, SHARE_OF_VALUES | bad("often", np.full((3, 6), 5.0))),
 }
-method("surrogate.DataInformedFEM.simulate", CHAIN, usual="noise random_state", X=(T, PREDICTING), **CHANGES, **FAULTS)
+methods(CHAIN, "simulate", usual="noise random_state", X=(T, PREDICTING), **CHANGES, **FAULTS)
 INVERTING = {
     "regressor": (Ridge(), estimators("None")),
     "bounds": (0.2, BOUNDED),
@@ -683,16 +657,10 @@ INVERTING = {
     "memory": (None, bad(True, 3, b"m", __file__, Path, NAN, ["m"])),
 }
 INVERTED = frequencies(F, rows=False, but=("unknown names", "columns in another order"))
-use(
-    "surrogate.InverseSurrogate",
-    lambda **a: (
-        surrogate.InverseSurrogate(**{k: v for k, v in a.items() if k not in "Xy"}).fit(a["X"], a["y"]).transform(F)
-    ),
-    usual="model n_jobs random_state",
-    **INVERTING,
-    X=(F, INVERTED),
-    y=(None, {}),
-)
+OF_F = lambda estimator, X: estimator.transform(F)  # noqa: E731
+COMMON = "model n_jobs random_state"
+fitted(surrogate.InverseSurrogate, (F, INVERTED), (None, {}), usual=COMMON, after=OF_F, **INVERTING)
+INVERTIBLE = (F, table(F, rows=False, positive=True))
 POSTERIOR = surrogate.PosteriorInverse(TRUSS, noise=0.01).fit(F)
 use(
     "surrogate.PosteriorInverse",
@@ -714,26 +682,20 @@ EXAMPLES.append(
         {"shape_noise": by_name(0.01, MODES, wrong=(1.0, 5))},
     )
 )
-INVERTIBLE = (F, table(F, rows=False, positive=True))
-method("surrogate.PosteriorInverse.transform", POSTERIOR, usual="return_std", X=INVERTIBLE)
-method("surrogate.PosteriorInverse.invert", POSTERIOR, X=INVERTIBLE)
+methods(POSTERIOR, "transform", usual="return_std", X=INVERTIBLE)
+methods(POSTERIOR, "invert", X=INVERTIBLE)
 use(
     "surrogate.InverseSurrogate.fit",
     lambda **a: surrogate.InverseSurrogate(None, Ridge()).fit(**a).transform(F),
     X=(F, table(F, rows=True, fixed=False, fitting=True)),
     y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True, fixed=False, but=("a number",))),
 )
-INVERTIBLE = (F, table(F, rows=False, positive=True))
-method("surrogate.InverseSurrogate.transform", SURROGATE, X=INVERTIBLE)
-method("surrogate.InverseSurrogate.predict", SURROGATE, usual="return_std", X=INVERTIBLE)
-method(
-    "surrogate.InverseSurrogate.inverse_transform",
+methods(SURROGATE, "transform", X=INVERTIBLE)
+methods(SURROGATE, "predict", usual="return_std", X=INVERTIBLE)
+methods(SURROGATE, "inverse_transform", X=(THETA, table(THETA, rows=False, positive=True, but=("no rows",))))
+methods(
     SURROGATE,
-    X=(THETA, table(THETA, rows=False, positive=True, but=("no rows",))),
-)
-method(
-    "surrogate.InverseSurrogate.score",
-    SURROGATE,
+    "score",
     X=(F, table(F, rows=True, positive=True)),
     y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True)),
 )
@@ -754,13 +716,8 @@ use(
         vector(np.ones(len(T)), but=("zero inside",)) | bad(pd.Series(1.0, T.index.shift(1)), np.ones(3)),
     ),
 )
-method("surrogate.TemperatureMapper.predict", MAPPER, usual="return_std", X=(T, table(T, rows=False)))
-method(
-    "surrogate.TemperatureMapper.score",
-    MAPPER,
-    X=(T, table(T, rows=True)),
-    y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True)),
-)
+methods(MAPPER, "predict", usual="return_std", X=(T, table(T, rows=False)))
+methods(MAPPER, "score", X=(T, table(T, rows=True)), y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True)))
 use(
     "surrogate.paper_network",
     lambda **a: surrogate.paper_network(**a).hidden_layer_sizes,
@@ -863,9 +820,9 @@ for name in detection.__all__:  # detectors that take what all detectors take
     cls = getattr(detection, name)
     if issubclass(cls, detection.DamageDetector) and not inspect.isabstract(cls) and not is_registered(cls):
         fitted(cls, (F, WATCHED), usual=" ".join(inspect.signature(cls).parameters), after=DAMAGE_INDEX)
-for name in ("damage_index", "decision_function", "predict", "score_samples"):
-    for owner in (DETECTOR, OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F)):
-        method(f"detection.{type(owner).__name__}.{name}", owner, X=(F, table(F, rows=False)))
+ASKED = "damage_index decision_function predict score_samples"
+for owner in (DETECTOR, OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F)):
+    methods(owner, ASKED, X=(F, table(F, rows=False)))
 SIDE_BY_SIDE = table(
     BOTH,
     rows=False,
@@ -893,10 +850,8 @@ fitted(
     cv=(3, FOLDS),
     window_share=(0.5, number(0, -0.1, 2)),
 )
-for name in ("damage_index", "decision_function", "predict", "score_samples", "residuals"):
-    method(f"detection.CompensatedDetector.{name}", COMPENSATED, X=(BOTH, table(BOTH, rows=False)))
-method("detection.TemperatureCompensator.transform", COMPENSATOR, X=(BOTH, table(BOTH, rows=False)))
-method("detection.TemperatureCompensator.extrapolation_distance", COMPENSATOR, X=(BOTH, table(BOTH, rows=False)))
+methods(COMPENSATED, f"{ASKED} residuals", X=(BOTH, table(BOTH, rows=False)))
+methods(COMPENSATOR, "transform extrapolation_distance", X=(BOTH, table(BOTH, rows=False)))
 
 # metrics
 PREDICTED = F * 1.01
@@ -963,20 +918,14 @@ use(
     retrofit=(False, flag()),
     drift=({GROUP: 0.01}, by_key({GROUP: 0.01}, wrong=(1000,))),
     damage=({GROUP: 0.1}, by_key({GROUP: 0.1}, wrong=(20, 1.0))),
-    damage_from=(
-        "2018-10-02",
-        moments("half", "too late", "negative") | bad("2030-01-01", "2000-01-01", 5),
-    ),
+    damage_from=("2018-10-02", moments("half", "too late", "negative") | bad("2030-01-01", "2000-01-01", 5)),
 )
 use(
     "datasets.steel_modulus",
     temperature=(
         T,
         table(
-            T,
-            rows=False,
-            fixed=False,
-            but=("three axes", "a number", "no rows", "repeated columns", "repeated names"),
+            T, rows=False, fixed=False, but=("three axes", "a number", "no rows", "repeated columns", "repeated names")
         )
         | bad(T + 273.15),
     ),
@@ -990,8 +939,7 @@ use(
     name=("a", texts()),
     damage=({"top": 0.1}, by_key({"top": 0.1}, wrong=(20, 1.0, -15), but=("unknown",))),
     parameters=({"top": 1.02}, by_key({"top": 1.02}, wrong=(0, -1), but=("unknown",))),
-    stiffness=(np.eye(23), matrix(np.eye(23), ("a column too many", "a column too few"))),
-    mass=(np.eye(23), matrix(np.eye(23), ("a column too many", "a column too few"))),
+    **dict.fromkeys(("stiffness", "mass"), (np.eye(23), matrix(np.eye(23), ("a column too many", "a column too few")))),
     family=("top", texts()),
     severity=(0.1, number(20, 1.0, but=("NaN",))),
 )
@@ -1012,36 +960,30 @@ use(
     name=("a", texts()),
     draws=(DRAWS, table(DRAWS, nan=False, rows=False, fixed=False) | bad(DRAWS * 100)),
 )
-method("studies.Scenario.changes", studies.Scenario("a", {"top": 0.1}), usual="repeat", T=(T, {}))
-method(
-    "studies.ProgressiveDamage.changes",
+methods(studies.Scenario("a", {"top": 0.1}), "changes", usual="repeat", T=(T, {}))
+methods(
     studies.ProgressiveDamage("a", {"top": 0.1}, 2),
+    "changes",
     usual="repeat",
     T=(T, bad(None, 3, True, "T", pd.DataFrame)),
 )
-method("studies.UncertainDamage.changes", studies.UncertainDamage("a", DRAWS), usual="repeat", T=(T, {}))
+methods(studies.UncertainDamage("a", DRAWS), "changes", usual="repeat", T=(T, {}))
 use(
     "studies.sweep",
     lambda **a: [one.severity for one in studies.sweep(**a)],
     usual="model kind",
-    severities=(
-        [0.1, 0.2],
-        vector([0.1, 0.2], but=("negative inside",)) | bad([10, 20], ".1", [1.0], [0.1, 0.1], 0.1),
-    ),
+    severities=([0.1, 0.2], vector([0.1, 0.2], but=("negative inside",)) | bad([10, 20], ".1", [1.0], [0.1, 0.1], 0.1)),
     groups=(["top"], names(["top"]) | bad("top")),
 )
 ARGUMENTS = {"fem": (CHAIN, models() | bad(surrogate.DataInformedFEM(TRUSS)))}
 use(
     "studies.DetectabilityStudy",
-    lambda **a: studies.DetectabilityStudy(
-        **{k: v for k, v in a.items() if k not in ("T", "baseline", "reference", "confidence")}, uncertainty="noise"
-    ).run(a["T"], a["baseline"], reference=a["reference"], confidence=a["confidence"])["rate"],
+    lambda T, baseline, reference, confidence, **a: studies.DetectabilityStudy(uncertainty="noise", **a).run(
+        T, baseline, reference=reference, confidence=confidence
+    )["rate"],
     usual="noise n_jobs random_state confidence",
     **ARGUMENTS,
-    detectors=(
-        MahalanobisDetector(),
-        estimators() | bad({}, {"": MahalanobisDetector()}, {3: None}),
-    ),
+    detectors=(MahalanobisDetector(), estimators() | bad({}, {"": MahalanobisDetector()}, {3: None})),
     scenarios=(
         SCENARIOS,
         bad(None, "healthy", 3, True, [], [SCENARIOS[0]] * 2, ["a"], [studies.Scenario])
@@ -1059,22 +1001,11 @@ use(
         | {f"inside: {c}": {"healthy": v} for c, v in table(LATER.frequencies, rows=False).items()},
     ),
 )
-method("studies.DetectabilityStudy.pod_curve", STUDY, usual="family source log")
-method("studies.DetectabilityStudy.is_undetected", STUDY, usual="family source")
-method(
-    "studies.DetectabilityStudy.minimum_detectable_damage",
-    STUDY,
-    level=(0.9, number(-0.1, 90)),
-    method=("grid", choice()),
-)
-method(
-    "studies.DetectabilityStudy.ranking",
-    STUDY,
-    usual="max_false_alarms source",
-    confidence=(0.9, number(0, 1, 90)),
-    by=("pod", choice()),
-)
-method("studies.DetectabilityStudy.detector_name", STUDY, detector=("MahalanobisDetector", texts("None")))
+methods(STUDY, "pod_curve", usual="family source log")
+methods(STUDY, "is_undetected", usual="family source")
+methods(STUDY, "minimum_detectable_damage", level=(0.9, number(-0.1, 90)), method=("grid", choice()))
+methods(STUDY, "ranking", usual="max_false_alarms source", confidence=(0.9, number(0, 1, 90)), by=("pod", choice()))
+methods(STUDY, "detector_name", detector=("MahalanobisDetector", texts("None")))
 COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | bad([1, 2, 3, 4], [30, 10, 19])
 use(
     "studies.pod_curve",
@@ -1084,12 +1015,8 @@ use(
     n_detected=([3, 10, 19], COUNTED),
     n_records=([20, 20, 20], vector([20.0, 20.0, 20.0], but=("zero inside",)) | bad([20] * 4)),
 )
-method(
-    "studies.PODCurve.predict",
-    CURVE,
-    severity=(0.2, vector(0.2, wrong=(20,), but=("zero inside", "empty", "three axes"))),
-)
-method("studies.PODCurve.severity_at", CURVE, usual="confidence", pod=(0.9, number(0, 1, 90, -0.1)))
+methods(CURVE, "predict", severity=(0.2, vector(0.2, wrong=(20,), but=("zero inside", "empty", "three axes"))))
+methods(CURVE, "severity_at", usual="confidence", pod=(0.9, number(0, 1, 90, -0.1)))
 use(
     "studies.identify_damage",
     lambda **a: studies.identify_damage(**a).severities,

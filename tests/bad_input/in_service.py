@@ -9,20 +9,8 @@ from skthermo import monitoring, surrogate
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from tests.bad_input.examples import BOTH, CHAIN, MODES, F, T
-from tests.bad_input.registry import FOLDER, LEGAL, NOT_CALLED, method, use
-from tests.bad_input.values import (
-    NAN,
-    bad,
-    durations,
-    flag,
-    frequencies,
-    instead,
-    jobs,
-    names,
-    number,
-    table,
-    weather,
-)
+from tests.bad_input.registry import FOLDER, LEGAL, NOT_CALLED, methods, use
+from tests.bad_input.values import NAN, bad, durations, flag, frequencies, instead, jobs, names, number, table, weather
 
 DETECTOR = make_pipeline(TemperatureCompensator(Ridge(), targets=MODES), MahalanobisDetector())
 SERVICE = make_truss_campaign(2, samples_per_year=120, damage={"bottom": 0.3}, damage_from="2025-06-10", random_state=0)
@@ -73,9 +61,9 @@ use(
     new=(NEW[:40], frequencies(NEW[:40], in_hertz=False, rows=False, but=("no rows",))),
     confirm=(False, flag()),
 )
-method("monitoring.Monitor.status", SERVED, now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
-method("monitoring.Monitor.transitions", SERVED, after=(1, number(-1, 1.5, 10**6)))
-method("monitoring.Monitor.years_watched", SERVED, since=("2025-06-10", MOMENT))
+methods(SERVED, "status", now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
+methods(SERVED, "transitions", after=(1, number(-1, 1.5, 10**6)))
+methods(SERVED, "years_watched", since=("2025-06-10", MOMENT))
 use(
     *served("acknowledge", lambda monitor: monitor.events_),
     event=(1, number(0, -1, 1.5, 1000)),
@@ -93,7 +81,7 @@ use(*served("rebaseline"), since=("2025-06-10", {**MOMENT, "None": None}), until
 PATHS = bad(
     "no such folder/monitor.joblib", "monitor.txt", "monitor", 3, None, True, b"monitor.joblib", ["a.joblib"], str
 )
-method("monitoring.Monitor.save", SERVED, path=(FOLDER / "saved.joblib", PATHS))
+methods(SERVED, "save", path=(FOLDER / "saved.joblib", PATHS))
 use(
     "monitoring.load_monitor",
     lambda path: monitoring.load_monitor(path).summary(),
@@ -110,8 +98,8 @@ use(
     freq=("1D", durations("half", "negative number")),
     significance=(0.01, number(0, 1, -0.1)),
 )
-method("monitoring.ParameterHistory.reaches", HISTORY, limit=(-0.1, number(0, -1, -1.5)))
-method("monitoring.ParameterHistory.remove_drift", HISTORY, F=(F, frequencies(F, rows=False)))
+methods(HISTORY, "reaches", limit=(-0.1, number(0, -1, -1.5)))
+methods(HISTORY, "remove_drift", F=(F, frequencies(F, rows=False)))
 NOT_CALLED |= {
     "monitoring.MonitorStatus": "made by a monitor's status",
     "monitoring.ParameterHistory": "made by track_parameters",
@@ -143,21 +131,15 @@ use(
     monitor=(watch, bad(3, True, "watch", [watch], MONITOR)),
     folder=(FOLDER / "another fleet", bad(3, True, ["a"], b"a", str)),
     n_jobs=(1, jobs()),
-    progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
+    progress=(False, flag("None")),
 )
 use(
     "monitoring.Fleet",
     lambda folder: tables(monitoring.Fleet(folder)),
     folder=(FOLDER / "fleet", bad("nowhere", 3, None, True, ["a"], b"a", str)),
 )
-method("monitoring.Fleet.status", WATCHED, now=("2025-05-01", MOMENT), max_age=("3D", durations("None")))
-method(
-    "monitoring.Fleet.update",
-    WATCHED,
-    records=({}, MAPPING),
-    n_jobs=(1, jobs()),
-    progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
-)
+methods(WATCHED, "status", now=("2025-05-01", MOMENT), max_age=("3D", durations("None")))
+methods(WATCHED, "update", records=({}, MAPPING), n_jobs=(1, jobs()), progress=(False, flag("None")))
 use(
     "monitoring.Fleet.discoveries",
     lambda **a: WATCHED.discoveries(**a).summary(),
@@ -182,7 +164,7 @@ use(
     y=(FEW, table(FEW, rows=True, fixed=False, fitting=True, but=("a number", "constant"))),
 )
 MAPPER = surrogate.FleetMapper(OTHERS).fit(T, FEW)
-method("surrogate.FleetMapper.predict", MAPPER, X=(T, table(T, rows=False)), return_std=(False, flag()))
+methods(MAPPER, "predict", X=(T, table(T, rows=False)), return_std=(False, flag()))
 LEGAL |= {
     "lookback": {("zero", "monitoring.Monitor"): "the detector looks at single records"},
     "max_age": {("zero", f"monitoring.{one}.status"): "any age is too old" for one in ("Monitor", "Fleet")},

@@ -71,9 +71,11 @@ def use(name, call=None, /, usual="", **arguments):
     EXAMPLES.append(Example(name, of, of if call is None else call, good, bad))
 
 
-def method(name, owner, **arguments):
-    """Register a method of a fixed object."""
-    use(name, getattr(owner, name.rpartition(".")[2]), **arguments)
+def methods(owner, names, **arguments):
+    """Register methods of a fixed object that take the same."""
+    kind = type(owner)
+    for name in names.split():
+        use(f"{kind.__module__.split('.')[1]}.{kind.__name__}.{name}", getattr(owner, name), **arguments)
 
 
 def fitted(cls, X, y=None, after=None, usual="", **arguments):

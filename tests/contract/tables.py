@@ -19,14 +19,7 @@ from skthermo.fem import match_modes
 from skthermo.metrics import error_table
 from skthermo.monitoring import Monitor, track_parameters
 from skthermo.preprocessing import check_records
-from skthermo.studies import (
-    DetectabilityStudy,
-    compare_extensions,
-    detection_task,
-    identify_damage,
-    pod_curve,
-    sweep,
-)
+from skthermo.studies import DetectabilityStudy, compare_extensions, detection_task, identify_damage, pod_curve, sweep
 from skthermo.surrogate import DataInformedFEM
 from skthermo.updating import ModelUpdater, identifiability, sensitivity
 

@@ -80,12 +80,7 @@ def monitoring_false_alarms():
         "expected": monitor.false_alarm_estimate_.expected,
         "evaluated": float(monitor.evaluations_["index"].notna().mean()),
         "smallest": monitor.smallest_changes_.common,
-    }, {
-        "events": {"atol": 2},
-        "expected": {"atol": 0.3},
-        "evaluated": {"atol": 0.05},
-        "smallest": {"atol": 0.004},
-    }
+    }, {"events": {"atol": 2}, "expected": {"atol": 0.3}, "evaluated": {"atol": 0.05}, "smallest": {"atol": 0.004}}
 
 
 def monitoring_groups():
@@ -112,11 +107,9 @@ def monitoring_new_baseline():
     done = monitor.rebaseline("2026-03-01", until="2026-04-30")
     monitor.update(records["2026-05":"2026-06"])
     index = monitor.evaluations_.loc["2026-05":, "index"]
-    return {
-        "before": before,
-        "accepted": bool(done.accepted),
-        "after": float((index > monitor.threshold_).mean()),
-    }, {"after": {"atol": 0.1}}
+    return {"before": before, "accepted": bool(done.accepted), "after": float((index > monitor.threshold_).mean())}, {
+        "after": {"atol": 0.1}
+    }
 
 
 def monitoring_sensors():

@@ -59,12 +59,7 @@ def surrogate_chain_damage():
         "scatter asked for": (known / fem.simulate(T)).std(),
         "healthy": bool((fem.simulate(T) - fem.predict(T)).abs().max().max() < 1e-9),
         "again": bool(noisy.equals(fem.simulate(T, damage={"bottom": 0.5}, noise="fitted", random_state=0))),
-    }, {
-        "*": {"rtol": 0.003},
-        "mape": {"atol": 0.1},
-        "scatter": {"rtol": 0.12},
-        "scatter asked for": {"rtol": 0.1},
-    }
+    }, {"*": {"rtol": 0.003}, "mape": {"atol": 0.1}, "scatter": {"rtol": 0.12}, "scatter asked for": {"rtol": 0.1}}
 
 
 def surrogate_chain_defects():

@@ -48,7 +48,6 @@ def updating_shapes():
     few.fit(frequencies, frequency_std=0.005 * frequencies[0])
     models = few.sample_models(5, random_state=0)
     sampled = np.array([model.frequencies(np.ones((1, len(model.parameter_names))))[0] for model in models])
-    return {
-        "theta": updater.theta_,
-        "open": [len(models), bool(np.abs(sampled / frequencies[0] - 1).max() < 0.03)],
-    }, {"theta": {"rtol": 2e-3}}
+    return {"theta": updater.theta_, "open": [len(models), bool(np.abs(sampled / frequencies[0] - 1).max() < 0.03)]}, {
+        "theta": {"rtol": 2e-3}
+    }
