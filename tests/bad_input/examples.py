@@ -371,7 +371,7 @@ use(
     lambda **a: fem.CallableModel(**a).frequencies([[1.0], [1.1]]),
     **PROGRAM,
     n_modes=(1, count(2)),
-    vectorized=(False, flag()),
+    usual="vectorized",
     cache=(None, bad(True, 3, b"c", __file__, Path, NAN)),
     groups=({"g": ["k"]}, bad("k", ["k"], 3, True, {"g": []}, {"g": ["E"]}, {"g": 1}, {"g": None}, {"g": ["k", "k"]})),
 )
@@ -508,7 +508,7 @@ fitted(
     BiasAligner,
     (F, PLAIN),
     reference=(NOMINAL[0], by_name(NOMINAL[0], MODES, but=("negative inside",))),
-    method=("shift", choice()),
+    usual="method",
 )
 ALIGNED = BiasAligner(TRUSS).fit(F)
 SAME = table(F, rows=False)
@@ -557,7 +557,7 @@ fitted(
     lags=(2, count() | bad(["1"], [0, True], [-1], [1, 1], [0, NAN], [STAMP], [0.5, 1.5])),
     freq=("1h", durations()),
     tolerance=("3h", durations()),
-    padding=("nan", choice()),
+    usual="padding",
 )
 methods(LagFeatures(2).fit(HOURLY), "transform", X=(HOURLY, table(HOURLY, rows=False)))
 POLES = {"frequencies": np.array([[2.0, 2.2], [2.1, 2.15]]), "shapes": np.array([[[1, 2.0, 1], [1, 0, -1]]] * 2)}
@@ -722,7 +722,7 @@ use(
     "surrogate.paper_network",
     lambda **a: surrogate.paper_network(**a).hidden_layer_sizes,
     network=("truss", choice()),
-    dropout=(True, flag()),
+    usual="dropout",
 )
 
 
@@ -901,7 +901,7 @@ use(
     lambda **a: datasets.make_kw51(**a).n_modes,
     parameters=(["E_arc"], names(["E_arc"])),
     n_modes=(2, count()),
-    updated=(False, flag()),
+    usual="updated",
 )
 use(
     "datasets.make_truss_campaign",
@@ -912,10 +912,8 @@ use(
 GROUP = "girders"
 use(
     "datasets.make_kw51_campaign",
-    usual="noise random_state shapes",
+    usual="noise random_state shapes gaps retrofit",
     n_hours=(48, count()),
-    gaps=(False, flag()),
-    retrofit=(False, flag()),
     drift=({GROUP: 0.01}, by_key({GROUP: 0.01}, wrong=(1000,))),
     damage=({GROUP: 0.1}, by_key({GROUP: 0.1}, wrong=(20, 1.0))),
     damage_from=("2018-10-02", moments("half", "too late", "negative") | bad("2030-01-01", "2000-01-01", 5)),
@@ -1044,7 +1042,7 @@ use(
     lambda **a: studies.DamagePrior(**a),
     numbers=((0.5, 0.5), bad("x", (0.2,) * 5, (1.5, -0.5), (1.0,), (0.5, 0.4))),
     severity=(0.2, number(0, 2, -0.1)),
-    law=("uniform", choice()),
+    usual="law",
     something_else=(0.1, number(1.5, -0.1)),
     model_error=(0.03, number(1.5, -0.1)),
 )
@@ -1145,10 +1143,17 @@ fitted(preprocessing.SensorMeans, (T, {}), roles=(None, bad(3, "air", True)))
 
 LATE = F.set_axis(F.index + pd.Timedelta("1h"))
 DATED = F["f1"]
+FAILING = fem.CallableModel(lambda theta: 1 / 0, ["k"], 1)
+OF_ONE_MODE = MahalanobisDetector().fit(F.to_numpy()[:, :1])
+LITTLE_NOISE = {"bounds": 0.1, "frequency_std": 1e-4}
 ONE_MODE = fem.CallableModel(lambda theta: [7.5 * theta[0] ** 0.5], ["k"], 1)
 LAGS = LagFeatures(2).fit(HOURLY)
 OFFSETS = [stamp.tz_localize("UTC" if i % 2 else "Asia/Tokyo") for i, stamp in enumerate(HOURLY.index)]
 LINES = detection.TemperatureCompensator(Ridge(), targets=MODES)
+
+
+def of_covariance(covariance):
+    return MahalanobisDetector(covariance=covariance)
 
 
 def windowed(window, **options):
@@ -1179,6 +1184,10 @@ def masked(frame):
 
 def truss_of(members=BARS, supports=SUPPORTS, nodes=NODES):
     return fem.Structure(nodes, members, supports)
+
+
+def assembled(parameters=("rafters",), **options):
+    return FRAME.assemble(list(parameters), **options)
 
 
 def affine(stiffness, mass=EYE):
@@ -1215,6 +1224,7 @@ def roles(roles):
 
 LISTS = {name: list(values) for name, values in POLES.items()}
 NAMED = dict(zip(("frequencies", "shapes"), REFERENCE, strict=True))
+OF_SENSORS = NAMED | {"sensors": "abz"}
 
 
 def tracker(reference, **options):
@@ -1236,12 +1246,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("fem.Structure", "length zero", lambda: truss_of(BARS | {"b": Bar("left", "left", **STEEL)}), "'b'"),
     ("fem.Structure", "nothing free", lambda: truss_of(supports=dict.fromkeys(NODES, "xy")), "every node"),
     ("fem.Structure", "a beam in the plane", lambda: truss_of(BARS | {"b": SPACE_BEAM}), "three coordinates"),
-    (
-        "fem.Structure",
-        "damage to mass",
-        lambda: FRAME.assemble(["rafters"], groups={"d": ("density", "rafters")}),
-        "'d'",
-    ),
+    ("fem.Structure", "damage to mass", lambda: assembled(groups={"d": ("density", "rafters")}), "'d'"),
     ("fem.Structure", "neither matrix", lambda: FRAME.assemble({"p": ("E", "rafters", "damping")}), "stiffness"),
     ("fem.CallableModel", "text", lambda: fem.CallableModel(lambda t: "no", ["k"], 1).frequencies([[1]]), "expected"),
     ("fem.match_modes", "too many modes", lambda: fem.match_modes(TRUSS, np.ones((1, 50))), "50"),
@@ -1287,12 +1292,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("SensorMeans", "no role", lambda: roles(dict.fromkeys(T)), "at least"),
     ("SensorMeans", "a number", lambda: roles(dict.fromkeys(T, 3)), "'air'"),
     ("BlockedKFold", "block of 0", lambda: preprocessing.BlockedKFold(block=0).fold_of(T), "block is 0"),
-    (
-        "BlockedKFold",
-        "block, no stamps",
-        lambda: preprocessing.BlockedKFold(block="7D").fold_of(np.ones((9, 1))),
-        "'7D'",
-    ),
+    ("BlockedKFold", "block, no stamps", lambda: preprocessing.BlockedKFold(block="7D").fold_of([[1.0]] * 9), "'7D'"),
     ("ModeTracker", "rad/s", lambda: tracked(many=True, frequencies=np.tile([12.6, 13.8], (20, 1))), "rad/s"),
     ("ModeTracker", "no shapes", lambda: tracked(shapes=None), "'shapes'"),
     ("ModeTracker", "negative", lambda: tracked(frequencies=-POLES["frequencies"]), "record 0"),
@@ -1306,24 +1306,14 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("ModeTracker", "a shape of zeros", lambda: tracker((REFERENCE[0], 0 * REFERENCE[1])), "zero"),
     ("ModeTracker", "a reference in part", lambda: tracker({"frequencies": REFERENCE[0]}), "'shapes'"),
     ("ModeTracker", "too few sensors", lambda: tracker(NAMED | {"sensors": "ab"}), "2 sensors"),
-    (
-        "ModeTracker",
-        "unknown sensors",
-        lambda: tracker(NAMED | {"sensors": "abz"}).transform(POLES | {"sensors": "abc"}),
-        "'z'",
-    ),
+    ("ModeTracker", "unknown sensors", lambda: tracker(OF_SENSORS).transform(POLES | {"sensors": "abc"}), "'z'"),
     ("ModeTracker", "a duration, no stamps", lambda: tracker(REFERENCE, follow="5D").transform(POLES), "Datetime"),
     ("BiasAligner", "scaled by zero", lambda: BiasAligner(method="scale").fit([[1.0], [-1.0]]), "zero"),
     ("BiasAligner", "a mode of NaN", lambda: BiasAligner().fit(F.assign(f3=NAN)), "'f3'"),
     ("BiasAligner", "a model of more modes", lambda: BiasAligner(TRUSS).fit(F[["f1", "f2"]]), "6"),
     ("KNNGapImputer", "an empty column", lambda: KNNGapImputer().fit(F.assign(f2=NAN)), "'f2'"),
     ("MahalanobisDetector", "a column of NaN", lambda: MahalanobisDetector().fit(F.assign(f1=NAN)), "'f1'"),
-    (
-        "MahalanobisDetector",
-        "gaps",
-        lambda: MahalanobisDetector(covariance=EmpiricalCovariance()).fit(DIAGONAL),
-        "0 of",
-    ),
+    ("MahalanobisDetector", "gaps", lambda: of_covariance(EmpiricalCovariance()).fit(DIAGONAL), "0 of"),
     ("CompensatedDetector", "a time, no stamps", lambda: windowed("7D").fit(BOTH.reset_index(drop=True)), "'7D'"),
     ("CompensatedDetector", "unsorted", lambda: windowed("7D").fit(BOTH[::-1]), "order"),
     ("CompensatedDetector", "too few rows", lambda: windowed(7).fit(BOTH[:6]), "6"),
@@ -1384,24 +1374,14 @@ PERCENT = [  # shares in percent are refused with a hint
 ]
 WARNED_OF = [
     ("reduced model", "outside its box", lambda: REDUCED.frequencies(np.full((3, 4), 2.0)), "outside-bounds"),
-    (
-        "fem.CallableModel",
-        "it fails",
-        lambda: fem.CallableModel(lambda t: 1 / 0, ["k"], 1).frequencies([[1]]),
-        "ZeroDivision",
-    ),
+    ("fem.CallableModel", "it fails", lambda: FAILING.frequencies([[1]]), "ZeroDivision"),
     ("KNNGapImputer", "-999", lambda: KNNGapImputer().fit(changed(F, 3, 1, -999.0)), "-999"),
     ("BiasAligner", "-999", lambda: BiasAligner().fit(changed(F, 3, 1, -999.0)), "'f2'"),
     ("MahalanobisDetector", "1e6", lambda: MahalanobisDetector().fit(changed(F, 3, 1, 1e6)), "'f2'"),
     ("MahalanobisDetector", "few records", lambda: MahalanobisDetector().fit(F[:20]), "49"),
     ("MahalanobisDetector", "rows lost", lambda: DETECTOR.predict(changed(F, slice(7), slice(None), NAN)), "7 of 120"),
     ("MahalanobisDetector", "all lost", lambda: DETECTOR.predict(F * NAN), "120 of 120"),
-    (
-        "MahalanobisDetector",
-        "masked",
-        lambda: MahalanobisDetector().fit(F.to_numpy()[:, :1]).predict(masked(F)[:, :1]),
-        "1 of 120",
-    ),
+    ("MahalanobisDetector", "masked", lambda: OF_ONE_MODE.predict(masked(F)[:, :1]), "1 of 120"),
     ("CompensatedDetector", "few windows", lambda: windowed(2).fit(BOTH[:40]), "49"),
     ("TemperatureCompensator", "kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "kelvin"),
     ("TemperatureCompensator", "hot", lambda: COMPENSATOR.transform((T + 60).join(F)), "other-weather"),
@@ -1410,12 +1390,7 @@ WARNED_OF = [
     ("ModelUpdater", "one mode", lambda: updated([[7.4]], model=datasets.make_truss(1)), "4 parameters"),
     ("ModelUpdater", "modes swapped", lambda: updated(NOMINAL[:, [0, 1, 3, 2, 4, 5]]), "order"),
     ("ModelUpdater", "at the bounds", lambda: updated(NOMINAL * 1.1, bounds=0.1), "'bottom'"),
-    (
-        "ModelUpdater",
-        "little noise",
-        lambda: updated(NOMINAL * 1.04 + 1, bounds=0.1, frequency_std=1e-4),
-        "frequency_std",
-    ),
+    ("ModelUpdater", "little noise", lambda: updated(NOMINAL * 1.04 + 1, **LITTLE_NOISE), "frequency_std"),
     ("ModelUpdater", "complex shapes", lambda: updated(shapes=SHAPES * 1j, dofs=DOFS), "complex"),
     ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "outside-bounds"),
     ("DataInformedFEM", "1.5 times too high", lambda: chain().fit(T, F * 1.5), "differ"),
@@ -1515,74 +1490,52 @@ UNTRIED |= {
     "surrogate.DataInformedFEM": {"discrepancy", "memory"},
     "updating.ModelUpdater": {"reduce"},
 }
-LEGAL |= {
-    "window": {("a duration", "preprocessing.HampelFilter"): "a window may be a duration"},
-    "n_deviations": {("1e308", "preprocessing.HampelFilter"): "removes nothing"},
-    "sample_weight": {(cause, "*"): "a mask says which rows count" for cause in ("true", "booleans", "true inside")},
-    "reduce": {("true", "*"): "True takes the default tolerance"},
-    "shapes": {("all nan", f"fem.{kind}.nominal_mac"): "NaN stays NaN" for kind in ("AffineModel", "ReducedModel")},
-    "columns": {
-        ("too high", "fem.modal.LocalModes.derivatives"): "more modes are kept than are given",
-        ("repeated", "fem.modal.LocalModes.derivatives"): "a column may be asked for twice",
-    },
-    "dofs": {("empty", "fem.modal.LocalModes.derivatives"): "documented: saves time where no shapes are wanted"},
-    "phi_a": {("NaN inside", "fem.mac"): "NaN stays NaN"},
-    "phi_b": {("NaN inside", "fem.mac"): "NaN stays NaN"},
-    "weights": {("None", "preprocessing.KNNGapImputer"): "scikit-learn's word for uniform"},
-    "severities": {("empty", "studies.sweep"): "the healthy structure alone"},
-    "modes": {("empty", "studies.compare_extensions"): "no further modes are asked for"},
-    "baseline_factors": {("empty", "studies.compare_extensions"): "no longer baselines are asked for"},
-    "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},
-    "tolerance": {("zero", "preprocessing.LagFeatures"): "only records at the very time"},
-    "F": {("NaN throughout", "updating.ModelUpdater.fit"): "shapes alone may be measured"},
-    "damage_index": {
-        ("infinite inside", "*"): "an infinite index is an alarm",
-        ("negative inside", "*"): "other detectors have indices of any sign",
-        ("empty", "*"): "the rate of no records is NaN",
-    },
-    "threshold": {
-        ("out of range: -1.0", f"metrics.{name}"): "other detectors have indices of any sign"
-        for name in ("probability_of_detection", "probability_of_false_alarm", "time_to_detection")
-    },
-    "reference": {("zero inside", "preprocessing.BiasAligner"): "the frequencies become shifts"},
-}
-
-CELSIUS = ("kelvin", "Fahrenheit", "tenths of a degree", "one sensor in kelvin", "-999", "9999", "a slipped point")
-
-
-def legal(argument, callables, causes, reason):
-    """Add bad values that are good for an argument of some callables."""
-    LEGAL.setdefault(argument, {}).update({(cause, name): reason for name in callables for cause in causes})
-
-
-LEVELS = ("levels of names", "tuples as names", "a number among names")
-CARRIED, EMPTY, VECTORS = (
-    "names are not matched",
-    "the answer is empty",
-    "a series is a vector, or a table of one column",
-)
-for argument, name, causes, reason in (
-    ("frequencies", "fem.add_noise", LEVELS, CARRIED),
-    ("frequencies", "fem.match_modes", LEVELS, CARRIED),
-    ("S", "updating.select_parameters", LEVELS, CARRIED),
-    ("temperature", "datasets.steel_modulus", LEVELS, CARRIED),
-    ("measured", "plotting.PredictionDisplay.from_predictions", LEVELS, CARRIED),
-    ("frequencies", "fem.add_noise", ["no columns"], EMPTY),
-    ("phi_a", "fem.mac", ["no columns"], EMPTY),
-    ("phi_b", "fem.mac", ["no columns"], EMPTY),
-    ("temperature", "datasets.steel_modulus", ["no columns"], EMPTY),
-    ("y", "surrogate.TemperatureMapper", ["a series"], VECTORS),
-    ("y", "surrogate.InverseSurrogate.fit", ["a series"], VECTORS),
-    ("measured", "plotting.PredictionDisplay.from_predictions", ["a series"], VECTORS),
-    ("temperature", "datasets.steel_modulus", ["a series"], VECTORS),
-    ("frequencies", "preprocessing.check_records", ["a series"], VECTORS),
-):
-    legal(argument, [name], causes, reason)
-UNITS = ("rad/s", "kHz", "periods")
-WEATHER = ["surrogate.DataInformedFEM.weather"]
-legal("X", ["surrogate.DataInformedFEM.extrapolation_distance"], CELSIUS, "the answer says how far outside")
-legal("X", WEATHER, CELSIUS, "fills gaps alone: predict warns of the weather")
-legal("X", WEATHER, ["stamps missing", "stamps equal", "stamps from numbers"], "there are no lags")
-READ_FOR_NAMES = [*UNITS, "9999", "a slipped point", "a mode twice"]
-legal("X", ["surrogate.InverseSurrogate"], READ_FOR_NAMES, "beside a model, only names are read")
-legal("frequencies", ["preprocessing.check_records"], UNITS, "without a model, any unit is possible")
+LEVELS = ["levels of names", "tuples as names", "a number among names"]
+CELSIUS = ["kelvin", "Fahrenheit", "tenths of a degree", "one sensor in kelvin", "-999", "9999", "a slipped point"]
+UNITS = ["rad/s", "kHz", "periods"]
+DERIVATIVES, DRAWN = "fem.modal.LocalModes.derivatives", "plotting.PredictionDisplay.from_predictions"
+WEATHER, COMPARED = "surrogate.DataInformedFEM.weather", "studies.compare_extensions"
+IN_METRICS = "metrics.probability_of_detection metrics.probability_of_false_alarm metrics.time_to_detection"
+A_SERIES = "a series is a vector, or a table of one column"
+for argument, callables, causes, reason in [  # bad values that are good for an argument of some callables
+    ("window", "preprocessing.HampelFilter", ["a duration"], "a window may be a duration"),
+    ("n_deviations", "preprocessing.HampelFilter", ["1e308"], "removes nothing"),
+    ("sample_weight", "*", ["true", "booleans", "true inside"], "a mask says which rows count"),
+    ("reduce", "*", ["true"], "True takes the default tolerance"),
+    ("shapes", "fem.AffineModel.nominal_mac fem.ReducedModel.nominal_mac", ["all nan"], "NaN stays NaN"),
+    ("columns", DERIVATIVES, ["too high"], "more modes are kept than are given"),
+    ("columns", DERIVATIVES, ["repeated"], "a column may be asked for twice"),
+    ("dofs", DERIVATIVES, ["empty"], "documented: saves time where no shapes are wanted"),
+    ("phi_a", "fem.mac", ["NaN inside"], "NaN stays NaN"),
+    ("phi_b", "fem.mac", ["NaN inside"], "NaN stays NaN"),
+    ("weights", "preprocessing.KNNGapImputer", ["None"], "scikit-learn's word for uniform"),
+    ("severities", "studies.sweep", ["empty"], "the healthy structure alone"),
+    ("modes", COMPARED, ["empty"], "no further modes are asked for"),
+    ("baseline_factors", COMPARED, ["empty"], "no longer baselines are asked for"),
+    ("follow", "preprocessing.ModeTracker", ["1e308"], "follows the mean of all records"),
+    ("tolerance", "preprocessing.LagFeatures", ["zero"], "only records at the very time"),
+    ("F", "updating.ModelUpdater.fit", ["NaN throughout"], "shapes alone may be measured"),
+    ("damage_index", "*", ["infinite inside"], "an infinite index is an alarm"),
+    ("damage_index", "*", ["negative inside"], "other detectors have indices of any sign"),
+    ("damage_index", "*", ["empty"], "the rate of no records is NaN"),
+    ("threshold", IN_METRICS, ["out of range: -1.0"], "other detectors have indices of any sign"),
+    ("reference", "preprocessing.BiasAligner", ["zero inside"], "the frequencies become shifts"),
+    ("frequencies", "fem.add_noise fem.match_modes", LEVELS, "names are not matched"),
+    ("S", "updating.select_parameters", LEVELS, "names are not matched"),
+    ("temperature", "datasets.steel_modulus", LEVELS, "names are not matched"),
+    ("measured", DRAWN, LEVELS, "names are not matched"),
+    ("frequencies", "fem.add_noise", ["no columns"], "the answer is empty"),
+    ("phi_a", "fem.mac", ["no columns"], "the answer is empty"),
+    ("phi_b", "fem.mac", ["no columns"], "the answer is empty"),
+    ("temperature", "datasets.steel_modulus", ["no columns"], "the answer is empty"),
+    ("y", "surrogate.TemperatureMapper surrogate.InverseSurrogate.fit", ["a series"], A_SERIES),
+    ("measured", DRAWN, ["a series"], A_SERIES),
+    ("temperature", "datasets.steel_modulus", ["a series"], A_SERIES),
+    ("frequencies", "preprocessing.check_records", ["a series"], A_SERIES),
+    ("X", "surrogate.DataInformedFEM.extrapolation_distance", CELSIUS, "the answer says how far outside"),
+    ("X", WEATHER, CELSIUS, "fills gaps alone: predict warns of the weather"),
+    ("X", WEATHER, ["stamps missing", "stamps equal", "stamps from numbers"], "there are no lags"),
+    ("X", "surrogate.InverseSurrogate", [*UNITS, "9999", "a slipped point", "a mode twice"], "only names are read"),
+    ("frequencies", "preprocessing.check_records", UNITS, "without a model, any unit is possible"),
+]:
+    LEGAL.setdefault(argument, {}).update({(cause, name): reason for name in callables.split() for cause in causes})

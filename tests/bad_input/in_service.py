@@ -40,7 +40,7 @@ def served(name, result=lambda monitor: monitor.evaluations_):
 use(
     "monitoring.Monitor",
     monitored,
-    usual="random_state",
+    usual="random_state sensors",
     detector=(DETECTOR, instead(DETECTOR.fit)),
     targets=(MODES, names(MODES, "None")),
     reference=(["T2"], names(["T2"], "None", "empty")),
@@ -50,7 +50,6 @@ use(
     persistence=((4, 6), number(0, -1, 1.5, (0, 3), (4, 3), (4.0, 6), (2, 3, 4), [3])),
     max_delay=("7D", durations("zero")),
     retention=("400D", durations()),
-    sensors=(True, flag()),
     units=("Hz", bad(3, True, ["Hz"], {"f1": 3}, {"no such name": "Hz"}, b"Hz", str)),
     lookback=("1D", durations("None")),
     X=(BOTH, frequencies(BOTH, in_hertz=False, fixed=False, rows=False, fitting=True)),
@@ -59,7 +58,7 @@ use(
     "monitoring.Monitor.update",
     lambda new, confirm: copy.deepcopy(MONITOR).update(new, confirm=confirm),
     new=(NEW[:40], frequencies(NEW[:40], in_hertz=False, rows=False, but=("no rows",))),
-    confirm=(False, flag()),
+    usual="confirm",
 )
 methods(SERVED, "status", now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
 methods(SERVED, "transitions", after=(1, number(-1, 1.5, 10**6)))
@@ -75,7 +74,7 @@ use(
     *served("refit", lambda monitor: monitor.threshold_),
     records=(NEW[:50], frequencies(NEW[:50], in_hertz=False, rows=False)),
     until=("2025-06-01", MOMENT),
-    force=(False, flag()),
+    usual="force",
 )
 use(*served("rebaseline"), since=("2025-06-10", {**MOMENT, "None": None}), until=("2025-08-20", MOMENT))
 PATHS = bad(
