@@ -106,6 +106,10 @@ def public_estimators():
     return sorted((one for one in classes if issubclass(one, BaseEstimator)), key=lambda kind: kind.__name__)
 
 
+def test_every_public_estimator_has_a_case():
+    assert set(public_estimators()) <= {type(case.estimator) for case in CASES.values()}, "tests/estimators.py"
+
+
 def made(kind):
     """An estimator with its arguments, or with its defaults."""
     try:
