@@ -87,12 +87,18 @@ FRAMES = {  # equal to a frame in C order
     "Parquet": from_parquet,
 }
 AT_NIGHT = {"backwards in memory", "CSV", "Fortran", "part of an array", "pickled", "Parquet"}
-IN_SHORT = {"Fortran order", "columns of their own"}  # of cases that are slow
+MADE_OF_OTHERS = {"pipeline", "compensated"}
 
 
 def marked(case, form):
-    is_nightly = form in AT_NIGHT or (CASES[case].is_slow and form not in IN_SHORT)
+    """Of cases that are slow, one form is tried each time."""
+    in_short = "columns of their own" if CASES[case].needs_frames else "Fortran order"
+    is_nightly = form in AT_NIGHT or case in MADE_OF_OTHERS or (CASES[case].is_slow and form != in_short)
     return pytest.param(case, form, id=f"{case}, {form}", marks=[pytest.mark.nightly] * is_nightly)
+
+
+def by_form(forms):
+    return [pytest.param(form, marks=[pytest.mark.nightly] * (form in AT_NIGHT)) for form in forms]
 
 
 def each(forms, needs_frames=False):
@@ -162,7 +168,7 @@ def test_another_process_gives_equal_results():
         assert_same(found[case], of_frames(case))
 
 
-@pytest.mark.parametrize("form", [*FRAMES, "polars"])
+@pytest.mark.parametrize("form", by_form([*FRAMES, "polars"]))
 def test_checks_of_equal_records_find_the_same(form):
     convert = in_polars if form == "polars" else FRAMES[form]
     found, expected = (check_records(*map(one, (T, GAPPED))) for one in (convert, frame_in_rows))
@@ -182,7 +188,7 @@ def residuals():
     return compensator.fit_transform(BOTH), compensator.transform(later.temperatures.join(later.frequencies))
 
 
-COPIES = {"pickled": lambda R: pickle.loads(pickle.dumps(R)), "CSV": from_csv, "array": lambda R: R.to_numpy(copy=True)}
+COPIES = {"loaded": lambda R: pickle.loads(pickle.dumps(R)), "CSV": from_csv, "array": lambda R: R.to_numpy(copy=True)}
 DETECTORS = {
     "Mahalanobis": MahalanobisDetector(),
     "softening": DirectionalDetector(),
@@ -205,7 +211,7 @@ def of_residuals(name):
     return evaluated_residuals(name, lambda R: R)
 
 
-@pytest.mark.parametrize("form", COPIES)
+@pytest.mark.parametrize("form", by_form(COPIES))
 @pytest.mark.parametrize("name", DETECTORS)
 def test_copies_of_residuals_give_equal_results(name, form):
     assert_same(evaluated_residuals(name, COPIES[form]), of_residuals(name))

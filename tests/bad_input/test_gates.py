@@ -43,7 +43,7 @@ VALUES = {  # what is done to values, which are set aside, and what the warning 
 
 
 def chain():
-    inverse = PosteriorInverse(noise=0.01)
+    inverse = PosteriorInverse(prior=0.2, noise=0.01)
     return DataInformedFEM(make_truss(), inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
 
 

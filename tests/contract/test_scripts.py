@@ -12,7 +12,7 @@ import pytest
 from tests.contract.run import run, scripts
 
 KEPT = json.loads(Path(__file__).with_name("results.json").read_text(encoding="utf-8"))
-SLOW = 0.85  # seconds of a processor
+SLOW = 0.55  # seconds of a processor
 
 
 def marked(name):
