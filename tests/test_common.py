@@ -1,9 +1,7 @@
 """scikit-learn's own estimator checks, every expected failure named with its reason."""
 
-import importlib
 import inspect
 import pickle
-import pkgutil
 import re
 from pathlib import Path
 
@@ -22,7 +20,6 @@ from sklearn.pipeline import Pipeline
 from sklearn.svm import OneClassSVM
 from sklearn.utils.estimator_checks import check_estimator
 
-import skthermo
 from skthermo.detection import (
     CompensatedDetector,
     DamageDetector,
@@ -37,6 +34,7 @@ from skthermo.studies import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
 from tests.estimators import CASES, T, assert_same, fitted
+from tests.source import public
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "scikit_learn.rst"
 
@@ -100,9 +98,7 @@ def expected_failures(estimator):
 
 def public_estimators():
     """All classes of estimators that users can name, sorted by name."""
-    rooms = [importlib.import_module(m.name) for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg]
-    public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
-    classes = {thing for thing in public if isinstance(thing, type) and not inspect.isabstract(thing)}
+    classes = {thing for *_, thing in public() if isinstance(thing, type) and not inspect.isabstract(thing)}
     return sorted((one for one in classes if issubclass(one, BaseEstimator)), key=lambda kind: kind.__name__)
 
 

@@ -5,7 +5,6 @@
 
 import importlib
 import inspect
-import pkgutil
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import skthermo
 from tests.bad_input.values import choice, count, flag
+from tests.source import public
 
 FOLDER = Path(tempfile.mkdtemp())
 """Holds the files that examples read and write."""
@@ -93,13 +93,9 @@ def fitted(cls, X, y=None, after=None, usual="", **arguments):
 
 def public_arguments():
     """Name and argument of every public function and constructor, but for those that are not tried."""
-    rooms = [module.name for module in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if module.ispkg]
-    for room in map(importlib.import_module, rooms):
-        for name in getattr(room, "__all__", ()):
-            full = f"{room.__name__.split('.')[-1]}.{name}"
-            if full in NOT_CALLED:
-                continue
-            for argument, parameter in inspect.signature(getattr(room, name)).parameters.items():
-                keyed = parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
-                if keyed and argument not in UNTRIED.get(full, ()):
-                    yield full, argument
+    for room, name, thing in public():
+        full = f"{room}.{name}"
+        for argument, parameter in inspect.signature(thing).parameters.items() if full not in NOT_CALLED else ():
+            keyed = parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
+            if keyed and argument not in UNTRIED.get(full, ()):
+                yield full, argument
