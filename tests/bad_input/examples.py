@@ -14,7 +14,18 @@ from sklearn.linear_model import Ridge
 from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import LocalOutlierFactor
 
-from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
+from skthermo import (
+    datasets,
+    detection,
+    fem,
+    metrics,
+    monitoring,
+    plotting,
+    preprocessing,
+    studies,
+    surrogate,
+    updating,
+)
 from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, Spring, evaluate_modes
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
@@ -1202,6 +1213,10 @@ def chain(model=TRUSS, **parts):
     return surrogate.DataInformedFEM(model, **(PARTS | {"random_state": 0} | parts))
 
 
+def of_seed(seed):
+    return monitoring.fit_fleet({"a": Ridge()}, {"a": (T, F)}, random_state=seed)
+
+
 def means(half_lives, **options):
     return preprocessing.ExponentialMeans(half_lives=half_lives, **options)
 
@@ -1308,6 +1323,8 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("ModeTracker", "too few sensors", lambda: tracker(NAMED | {"sensors": "ab"}), "2 sensors"),
     ("ModeTracker", "unknown sensors", lambda: tracker(OF_SENSORS).transform(POLES | {"sensors": "abc"}), "'z'"),
     ("ModeTracker", "a duration, no stamps", lambda: tracker(REFERENCE, follow="5D").transform(POLES), "Datetime"),
+    ("monitoring.fit_fleet", "a flag as seed", lambda: of_seed(True), "random_state"),
+    ("monitoring.fit_fleet", "a negative seed", lambda: of_seed(-1), "random_state"),
     ("BiasAligner", "scaled by zero", lambda: BiasAligner(method="scale").fit([[1.0], [-1.0]]), "zero"),
     ("BiasAligner", "a mode of NaN", lambda: BiasAligner().fit(F.assign(f3=NAN)), "'f3'"),
     ("BiasAligner", "a model of more modes", lambda: BiasAligner(TRUSS).fit(F[["f1", "f2"]]), "6"),
