@@ -14,20 +14,10 @@ from sklearn.linear_model import Ridge
 from sklearn.model_selection import ShuffleSplit
 from sklearn.neighbors import LocalOutlierFactor
 
-from skthermo import (
-    datasets,
-    detection,
-    fem,
-    metrics,
-    monitoring,
-    plotting,
-    preprocessing,
-    studies,
-    surrogate,
-    updating,
-)
+from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
 from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, Spring, evaluate_modes
+from skthermo.monitoring import fit_fleet
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
 from tests.bad_input.registry import (
     EXAMPLES,
@@ -1214,7 +1204,7 @@ def chain(model=TRUSS, **parts):
 
 
 def of_seed(seed):
-    return monitoring.fit_fleet({"a": Ridge()}, {"a": (T, F)}, random_state=seed)
+    return fit_fleet({"a": Ridge()}, {"a": (T, F)}, random_state=seed)
 
 
 def means(half_lives, **options):
