@@ -475,14 +475,11 @@ use(
     factor=(2.0, FACTORS),
     check=(
         None,
-        {
-            "a matrix": STIFF,
-            "unknown": ({"x": 2.0}, STIFF),
-            "text": ({"k": "2"}, STIFF),
-            "other stiffness": ({"k": 3.0}, STIFF),
-            "NaN inside": ({"k": 2.0}, STIFF * np.nan),
-            "None": ({"k": 2.0}, None),
-        },
+        (
+            {"a matrix": STIFF, "unknown": ({"x": 2.0}, STIFF), "text": ({"k": "2"}, STIFF)}
+            | {"other stiffness": ({"k": 3.0}, STIFF), "NaN inside": ({"k": 2.0}, STIFF * np.nan)}
+            | {"None": ({"k": 2.0}, None)}
+        ),
     ),
 )
 (FOLDER / "tower.sti").write_text("1 1 800.0\n1 2 -400.0\n2 2 400.0\n")
@@ -570,14 +567,10 @@ POLED = {
 }
 POLED |= {
     f"shapes: {c}": POLES | {"shapes": v}
-    for c, v in {
-        "texts": POLES["shapes"].astype(str),
-        "booleans": POLES["shapes"] > 0,
-        "two axes": POLES["shapes"][0],
-        "infinite": POLES["shapes"] * INF,
-        "other sensors": POLES["shapes"][:, :, :2],
-        "text": "x",
-    }.items()
+    for c, v in (
+        {"texts": POLES["shapes"].astype(str), "booleans": POLES["shapes"] > 0, "two axes": POLES["shapes"][0]}
+        | {"infinite": POLES["shapes"] * INF, "other sensors": POLES["shapes"][:, :, :2], "text": "x"}
+    ).items()
 }
 REFERRED = bad(None, "model", True, 3, (REFERENCE[0],), tuple, ()) | {
     f"frequencies: {c}": (v, REFERENCE[1]) for c, v in vector(REFERENCE[0], size=2).items()
