@@ -3,23 +3,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from skthermo.datasets import (
-    kw51_sensors,
-    kw51_structure,
-    load_z24,
-    make_fleet,
-    make_kw51,
-    make_truss,
-    make_truss_campaign,
-    make_z24,
-    steel_modulus,
-    truss_structure,
-)
+from skthermo import datasets
 
 
 def datasets_fleet():
     """Bridges of a fleet: their kinds, and records of one with a softer soil."""
-    fleet = make_fleet(3, random_state=0)
+    fleet = datasets.make_fleet(3, random_state=0)
     bridge = fleet["bridge 001"]
     records = bridge.records(60, damage={"soil": 0.2})
     return {
@@ -33,11 +22,11 @@ def datasets_fleet():
 
 def datasets_kw51_model():
     """The model of the bridge KW51, its sensors, and its calibrated state."""
-    model = make_kw51(["E_arc", "M_a"], n_modes=2)
-    structure = kw51_structure()
+    model = datasets.make_kw51(["E_arc", "M_a"], n_modes=2)
+    structure = datasets.kw51_structure()
     return {
         "frequencies": model.frequencies([[1.0, 1.0], [1.1, 1.0], [1.0, 1.1]]),
-        "sensor": [str(part) for part in structure.dofs[kw51_sensors()["aBD17Az"]]],
+        "sensor": [str(part) for part in structure.dofs[datasets.kw51_sensors()["aBD17Az"]]],
         "dofs": len(structure.dofs),
         "braces": len(structure.groups["braces"]),
     }, {"*": {"rtol": 1e-7}}
@@ -45,23 +34,25 @@ def datasets_kw51_model():
 
 def datasets_truss():
     """The truss of the paper: nominal frequencies, a damaged chord, the modulus of steel."""
-    truss = make_truss()
+    truss = datasets.make_truss()
     return {
         "parameters": list(truss.parameter_names),
         "nominal": truss.frequencies([[1.0] * 4]),
         "SB-50": truss.damaged({"bottom": 0.5}).frequencies([[1.0] * 4]),
-        "modulus": steel_modulus([-10.0, 20.0, 40.0]),
-        "bottom chord": sorted(truss_structure().groups["bottom"], key=int),
-        "degrees of freedom": len(truss_structure().dofs),
+        "modulus": datasets.steel_modulus([-10.0, 20.0, 40.0]),
+        "bottom chord": sorted(datasets.truss_structure().groups["bottom"], key=int),
+        "degrees of freedom": len(datasets.truss_structure().dofs),
     }, {"*": {"rtol": 1e-8}}
 
 
 def datasets_truss_campaign():
     """Records of the truss: the same seed gives the same bits, damage and drift begin where they are asked for."""
-    year = make_truss_campaign(random_state=0)
+    year = datasets.make_truss_campaign(random_state=0)
     chord = {"drift": {"bottom": 0.01}, "damage": {"bottom": 0.12}, "damage_from": "2028-01-01"}
-    f1 = make_truss_campaign(4, **chord, random_state=0).clean_frequencies["f1"]
-    hourly = make_truss_campaign(samples_per_year=48, samples_per_day=24, noise=0.005, correlation=0.5, random_state=1)
+    f1 = datasets.make_truss_campaign(4, **chord, random_state=0).clean_frequencies["f1"]
+    hourly = datasets.make_truss_campaign(
+        samples_per_year=48, samples_per_day=24, noise=0.005, correlation=0.5, random_state=1
+    )
     return {
         "columns": [*year.temperatures, *year.frequencies],
         "stamps": [str(year.temperatures.index[n]) for n in (0, 1, -1)],
@@ -80,7 +71,7 @@ def datasets_z24_file():
     table = pd.DataFrame(rows, columns=["record", "f1", "f2", "f3", "f4", *sensors, "state"])
     with tempfile.TemporaryDirectory() as folder:
         table.to_csv(Path(folder) / "z24.csv", index=False)
-        z24 = load_z24(Path(folder) / "z24.csv")
+        z24 = datasets.load_z24(Path(folder) / "z24.csv")
     return {
         "temperatures": z24.temperatures,
         "frequencies": z24.frequencies,
@@ -91,7 +82,7 @@ def datasets_z24_file():
 
 def datasets_z24_model():
     """The model of the bridge Z24, and a settled pier."""
-    model = make_z24()
+    model = datasets.make_z24()
     return {
         "parameters": list(model.parameter_names),
         "frequencies": model.frequencies([[1.0] * 4]),

@@ -5,20 +5,9 @@ from sklearn.linear_model import Ridge
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 
+from skthermo import studies
 from skthermo.datasets import make_truss, truss_structure
 from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
-from skthermo.studies import (
-    DamagePrior,
-    DetectabilityStudy,
-    ProgressiveDamage,
-    Scenario,
-    UncertainDamage,
-    compare_extensions,
-    detection_task,
-    identify_damage,
-    pod_curve,
-    sweep,
-)
 from skthermo.surrogate import TemperatureMapper
 from tests.contract.truss import campaign, chain, fitted
 
@@ -27,9 +16,11 @@ def studies_compare_extensions():
     """What a further mode would gain."""
     fem, weather = chain(), campaign(1).temperatures
     options = {"n_repeats": 3, "uncertainty": "noise", "random_state": 0}
-    study = DetectabilityStudy(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2, 0.3), ["top"]), **options)
+    study = studies.DetectabilityStudy(
+        fem, MahalanobisDetector(), studies.sweep(fem, (0.1, 0.2, 0.3), ["top"]), **options
+    )
     study.run(weather)
-    table = compare_extensions(study, weather, modes=[6, 8])
+    table = studies.compare_extensions(study, weather, modes=[6, 8])
     return {
         "candidates": sorted(table["candidate"]),
         "now": table["mdd_now"].iloc[:1],
@@ -41,7 +32,7 @@ def studies_detection_task():
     """A detector is tuned by simulated damage in scikit-learn's search, and confirmed in other weather."""
     fem, weather, later = chain(), campaign(1), campaign(2)
     options = {"columns": fem.mode_names_, "n_repeats": 2, "random_state": 0}
-    task = detection_task(fem, weather.temperatures, [{}, {"bottom": 0.2}], **options)
+    task = studies.detection_task(fem, weather.temperatures, [{}, {"bottom": 0.2}], **options)
     grid = {"threshold": ["conformal", "quantile"]}
     search = GridSearchCV(MahalanobisDetector(), grid, cv=task.cv, scoring=task.scoring, refit=False).fit(
         task.X, task.y
@@ -65,7 +56,7 @@ def studies_identify_damage():
     for name, damage in {"bottom": {"bottom": 0.12}, "diagonal": {"diagonal": 0.1}, "healthy": None}.items():
         later = campaign(2, damage=damage)
         T, F = later.temperatures[:90], later.frequencies[:90]
-        found[name] = identify_damage(fem, T, F, groups, random_state=0)
+        found[name] = studies.identify_damage(fem, T, F, groups, random_state=0)
     lowest, highest = found["bottom"].table.loc["bottom", ["ci_low", "ci_high"]]
     results = {name: {"causes": list(one.most_probable)} for name, one in found.items()}
     results |= {
@@ -85,13 +76,17 @@ def studies_identify_other_causes():
     nominal = truss.frequencies([[1.0] * 4])
     stiffer = truss.damaged({"bottom": -0.15}).frequencies([[1.0] * 4]) / nominal
     T, F = later.temperatures[:120], later.frequencies[:120] * stiffer
-    gain = identify_damage(fem, T, F, ["bottom", "top"], stiffening=True, random_state=0)
-    other = identify_damage(fem, T, later.frequencies[:120] * [1, 1, 1, 1, 1, 0.93], ["bottom", "top"], random_state=0)
-    loss = identify_damage(fem, T, F, ["bottom", "top"], prior=DamagePrior(severity=0.2), random_state=0)
+    gain = studies.identify_damage(fem, T, F, ["bottom", "top"], stiffening=True, random_state=0)
+    other = studies.identify_damage(
+        fem, T, later.frequencies[:120] * [1, 1, 1, 1, 1, 0.93], ["bottom", "top"], random_state=0
+    )
+    loss = studies.identify_damage(
+        fem, T, F, ["bottom", "top"], prior=studies.DamagePrior(severity=0.2), random_state=0
+    )
     return {
         "gain": float(gain.table.loc["bottom stiffer", "severity"]),
         "other": [bool(other.probability_other > 0.5), bool(loss.probability_other > 0.5)],
-        "law": DamagePrior(severity=0.3).law,
+        "law": studies.DamagePrior(severity=0.3).law,
     }, {"gain": {"atol": 0.02}}
 
 
@@ -102,7 +97,7 @@ def studies_locate_damage():
     healthy, damaged = (one.frequencies([[1.0] * 4]) for one in (divided, divided.damaged({"two bays": 0.4})))
     F = later.frequencies * damaged / healthy
     T, groups = later.temperatures, ["top", "diagonal"]
-    located = identify_damage(fem, T, F, groups, structure=structure, random_state=0)
+    located = studies.identify_damage(fem, T, F, groups, structure=structure, random_state=0)
     return {
         "members": sorted(located.likely_members()),
         "severity": located.table.loc[["10", "22"], "severity"],
@@ -112,7 +107,10 @@ def studies_locate_damage():
 
 def studies_pod_curve():
     """A curve of detection over severity, with the 90 % severity and its bound."""
-    curves = {log: pod_curve([0.1, 0.2, 0.3, 0.4], [3, 12, 19, 20], [20, 20, 20, 20], log=log) for log in (False, True)}
+    curves = {
+        log: studies.pod_curve([0.1, 0.2, 0.3, 0.4], [3, 12, 19, 20], [20, 20, 20, 20], log=log)
+        for log in (False, True)
+    }
     return {
         "a50": [curve.a50 for curve in curves.values()],
         "a90": [curve.a90 for curve in curves.values()],
@@ -137,7 +135,7 @@ def studies_readme():
         "directions of damage": make_pipeline(regression, DirectionalDetector(fem)),
     }
     damage = [{}, {"bottom": 0.1}, {"top": 0.1}]
-    study = DetectabilityStudy(fem, detectors, damage, n_repeats=5, random_state=0, uncertainty="noise")
+    study = studies.DetectabilityStudy(fem, detectors, damage, n_repeats=5, random_state=0, uncertainty="noise")
     results = study.run(campaign(1).temperatures)
     ranking = study.ranking()
     return {
@@ -152,18 +150,18 @@ def studies_readme():
 
 def studies_scenarios():
     """Kinds of damage: sudden, growing, uncertain, and a series of severities."""
-    crack = ProgressiveDamage("growing crack", {"bottom": 0.2}, onset=2, end=4)
-    settled = UncertainDamage("settled pier", pd.DataFrame({"pier": [0.24, 0.31, 0.28]}))
-    chord = Scenario("lower chord, a fifth", {"bottom": 0.2})
+    crack = studies.ProgressiveDamage("growing crack", {"bottom": 0.2}, onset=2, end=4)
+    settled = studies.UncertainDamage("settled pier", pd.DataFrame({"pier": [0.24, 0.31, 0.28]}))
+    chord = studies.Scenario("lower chord, a fifth", {"bottom": 0.2})
     year = campaign(0, samples_per_year=120)
     fem = fitted(year)
     cracked = fem.simulate(year.temperatures, **crack.changes(year.temperatures)) / fem.predict(year.temperatures)
     return {
         "growth": crack.changes(np.zeros((6, 3)))["damage"]["bottom"],
         "draw": settled.changes(None, repeat=1),
-        "chord": [chord.family, chord.severity, chord.is_healthy, Scenario("healthy").is_healthy],
-        "names": [one.name for one in sweep(make_truss(), (0.1, 0.2), ["bottom", "top"])],
-        "families": [one.family for one in sweep(make_truss(), (-0.1, 0.2), ["bottom"])],
+        "chord": [chord.family, chord.severity, chord.is_healthy, studies.Scenario("healthy").is_healthy],
+        "names": [one.name for one in studies.sweep(make_truss(), (0.1, 0.2), ["bottom", "top"])],
+        "families": [one.family for one in studies.sweep(make_truss(), (-0.1, 0.2), ["bottom"])],
         "falls": cracked["f1"].iloc[[0, 1, 3, 4, 60]].to_numpy(),
     }, {"falls": {"rtol": 2e-3}}
 
@@ -172,8 +170,10 @@ def studies_smallest_damage():
     """How small a loss is found: rates by severity, the smallest damage, a curve."""
     fem, later = chain(), campaign(1)
     detector = make_pipeline(TemperatureCompensator(Ridge(), targets=fem.mode_names_), MahalanobisDetector())
-    scenarios = sweep(fem, (0.05, 0.1, 0.15, 0.2), ["bottom"])
-    study = DetectabilityStudy(fem, {"ridge": detector}, scenarios, n_repeats=4, uncertainty="noise", random_state=0)
+    scenarios = studies.sweep(fem, (0.05, 0.1, 0.15, 0.2), ["bottom"])
+    study = studies.DetectabilityStudy(
+        fem, {"ridge": detector}, scenarios, n_repeats=4, uncertainty="noise", random_state=0
+    )
     results = study.run(later.temperatures)
     smallest = study.minimum_detectable_damage()
     return {
@@ -190,7 +190,7 @@ def studies_uncertainty():
     """Bands that hold the error of the baseline, the weather and the model."""
     fem, later = chain(), campaign(1)
     options = {"n_repeats": 3, "n_replicates": 4, "random_state": 0}
-    study = DetectabilityStudy(fem, MahalanobisDetector(), [{}, {"bottom": 0.3}], **options)
+    study = studies.DetectabilityStudy(fem, MahalanobisDetector(), [{}, {"bottom": 0.3}], **options)
     results = study.run(later.temperatures)
     return {
         "rates": results["rate"],

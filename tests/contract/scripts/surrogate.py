@@ -6,19 +6,10 @@ from sklearn.linear_model import BayesianRidge, LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV, cross_val_score
 from sklearn.pipeline import make_pipeline
 
+from skthermo import surrogate
 from skthermo.datasets import make_truss
 from skthermo.metrics import frequency_scorer, mape
 from skthermo.preprocessing import BiasAligner, BlockedKFold, HingeFeatures, KNNGapImputer
-from skthermo.surrogate import (
-    DataInformedFEM,
-    InverseSurrogate,
-    PosteriorInverse,
-    TemperatureMapper,
-    paper_network,
-    refitted,
-    resampled,
-    with_model,
-)
 from tests.contract.truss import campaign, chain
 
 
@@ -71,7 +62,7 @@ def surrogate_chain_defects():
     T.iloc[10:15, 0] = np.nan
     T.iloc[40:44, 1] = -999.0
     F.iloc[random.choice(365, 6), 2] *= 1.3
-    fem = DataInformedFEM(make_truss(), random_state=0).fit(T, F)
+    fem = surrogate.DataInformedFEM(make_truss(), random_state=0).fit(T, F)
     gaps = later.temperatures.copy()
     gaps.iloc[5, 0] = np.nan
     gaps.iloc[6] = np.nan
@@ -104,10 +95,10 @@ def surrogate_chain_settings():
     T, F = year.temperatures, year.frequencies.copy()
     F.iloc[::20, 1] = np.nan
     truss = make_truss()
-    fem = DataInformedFEM(
+    fem = surrogate.DataInformedFEM(
         truss,
-        inverse=InverseSurrogate(regressor=Ridge(), bounds=0.2, n_samples=200, noise=0.01, random_state=0),
-        mapper=TemperatureMapper(LinearRegression()),
+        inverse=surrogate.InverseSurrogate(regressor=Ridge(), bounds=0.2, n_samples=200, noise=0.01, random_state=0),
+        mapper=surrogate.TemperatureMapper(LinearRegression()),
         aligner=BiasAligner(truss),
         imputer=KNNGapImputer(),
         discrepancy=None,
@@ -128,9 +119,9 @@ def surrogate_chain_variants():
     T = year.temperatures
     arrays = clone(fem).fit(T.to_numpy(), year.frequencies.to_numpy())
     others = {
-        "refitted": refitted(fem, later.temperatures, later.frequencies),
-        "resampled": resampled(fem, random_state=1),
-        "damaged": with_model(fem, make_truss().damaged({"bottom": 0.1})),
+        "refitted": surrogate.refitted(fem, later.temperatures, later.frequencies),
+        "resampled": surrogate.resampled(fem, random_state=1),
+        "damaged": surrogate.with_model(fem, make_truss().damaged({"bottom": 0.1})),
     }
     results = {name: (other.predict(T) / fem.predict(T)).mean() for name, other in others.items()}
     results |= {
@@ -144,7 +135,7 @@ def surrogate_chain_variants():
 def surrogate_grid_search():
     """A chain in scikit-learn's searches: parts by name, folds of weeks, errors of frequencies."""
     year = campaign(0, samples_per_year=120)
-    fem = DataInformedFEM(make_truss(), mapper=TemperatureMapper(Ridge()), random_state=0)
+    fem = surrogate.DataInformedFEM(make_truss(), mapper=surrogate.TemperatureMapper(Ridge()), random_state=0)
     grid = {"mapper__regressor__alpha": [1e-3, 1e6]}
     search = GridSearchCV(fem, grid, cv=BlockedKFold(3), scoring=frequency_scorer, refit="neg_mape")
     search.fit(year.temperatures, year.frequencies)
@@ -158,13 +149,13 @@ def surrogate_grid_search():
 def surrogate_inverse():
     """The paper's inverse, trained on simulations, and the network's layers."""
     model = make_truss()
-    inverse = InverseSurrogate(model, Ridge(1e-6), bounds=0.2, n_samples=400, noise=0.0, random_state=0).fit()
+    inverse = surrogate.InverseSurrogate(model, Ridge(1e-6), bounds=0.2, n_samples=400, noise=0.0, random_state=0).fit()
     theta = np.array([[0.95, 1.05, 0.9, 1.0], [1.1, 1.0, 0.97, 1.0]])
     return {
         "inverted": inverse.transform(model.frequencies(theta))[:, :3],
         "samples": inverse.samples_.theta[:2],
         "bounds": inverse.bounds_,
-        "layers": list(paper_network("kw51-inverse", alpha=0.01).hidden_layer_sizes),
+        "layers": list(surrogate.paper_network("kw51-inverse", alpha=0.01).hidden_layer_sizes),
     }, {"inverted": {"rtol": 0.003}}
 
 
@@ -172,10 +163,12 @@ def surrogate_mapper():
     """Temperature to stiffness by the default regression, by one with a standard deviation, and in a grid search."""
     T = np.linspace(-10, 40, 50)[:, np.newaxis]
     theta = np.exp(-0.004 * T) * np.exp(0.001 * np.random.default_rng(0).normal(size=T.shape))
-    default = TemperatureMapper(random_state=0).fit(T, theta)
-    mean, std = TemperatureMapper(BayesianRidge()).fit(T, theta[:, 0]).predict(T, return_std=True)
+    default = surrogate.TemperatureMapper(random_state=0).fit(T, theta)
+    mean, std = surrogate.TemperatureMapper(BayesianRidge()).fit(T, theta[:, 0]).predict(T, return_std=True)
     search = GridSearchCV(
-        TemperatureMapper(make_pipeline(HingeFeatures(), Ridge())), {"regressor__hingefeatures__n_knots": [1, 4]}, cv=3
+        surrogate.TemperatureMapper(make_pipeline(HingeFeatures(), Ridge())),
+        {"regressor__hingefeatures__n_knots": [1, 4]},
+        cv=3,
     )
     return {
         "default": default.predict([[20.0], [30.0]]),
@@ -190,9 +183,9 @@ def surrogate_posterior_inverse():
     """Stiffness of each record with its standard deviation: prior and noise that the records teach, or given ones."""
     year = campaign()
     model, F = make_truss(), year.frequencies
-    learned = PosteriorInverse(model).fit(F)
+    learned = surrogate.PosteriorInverse(model).fit(F)
     theta, std = learned.transform(F, return_std=True)
-    given = PosteriorInverse(model, prior=0.2, noise=0.01).fit(F)
+    given = surrogate.PosteriorInverse(model, prior=0.2, noise=0.01).fit(F)
     exact = given.transform(model.frequencies([[0.9, 1.1, 0.95, 1.0]]))
     gaps = F[:3].copy()
     gaps.iloc[0, 2], gaps.iloc[1] = float("nan"), float("nan")
