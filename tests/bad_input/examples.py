@@ -19,19 +19,8 @@ from skthermo.detection import CompensatedDetector, MahalanobisDetector, Outlier
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, Spring, evaluate_modes
 from skthermo.monitoring import fit_fleet
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
-from tests.bad_input.registry import (
-    EXAMPLES,
-    FOLDER,
-    LEGAL,
-    NOT_CALLED,
-    UNTRIED,
-    USUAL,
-    Example,
-    fitted,
-    is_registered,
-    methods,
-    use,
-)
+from tests.bad_input import registry
+from tests.bad_input.registry import FOLDER, fitted, is_registered, methods, use
 from tests.bad_input.values import (
     HUGE,
     INF,
@@ -88,7 +77,7 @@ BOUNDED = by_name(0.2, NAMES, wrong=(20, 1.0, 0, -0.2), but=("too long",)) | {
 }
 PRIOR = by_name(0.2, NAMES, wrong=(20, 30))
 NOISE = by_name(0.01, MODES, wrong=(0.5, 1.0, 5), but=("zero inside",))
-USUAL |= {
+registry.USUAL |= {
     "random_state": (0, seed()),
     "model": (TRUSS, models()),
     "dofs": (DOFS, integers(23)),
@@ -667,8 +656,8 @@ use(
     X=(F, INVERTED),
 )
 SHAPED = np.hstack([NOMINAL, evaluate_modes(TRUSS, np.ones((1, 4)), DOFS)[1].swapaxes(1, 2).reshape(1, -1)])
-EXAMPLES.append(
-    Example(
+registry.EXAMPLES.append(
+    registry.Example(
         "surrogate.PosteriorInverse",
         surrogate.PosteriorInverse,
         lambda **a: surrogate.PosteriorInverse(TRUSS, dofs=DOFS, noise=0.01, prior=0.1, **a).fit_transform(SHAPED),
@@ -1457,7 +1446,7 @@ use(
     stamps=("ISO8601", texts() | bad("%d.%m.%Y")),
 )
 
-NOT_CALLED |= {
+registry.NOT_CALLED |= {
     "detection.DamageDetector": "abstract",
     "fem.Element": "a protocol",
     "fem.FEModel": "a protocol",
@@ -1475,7 +1464,7 @@ NOT_CALLED |= {
         f"plotting.{name}": "draws results of others; tables are tried in from_predictions" for name in plotting.__all__
     },
 }
-UNTRIED |= {
+registry.UNTRIED |= {
     "datasets.make_fleet": {"atypical", "kinds"},
     "datasets.make_truss_campaign": {"damage_from", "drift"},
     "detection.OutlierDetector": {"block"},
@@ -1538,4 +1527,6 @@ for argument, callables, causes, reason in [  # bad values that are good for an 
     ("X", "surrogate.InverseSurrogate", [*UNITS, "9999", "a slipped point", "a mode twice"], "only names are read"),
     ("frequencies", "preprocessing.check_records", UNITS, "without a model, any unit is possible"),
 ]:
-    LEGAL.setdefault(argument, {}).update({(cause, name): reason for name in callables.split() for cause in causes})
+    registry.LEGAL.setdefault(argument, {}).update(
+        {(cause, name): reason for name in callables.split() for cause in causes}
+    )
