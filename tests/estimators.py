@@ -47,7 +47,7 @@ MEASURED = F[:5]
 STAMPED = T.join(FEW).set_axis(pd.date_range("2025-01-01", periods=len(T), name="time"))
 NOMINAL, SHAPES = (values[0] for values in TRUSS.modes(np.ones((1, 4))))
 LINEAR = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=50, noise=0.01, random_state=0)
-CHAIN = DataInformedFEM(TRUSS, inverse=LINEAR, mapper=TemperatureMapper(Ridge()), random_state=0)
+CHAIN = DataInformedFEM(TRUSS, inverse=LINEAR, mapper=TemperatureMapper(Ridge()), reduce=True, random_state=0)
 COMPENSATOR = TemperatureCompensator(Ridge(), targets=MODES)
 COMPENSATED = CompensatedDetector(MahalanobisDetector(), Ridge(), targets=MODES)
 PIPELINE = make_pipeline(COMPENSATOR, MahalanobisDetector())
