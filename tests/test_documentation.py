@@ -24,7 +24,7 @@ PACKAGES = [m.name for m in pkgutil.iter_modules(skthermo.__path__) if not m.nam
 ROOMS = [name for name in PACKAGES if importlib.import_module(f"skthermo.{name}").__all__]  # with public names
 README, HOME = ROOT / "README.md", ROOT / "docs" / "index.rst"
 LONG = {  # pages whose code takes seconds
-    "choices.rst", "detection.rst", "estimation.rst", "identify.rst", "many_bridges.rst",
+    "choices.rst", "detection.rst", "estimation.rst", "identify.rst", "in_service.rst", "many_bridges.rst",
     "method.rst", "models.rst", "preparing_records.rst", "quickstart.rst",
     "records_theory.rst", "studies.rst", "three_steps.rst", "validation.rst",
 }  # fmt: skip
@@ -61,6 +61,7 @@ def test_a_pages_code_runs_from_top_to_bottom(page):
     assert run_code(page).keys() > {"__builtins__"}  # it runs without an error, and defines something
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("chains_fitted_once")
 def test_readmes_study_prints_what_is_shown(capsys):
     run_code(README)
