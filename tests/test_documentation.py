@@ -61,7 +61,6 @@ def test_a_pages_code_runs_from_top_to_bottom(page):
     assert run_code(page).keys() > {"__builtins__"}  # it runs without an error, and defines something
 
 
-@pytest.mark.nightly
 @pytest.mark.usefixtures("chains_fitted_once")
 def test_readmes_study_prints_what_is_shown(capsys):
     run_code(README)
