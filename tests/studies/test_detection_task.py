@@ -279,6 +279,14 @@ def test_confirmation_evaluates_fresh_noise_and_weather(fem):
     pd.testing.assert_series_equal(single.loc["CompensatedDetector"], table.loc["single"], check_names=False)
 
 
+def test_who_takes_no_labels_is_named_after_a_search(fem):
+    task = task_of(fem, columns=MODES)
+    forest = IsolationForest(n_estimators=10, random_state=0)
+    search = GridSearchCV(forest, {"max_samples": [50]}, cv=task.cv, scoring=task.scoring).fit(task.X, task.y)
+    with pytest.warns(UserWarning, match="search-refits"):
+        task.refit(search)
+
+
 def test_confirmation_in_the_same_weather_says_so(fem):
     task = task_of(fem, columns=MODES)
     with pytest.warns(UserWarning, match="other-weather"):
