@@ -8,7 +8,7 @@ from skthermo.detection import CompensatedDetector, MahalanobisDetector, Tempera
 from skthermo.studies import DetectabilityStudy
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-WEATHER = LATER.temperatures
+WEATHER = LATER.temperatures[::3]
 SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
 MODES = list(YEAR.frequencies)
 

@@ -123,7 +123,7 @@ def test_impossible_data_are_errors(arguments, message):
 
 
 @pytest.mark.filterwarnings("ignore:.*no-curve")
-@pytest.mark.parametrize("n_records", [20, 200])
+@pytest.mark.parametrize("n_records", [pytest.param(20, marks=pytest.mark.nightly), 200])
 @pytest.mark.parametrize("is_log", [True, False])
 def test_the_bound_of_the_likelier_law_holds_a90_under_either_law(is_log, n_records):
     """95 % asked, of 150 draws of five severities; 92 to 98 % where the law has to be chosen."""
@@ -153,7 +153,8 @@ def warned_share(pod, n_records, n_draws=100):
     return n_warned / n_draws
 
 
-@pytest.mark.parametrize("n_records", [30, 300, 3000])
+@pytest.mark.one_case
+@pytest.mark.parametrize("n_records", [300, 30, 3000])
 def test_a_curve_that_fits_gives_no_warning(n_records):
     assert warned_share(expit(8 + 5 * np.log(SEVERITIES)), n_records) <= 0.01
 
@@ -161,10 +162,10 @@ def test_a_curve_that_fits_gives_no_warning(n_records):
 @pytest.mark.one_case
 @pytest.mark.parametrize("pod", [[0.05, 0.6, 0.65, 0.7, 0.98], [0.3, 0.35, 0.4, 0.97, 0.98]])
 def test_a_curve_beside_its_points_is_said(pod):
-    assert warned_share(pod, 500) >= 0.99
+    assert warned_share(pod, 500, 40) == 1
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.parametrize("log", [False, True])
 def test_bounds_hold_a90_as_often_as_they_say(log):
     random = np.random.RandomState(0)
@@ -188,7 +189,7 @@ def decisions(random, rate, correlation, n_repeats, n_records):
 
 
 @pytest.mark.one_case
-@pytest.mark.parametrize(("n_repeats", "correlation", "rate"), [(20, 0.8, 0.02), (3, 0.5, 0.95), (1, 0.8, 0.3)])
+@pytest.mark.parametrize(("n_repeats", "correlation", "rate"), [(3, 0.5, 0.95), (20, 0.8, 0.02), (1, 0.8, 0.3)])
 def test_bounds_hold_the_rate_as_often_as_they_say(n_repeats, correlation, rate):
     random, held = np.random.RandomState(0), []
     for _ in range(150):

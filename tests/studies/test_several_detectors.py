@@ -13,8 +13,9 @@ from sklearn.exceptions import ConvergenceWarning
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.exceptions import RecordsWarning
 from skthermo.studies import DetectabilityStudy, Scenario
-from tests.studies.studies import SIDE_BY_SIDE, WEATHER, compensated, study_of
+from tests.studies.studies import LATER, SIDE_BY_SIDE, compensated, study_of
 
+WEATHER = LATER.temperatures
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
 
 
