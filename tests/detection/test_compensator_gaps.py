@@ -33,13 +33,8 @@ from tests.detection.compensated import (
 # The chain's linear inverse scatters with the noise, and folds of few records predict weather not seen.
 pytestmark = [
     pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)"),
-    pytest.mark.filterwarnings("ignore:.*other-weather"),
 ]
-
-
 TREES = HistGradientBoostingRegressor(max_iter=5)
-
-
 SHUFFLED = KFold(3, shuffle=True, random_state=0)
 
 
@@ -87,29 +82,20 @@ def test_the_data_informed_model_gets_every_row_and_shares_its_fe_model(bare):
     assert np.nanmedian(excess) < 1e-9
 
 
-def test_a_missing_target_is_missing_in_its_own_residual_only():
-    holed = with_gaps(["f2"], [3, 50])
-    fitted = compensator().fit(holed)
-    for residuals in (fitted.transform(holed), fitted.fit_transform(holed)):
-        np.testing.assert_array_equal(np.argwhere(residuals.isna()), [[3, 1], [50, 1]])
-
-
 @pytest.mark.one_case
 @pytest.mark.parametrize("estimator", [KNeighborsRegressor(3), make_pipeline(StandardScaler(), Ridge())], ids=str)
-def test_every_target_learns_from_the_rows_that_have_it(estimator):
-    holed = with_gaps(["f2"], [3, 50])
-    residuals = compensator(estimator).fit(holed).transform(X)
-    others = [mode for mode in MODES if mode != "f2"]
+def test_every_target_learns_from_the_rows_that_have_it_and_is_missing_alone(estimator):
+    holed, fitted, others = with_gaps(["f2"], [3, 50]), compensator(estimator), ["f1", *MODES[2:]]
+    np.testing.assert_array_equal(np.argwhere(fitted.fit_transform(holed).isna()), [[3, 1], [50, 1]])
+    np.testing.assert_array_equal(np.argwhere(fitted.transform(holed).isna()), [[3, 1], [50, 1]])
+    residuals = fitted.transform(X)
     np.testing.assert_allclose(residuals[others], compensator(estimator).fit(X).transform(X)[others], atol=1e-9)
     alone = compensator(estimator, targets=["f2"]).fit(T.join(holed[["f2"]])).transform(T.join(F[["f2"]]))
     np.testing.assert_allclose(residuals[["f2"]], alone, atol=1e-9)
-
-
-def test_targets_that_are_never_there_together_are_compensated():
-    holed = with_gaps(["f1", "f2"], slice(0, 200, 2))
-    holed.iloc[1::2, holed.columns.get_indexer(["f3", "f4", "f5", "f6"])] = np.nan
-    residuals = compensator().fit_transform(holed)
-    np.testing.assert_array_equal(residuals.isna(), holed[MODES].isna())
+    never_together = X.copy()
+    never_together.iloc[::2, POSITIONS[1]], never_together.loc[X.index[1::2], others] = np.nan, np.nan
+    residuals = compensator(estimator).fit_transform(never_together)
+    pd.testing.assert_frame_equal(residuals.isna(), never_together[MODES].isna())
 
 
 EMPTY = "ignore:.*not-evaluated"
@@ -128,11 +114,8 @@ def test_a_fold_without_a_temperature_is_missing():
     "estimator",
     [
         Ridge(),
-        RandomForestRegressor(5, random_state=0),
         MultiOutputRegressor(TREES),
         GridSearchCV(RandomForestRegressor(random_state=0), {"n_estimators": [2, 3]}, cv=2),
-        make_pipeline(StandardScaler(), Ridge()),
-        make_pipeline("passthrough", SimpleImputer(), Ridge()),
         make_pipeline(StandardScaler(), KNNGapImputer(), PolynomialFeatures(2), LinearRegression()),
         TransformedTargetRegressor(make_pipeline(SimpleImputer(), Ridge()), transformer=StandardScaler()),
     ],
@@ -217,7 +200,6 @@ def test_numbers_for_missing_values_are_set_aside_and_warned_of_at_the_users_lin
         (201, "201 folds of 200 rows"),
         (1, "'cv' parameter"),
         ([1, 2], r"cv holds 1 as its element 0; expected a number of folds, a splitter, or pairs of training and te"),
-        ([(np.arange(100), np.arange(100, 300))], r"element 0; .* positions from 0 to 199"),
         ([(np.arange(200) < 100, np.arange(200) >= 100)], r"element 0; .* positions from 0 to 199"),
         ("five", "'cv' parameter"),
     ],
@@ -228,16 +210,7 @@ def test_folds_that_do_not_partition_the_rows_are_refused(cv, message):
         compensator(cv=cv).fit_transform(X)
 
 
-@pytest.mark.one_case
-@pytest.mark.parametrize(
-    ("estimator", "holed", "message"),
-    [
-        (Ridge(), with_gaps(["f1"], slice(1, None)), "that target and every other column for Ridge"),
-        (RandomForestRegressor(), with_gaps(["f1"], slice(1, None)), "that target and every other column"),
-    ],
-    ids=["targets of a fold", "targets"],
-)
-def test_no_row_to_learn_from_is_said(estimator, holed, message):
-    said = rf"'f1' has none of [0-9]+ rows to learn from, of all or in a fold; expected rows with {message}"
+def test_no_row_to_learn_from_is_said():
+    said = r"'f1' has none of [0-9]+ rows to learn from, of all or in a fold; expected rows with that target"
     with pytest.raises(ValueError, match=said):
-        compensator(estimator).fit_transform(holed)
+        compensator(Ridge()).fit_transform(with_gaps(["f1"], slice(1, None)))
