@@ -14,6 +14,7 @@ from sklearn.preprocessing import StandardScaler
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.preprocessing import BlockedKFold
+from skthermo.surrogate import TemperatureMapper
 from tests.detection.compensated import (
     MODES,
     POSITIONS,
@@ -53,6 +54,21 @@ def test_responses_that_may_be_zero_have_residuals_in_their_own_unit():
     assert fitted.relative_.tolist() == [False] + [True] * 5
     expected = KNeighborsRegressor(3).fit(T, strain[MODES]).predict(T)
     np.testing.assert_allclose(fitted.transform(strain)["f1"], strain["f1"] - expected[:, 0], atol=1e-12)
+
+
+def test_damping_ratios_are_compensated_beside_frequencies():
+    """They fall by 14 % with every ten degrees and scatter by 15 %."""
+    random, names = np.random.default_rng(0), [f"xi{mode}" for mode in range(1, 7)]
+    ratios = np.exp(-0.15 * T[["T2"]].to_numpy() / 10 + 0.15 * random.standard_normal(F.shape)) * 0.008
+    damping = pd.DataFrame(ratios, X.index, names)
+    residuals = compensator(TemperatureMapper(LinearRegression()), targets=MODES + names).fit_transform(X.join(damping))
+    assert list(residuals) == MODES + names
+    assert (damping.corrwith(T["T2"]) < -0.4).all()
+    assert (residuals[names].corrwith(T["T2"]).abs() < 0.1).all()
+    damping.iloc[::5, 0], damping.iloc[3, 5] = np.nan, -0.001  # modes are lost, and ratios just below zero happen
+    residuals = compensator(TemperatureMapper(LinearRegression()), targets=MODES + names).fit_transform(X.join(damping))
+    pd.testing.assert_frame_equal(residuals.isna(), F.join(damping).isna())
+    assert np.isfinite(MahalanobisDetector().fit(residuals).damage_index(residuals)).all()
 
 
 def test_a_larger_fall_is_never_a_smaller_residual():

@@ -8,7 +8,7 @@ from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import LinearRegression
 from sklearn.mixture import GaussianMixture
 from sklearn.model_selection import GridSearchCV
-from sklearn.neighbors import KernelDensity, KNeighborsRegressor
+from sklearn.neighbors import KernelDensity
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
@@ -18,7 +18,6 @@ from skthermo.detection import (
     OutlierDetector,
     TemperatureCompensator,
 )
-from skthermo.preprocessing import BlockedKFold
 
 pytestmark = [  # folds of few records predict weather not seen, and raw frequencies follow the season
     pytest.mark.filterwarnings("ignore:.*other-weather"),
@@ -75,18 +74,6 @@ def test_a_pipeline_a_whole_detector_and_its_compensator_score_alike():
     behind = pipeline().fit(X)
     assert whole.score(HOLED) == pytest.approx(behind.score(HOLED), rel=1e-9)
     assert behind[0].score(HOLED) == pytest.approx(behind.score(HOLED), rel=1e-3)
-
-
-@pytest.mark.nightly
-def test_a_search_without_damage_chooses_what_predicts_best():
-    grid = {"temperaturecompensator__estimator__n_neighbors": [1, 15]}
-    search = GridSearchCV(pipeline(KNeighborsRegressor()), grid, cv=BlockedKFold(3)).fit(X)
-    assert search.best_params_ == {"temperaturecompensator__estimator__n_neighbors": 15}
-    assert search.score(NEW) == search.best_estimator_.score(NEW)
-    alone = GridSearchCV(compensator(KNeighborsRegressor()), {"estimator__n_neighbors": [1, 15]}, cv=BlockedKFold(3))
-    np.testing.assert_allclose(
-        alone.fit(X).cv_results_["mean_test_score"], search.cv_results_["mean_test_score"], rtol=1e-6
-    )
 
 
 def test_rows_that_nothing_predicts_are_not_scored():

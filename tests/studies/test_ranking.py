@@ -104,19 +104,6 @@ def test_equal_false_alarms_move_the_threshold_on_the_calibration_records(study,
         assert table.loc[name, "pod_at_equal_pfa"] == pytest.approx(pod)
 
 
-@pytest.mark.nightly
-def test_a_moved_threshold_gives_the_asked_rate_on_fresh_records(fem, study):
-    for name in ("raw", "loud", "dice"):
-        calibration = np.sort(study.calibration_[name, SIMULATED].ravel())
-        threshold = calibration[int(0.02 * calibration.size)]
-        seeds = range(100, 120)
-        fresh = [fem.simulate(WEATHER, noise="fitted", random_state=seed) for seed in seeds]
-        alarms = sum((study.detectors_[name].decision_function(records) < threshold).sum() for records in fresh)
-        # The threshold scatters as a rate of its own number of records, which are fewer.
-        spread = np.sqrt(0.02 * 0.98 * (1 / calibration.size + 1 / (len(WEATHER) * len(seeds))))
-        assert alarms / (len(WEATHER) * len(seeds)) == pytest.approx(0.02, abs=3 * spread)
-
-
 def test_differences_of_the_rates_have_t_intervals_over_the_repeats(study, table):
     shares = {name: np.mean([(d < 0).mean(axis=1) for d in damaged(study, name)], axis=0) for name in table.index[:-1]}
     for name in table.index[1:-1]:

@@ -6,13 +6,11 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.ensemble import IsolationForest
 
-from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import MahalanobisDetector, OutlierDetector
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import MahalanobisDetector
 from skthermo.metrics import probability_of_detection, time_to_detection
 from skthermo.studies import ProgressiveDamage, Scenario, detection_task, sweep
-from skthermo.surrogate import DataInformedFEM
 from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, WITHIN, YEAR, compensated, study_of
 from tests.surrogate.chains import chain
 
@@ -170,25 +168,6 @@ def test_without_a_slope_damage_is_bracketed(fem, severities, group, bracket):
     found = study.minimum_detectable_damage(method="curve").iloc[0]
     assert np.isnan(found["mdd"])
     assert (found["ci_low"], found["ci_high"]) == bracket
-
-
-@pytest.mark.nightly
-def test_records_that_cannot_be_evaluated_do_not_count():
-    frequencies = YEAR.frequencies.copy()
-    frequencies.iloc[::3, :3] = np.nan
-    frequencies.iloc[::5] = np.nan
-    gappy = DataInformedFEM(make_truss(), random_state=0).fit(YEAR.temperatures, frequencies)
-    weather = WEATHER.copy()
-    weather.iloc[5:15] = np.nan
-    detector = OutlierDetector(IsolationForest())
-    study = study_of(gappy, detector, [Scenario("healthy")])
-    with pytest.warns(UserWarning, match="without any temperature .*not-evaluated") as caught:
-        results = study.run(weather)
-    assert len(caught) == 1
-    n_records, n_not_evaluated = results.loc[0, ["n_records", "n_not_evaluated"]]
-    assert 0.4 * 730 < n_records < 0.75 * 730
-    assert n_records + n_not_evaluated == 730
-    assert study.indices_["OutlierDetector", "healthy", "simulated"].iloc[5:15].isna().all()
 
 
 @pytest.mark.parametrize(
