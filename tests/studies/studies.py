@@ -32,3 +32,10 @@ def study_of(fem, detectors, scenarios, **options):
     """A study of two repeats with the noise alone, unless asked otherwise."""
     options = {"n_repeats": 2, "random_state": 0, "uncertainty": "noise"} | options
     return DetectabilityStudy(fem, detectors, scenarios, **options)
+
+
+def ran(fem, scenarios, detectors=None, T=WEATHER, **options):
+    """Such a study, of the distance alone unless others are named, that has been run."""
+    study = study_of(fem, MahalanobisDetector() if detectors is None else detectors, scenarios, **options)
+    study.run(T)
+    return study

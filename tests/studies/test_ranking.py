@@ -10,7 +10,7 @@ from sklearn.metrics import roc_auc_score
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
-from tests.studies.studies import WEATHER, compensated, study_of
+from tests.studies.studies import WEATHER, compensated, ran, study_of
 
 SIMULATED = "simulated"
 
@@ -49,8 +49,7 @@ def detectors():
 @pytest.fixture(scope="module")
 def study(fem):
     scenarios = [*sweep(fem, (0.1, 0.2), ["bottom"]), ProgressiveDamage("crack", {"top": 0.3}, 33, 100)]
-    study = study_of(fem, detectors(), scenarios, n_repeats=8)
-    study.run(WEATHER)
+    study = ran(fem, scenarios, detectors(), n_repeats=8)
     return study
 
 
@@ -180,8 +179,7 @@ def test_a_detector_whose_decisions_never_vary_is_significantly_worse(fem):
             return np.ones(len(X))
 
     some = {"deaf": Deaf(), "raw": MahalanobisDetector()}
-    study = study_of(fem, some, [{}, {"top": 0.2}], n_repeats=4)
-    study.run(WEATHER)
+    study = ran(fem, [{}, {"top": 0.2}], some, n_repeats=4)
     table = study.ranking()
     assert table.loc["deaf", ["significantly_worse", "pod"]].tolist() == [True, 0.0]
     assert table.loc["deaf", "pod_deficit_ci_low"] > 0

@@ -13,7 +13,7 @@ from sklearn.exceptions import ConvergenceWarning
 from skthermo.detection import MahalanobisDetector, OutlierDetector
 from skthermo.exceptions import RecordsWarning
 from skthermo.studies import DetectabilityStudy, Scenario
-from tests.studies.studies import LATER, SIDE_BY_SIDE, compensated, study_of
+from tests.studies.studies import LATER, SIDE_BY_SIDE, compensated, ran, study_of
 
 WEATHER = LATER.temperatures
 SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
@@ -52,8 +52,7 @@ class Trouble(OutlierMixin, BaseEstimator):
 
 @pytest.fixture(scope="module")
 def study(fem):
-    study = study_of(fem, detectors(), SCENARIOS, n_repeats=3)
-    study.run(WEATHER)
+    study = ran(fem, SCENARIOS, detectors(), WEATHER, n_repeats=3)
     return study
 
 

@@ -10,8 +10,19 @@ import pytest
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.metrics import probability_of_detection, time_to_detection
-from skthermo.studies import ProgressiveDamage, Scenario, detection_task, sweep
-from tests.studies.studies import MODES, SIDE_BY_SIDE, WEATHER, WITHIN, YEAR, compensated, study_of
+from skthermo.studies import ProgressiveDamage, Scenario, compare_extensions, detection_task, sweep
+from tests.studies.studies import (
+    LATER,
+    MODES,
+    SIDE_BY_SIDE,
+    WEATHER,
+    WITHIN,
+    YEAR,
+    compensated,
+    ran,
+    study_of,
+    windowed,
+)
 from tests.surrogate.chains import chain
 
 ONLY = "MahalanobisDetector"  # name of the only detector of a study
@@ -47,8 +58,7 @@ def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
     decisions = study.decisions_[ONLY, "one", "simulated"]
     assert one.n_alarms == (decisions < 0).sum()
     assert all((first != second).mean() > 0.95 for first, second in combinations(decisions, 2))
-    fewer = study_of(fem, MahalanobisDetector(), scenarios)
-    fewer.run(WEATHER)
+    fewer = ran(fem, scenarios)
     np.testing.assert_array_equal(fewer.decisions_[ONLY, "one", "simulated"], decisions[:2])
 
 
@@ -121,7 +131,9 @@ def test_progressive_damage_counts_from_its_onset(fem):
         ProgressiveDamage("by number", {"top": 0.4}, 20, 81),
     ]
     study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01)
-    results = study.run(WEATHER).drop(columns=["scenario", "pi_low", "pi_high"])  # one repeat has no band
+    results = study.run(WEATHER)
+    assert results[["pi_low", "pi_high"]].isna().all(axis=None)  # one repeat has no band
+    results = results.drop(columns=["scenario", "pi_low", "pi_high"])
     by_time, by_number = results.itertuples(index=False)
     assert by_time == by_number
     index = study.indices_[ONLY, "by time", "simulated"]
@@ -141,21 +153,53 @@ def test_changes_that_are_no_damage_can_be_detected_too(fem):
     assert (results["rate"] > 0.2).all()
 
 
-def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
-    scenarios = sweep(fem, (0.1, 0.2, 0.3), ["bottom", "top"])
+@pytest.fixture(scope="module")
+def swept(fem):
+    """A study of damage, of strengthening, and of damage that is too small to be found."""
+    found = [*sweep(fem, (-0.3, -0.2, -0.1, 0.1, 0.2, 0.3), ["bottom"]), *sweep(fem, (0.1, 0.2, 0.3), ["top"])[1:]]
+    scenarios = [*found, *sweep(fem, (0.001, 0.002), ["vertical"])[1:]]
     study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=5)
-    rates = study.run(WEATHER, confidence=0.9).set_index("scenario")["rate"]
-    grid, curve = (study.minimum_detectable_damage(method=method) for method in ("grid", "curve"))
+    study.run(WEATHER, confidence=0.9)
+    return study
+
+
+def smallest_of(study):
+    """The smallest detectable damage by grid and by curve."""
+    grid = study.minimum_detectable_damage()
+    with pytest.warns(UserWarning, match="'vertical'.*outliers.*no-curve"):
+        return grid, study.minimum_detectable_damage(method="curve")
+
+
+def test_smallest_detectable_damage_by_grid_and_by_curve(fem, swept):
+    rates, (grid, curve) = swept.results_.set_index("scenario")["rate"], smallest_of(swept)
     for group in ("bottom", "top"):
         smallest = next(s for s in (0.1, 0.2, 0.3) if rates[f"{group} {100 * s:g} %"] >= 0.9)
         assert grid.loc[(group, "simulated"), "mdd"] == smallest
         found = curve.loc[(group, "simulated")]
         assert smallest - 0.1 < found["mdd"] < smallest
         assert found["ci_low"] < found["mdd"] < found["ci_high"]
-        fitted = study.pod_curve(group)
+        fitted = swept.pod_curve(group)
         assert found["mdd"] == fitted.a90
         assert found["ci_high"] == fitted.a90_95  # two-sided 90 % bounds
-    assert np.isnan(study.minimum_detectable_damage(level=0.999).loc[("top", "simulated"), "mdd"])
+    assert np.isnan(swept.minimum_detectable_damage(level=0.999).loc[("top", "simulated"), "mdd"])
+    alone = study_of(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2, 0.3), ["bottom"]), n_repeats=5)
+    alone.run(WEATHER, confidence=0.9)
+    for method, found in (("grid", grid), ("curve", curve)):
+        found = found["mdd"].droplevel("source")
+        assert found.index.tolist() == ["bottom strengthened", "bottom", "top", "vertical"]
+        assert -0.4 < found["bottom strengthened"] < 0 < found["bottom"] < 0.4
+        assert found["bottom"] == pytest.approx(alone.minimum_detectable_damage(method=method)["mdd"].iloc[0])
+
+
+def test_a_family_that_is_not_found_leaves_the_others_their_curves(fem, swept):
+    assert [swept.is_undetected(family) for family in ("bottom", "vertical")] == [False, True]
+    unknown = smallest_of(swept)[1].loc[("vertical", "simulated")]
+    assert (np.isnan(unknown["mdd"]), unknown["ci_low"], np.isnan(unknown["ci_high"])) == (True, 0.002, True)
+    few = [*sweep(fem, (0.1, 0.2), ["bottom"]), *sweep(fem, (0.001, 0.002), ["vertical"])[1:]]
+    study = ran(fem, few)
+    table = compare_extensions(study, WEATHER, modes=[], baseline_factors=(2,)).set_index("family")
+    assert np.isfinite(table["gain"]["bottom"])
+    assert np.isnan(table["gain"]["vertical"])
 
 
 @pytest.mark.parametrize(
@@ -163,8 +207,7 @@ def test_smallest_detectable_damage_by_grid_and_by_curve(fem):
 )
 @pytest.mark.filterwarnings("ignore:.*no-curve")
 def test_without_a_slope_damage_is_bracketed(fem, severities, group, bracket):
-    study = study_of(fem, MahalanobisDetector(), sweep(fem, severities, [group]))
-    study.run(WEATHER)
+    study = ran(fem, sweep(fem, severities, [group]))
     found = study.minimum_detectable_damage(method="curve").iloc[0]
     assert np.isnan(found["mdd"])
     assert (found["ci_low"], found["ci_high"]) == bracket
@@ -246,15 +289,15 @@ def test_a_detector_sees_temperatures_with_their_gaps(in_service):
 
 def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
     scenarios, numbers = sweep(fem, (0.1, 0.2), ["bottom"]), []
-    for tol, uncertainty in ((0.2, "weather"), (0.04, "weather"), (0.001, "noise")):
+    for tol, uncertainty in ((0.2, "weather"), (0.06, "noise"), (0.001, "noise")):
         options = {"uncertainty": uncertainty, "n_replicates": 2}
         study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol, **options)
-        results = study.run(WEATHER)
+        results = study.run(WEATHER[::3])
         (number,) = results["n_repeats"].unique()
         numbers.append(number)
         if number < 20:
             assert (results["ci_high"] - results["ci_low"]).max() / 2 < 1.15 * tol
-            fixed = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=int(number), **options).run(WEATHER)
+            fixed = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=int(number), **options).run(WEATHER[::3])
             pd.testing.assert_frame_equal(results, fixed)
     assert numbers == sorted(numbers)
     assert (numbers[0], numbers[-1]) == (3, 20)
@@ -262,3 +305,42 @@ def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
         study_of(fem, MahalanobisDetector(), scenarios, n_repeats="many").run(WEATHER)
     with pytest.raises(ValueError, match="tol"):
         study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=0.0).run(WEATHER)
+
+
+# Studies of which little can be said
+
+
+def test_a_baseline_in_other_units_gives_false_alarms_that_are_said(fem):
+    wrong = study_of(fem, MahalanobisDetector(), [Scenario("healthy")])
+    with pytest.warns(UserWarning, match="100% .*'healthy'.*many-false-alarms"):
+        wrong.run(WEATHER, YEAR.frequencies * 2 * np.pi)
+    assert any("many-false-alarms" in text for text in wrong.warnings_)
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_weather_by_a_longer_step_than_the_baselines_leaves_windows_without_values(fem, is_named):
+    thinned = WEATHER[:30] if is_named else LATER.temperatures[:2]
+    with pytest.raises(ValueError, match=r"none of .* can be evaluated") as raised:
+        study_of(fem, windowed("5D"), [Scenario("healthy")], n_repeats=1).run(thinned)
+    assert ("every 3 days, records of the baseline every 1 day" in str(raised.value)) == is_named
+
+
+def test_a_blind_detector_is_said_to_be_blind(fem):
+    blind = study_of(fem, MahalanobisDetector(), sweep(fem, (0.05, 0.1), ["bottom"]))
+    results = blind.run(WEATHER)
+    for rate in (results["rate"][0], 0.0):
+        results["rate"] = rate
+        with pytest.warns(UserWarning, match="outliers of the baseline raise the threshold.*no-curve") as caught:
+            minimum = blind.minimum_detectable_damage(method="curve")
+        assert len(caught) == 1
+        assert minimum["mdd"].isna().all()
+
+
+def test_errors_name_the_family_with_damage_and_strengthening(fem):
+    mixed = study_of(
+        fem, MahalanobisDetector(), [Scenario(f"bottom {severity}", {"bottom": severity}) for severity in (-0.1, 0.2)]
+    )
+    mixed.run(WEATHER)
+    for ask in (mixed.minimum_detectable_damage, lambda: mixed.pod_curve("bottom")):
+        with pytest.raises(ValueError, match=r"family 'bottom': severities are \[-0.1, 0.2\]"):
+            ask()
