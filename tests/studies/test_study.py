@@ -64,7 +64,7 @@ def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
 
 def test_without_a_baseline_the_detector_learns_what_the_chain_has_learned(fem):
     for detector, baseline in ((MahalanobisDetector(), YEAR.frequencies), (compensated(), SIDE_BY_SIDE)):
-        study = study_of(fem, detector, [{"top": 0.2}], n_repeats=1)
+        study = study_of(fem, detector, [{"top": 0.2}], n_repeats=1, noise=0.01)
         pd.testing.assert_frame_equal(study.run(WEATHER), study.run(WEATHER, baseline))
 
 
@@ -101,9 +101,9 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
     frequencies = measured.frequencies.mask(np.random.RandomState(0).uniform(size=(730, 6)) < 0.1)
     frequencies.iloc[10:30] = np.nan
     side_by_side = measured.temperatures.join(frequencies)
-    scenarios = sweep(fem, (0.3,), ["top"])
+    scenarios = [{"top": 0.3}]
     for detector, records in ((MahalanobisDetector(), frequencies), (compensated(), side_by_side)):
-        study = study_of(fem, detector, scenarios)
+        study = study_of(fem, detector, scenarios, n_repeats=1, noise=0.01)
         results = study.run(WEATHER, reference={"top 30 %": records}).set_index(["scenario", "source"])
         row = results.loc[("top 30 %", "reference")]
         decision = study.detectors_[study.detector_name()].decision_function(records)
@@ -116,7 +116,7 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
 
 
 def test_a_reference_on_the_same_rows_takes_their_temperatures(fem):
-    study = study_of(fem, compensated(), sweep(fem, (0.3,), ["top"]), n_repeats=1)
+    study = study_of(fem, compensated(), [{"top": 0.3}], n_repeats=1, noise=0.01)
     damaged = make_truss_campaign(damage={"top": 0.3}, random_state=1)
     T, F = damaged.temperatures[::3], damaged.frequencies[::3]
     alone = study.run(WEATHER, reference={"top 30 %": F})
@@ -289,15 +289,15 @@ def test_a_detector_sees_temperatures_with_their_gaps(in_service):
 
 def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
     scenarios, numbers = sweep(fem, (0.1, 0.2), ["bottom"]), []
-    for tol, uncertainty in ((0.2, "weather"), (0.06, "noise"), (0.001, "noise")):
-        options = {"uncertainty": uncertainty, "n_replicates": 2}
+    for tol, uncertainty in ((0.2, "weather"), (0.04, "noise"), (0.001, "noise")):
+        options = {"uncertainty": uncertainty, "n_replicates": 2, "noise": 0.01}
         study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol, **options)
-        results = study.run(WEATHER[::3])
+        results = study.run(WEATHER)
         (number,) = results["n_repeats"].unique()
         numbers.append(number)
         if number < 20:
             assert (results["ci_high"] - results["ci_low"]).max() / 2 < 1.15 * tol
-            fixed = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=int(number), **options).run(WEATHER[::3])
+            fixed = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=int(number), **options).run(WEATHER)
             pd.testing.assert_frame_equal(results, fixed)
     assert numbers == sorted(numbers)
     assert (numbers[0], numbers[-1]) == (3, 20)
