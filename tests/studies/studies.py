@@ -29,8 +29,8 @@ def windowed(window=None, regression=None, targets=MODES, **options):
 
 
 def study_of(fem, detectors, scenarios, **options):
-    """A study of two repeats with the noise alone, unless asked otherwise."""
-    options = {"n_repeats": 2, "random_state": 0, "uncertainty": "noise"} | options
+    """A study of two repeats with 1 % of noise alone, unless asked otherwise."""
+    options = {"n_repeats": 2, "random_state": 0, "noise": 0.01, "uncertainty": "noise"} | options
     return DetectabilityStudy(fem, detectors, scenarios, **options)
 
 

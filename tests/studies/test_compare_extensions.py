@@ -19,7 +19,7 @@ NO_OTHERS = {"modes": (), "baseline_factors": ()}
 @pytest.fixture(scope="module")
 def study(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
-    study = ran(fem, scenarios, n_repeats=6, noise=0.01)
+    study = ran(fem, scenarios, n_repeats=6)
     return study
 
 
@@ -67,7 +67,7 @@ def test_the_recommended_mode_gains_as_much_in_true_records(table):
 @pytest.mark.filterwarnings("ignore:.*few-records")  # without T3, residuals follow the season
 def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
     known = YEAR.temperatures[["T1", "T2"]]
-    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01)
+    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300)
     fem = DataInformedFEM(make_truss(), inverse=inverse, random_state=0).fit(known, YEAR.frequencies)
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
     study = study_of(fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]))
@@ -127,7 +127,7 @@ def test_a_model_without_other_modes_has_only_longer_baselines(fem):
     model = CallableModel(truss.frequencies, truss.parameter_names, 6)
     chain = DataInformedFEM(model, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
     scenarios = [Scenario(f"soft {s}", parameters={"top": 1 - s}, family="top", severity=s) for s in (0.2, 0.3, 0.4)]
-    study = study_of(chain, MahalanobisDetector(), scenarios, noise=0.01)
+    study = study_of(chain, MahalanobisDetector(), scenarios)
     study.run(WEATHER)
     assert compare_extensions(study, WEATHER)["kind"].tolist() == ["baseline"]
     with pytest.raises(ValueError, match="has no method 'with_modes'"):

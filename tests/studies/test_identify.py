@@ -365,7 +365,8 @@ def test_gaps_outliers_and_what_has_just_begun_are_counted(fem):
 @pytest.mark.filterwarnings("ignore:.*few-records")
 def test_one_record_says_less_than_many(fem):
     record = simulated(fem, {"diagonal": 0.4})
-    one, many = (identify_damage(fem, WEATHER[:n], record[:n], GROUPS, random_state=0) for n in (1, 73))
+    groups = ["top", "diagonal"]
+    one, many = (identify_damage(fem, WEATHER[:n], record[:n], groups, random_state=0) for n in (1, 73))
     assert one.most_probable == many.most_probable == ("diagonal",)
     assert one.table.loc["diagonal", "standard_error"] > many.table.loc["diagonal", "standard_error"]
 
@@ -387,10 +388,10 @@ def test_records_in_foreign_weather_are_not_compared(fem, healthy):
     foreign.iloc[:5] += 60
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = identify_damage(fem, foreign, F, GROUPS, random_state=0)
+        found = identify_damage(fem, foreign, F, "top", random_state=0)
     assert sorted(one.message.kind for one in caught) == ["not-evaluated", "other-weather"]
     assert {one.filename for one in caught} == {__file__}
-    expected = identify_damage(fem, WEATHER[5:], F[5:], GROUPS, random_state=0)
+    expected = identify_damage(fem, WEATHER[5:], F[5:], "top", random_state=0)
     pd.testing.assert_series_equal(found.severities, expected.severities, atol=1e-3)
     with pytest.raises(ValueError, match=r"none of 73\srecords can be compared .*: 73 in weather far outside"):
         identify_damage(fem, WEATHER + 60, F, GROUPS)
@@ -474,10 +475,9 @@ def test_bad_records(fem, healthy):
     zero = F.copy()
     zero.iloc[3, 2] = 0.0
     with pytest.warns(UserWarning, match="'f3' is 0 Hz in 1 of 73 rows.*set-aside"):
-        found = identify_damage(fem, WEATHER, zero, GROUPS, random_state=0)
-    pd.testing.assert_frame_equal(
-        found.table, identify_damage(fem, WEATHER, zero.where(zero > 0), GROUPS, random_state=0).table
-    )
+        found = identify_damage(fem, WEATHER, zero, "top", random_state=0)
+    expected = identify_damage(fem, WEATHER, zero.where(zero > 0), "top", random_state=0)
+    pd.testing.assert_frame_equal(found.table, expected.table)
     for factors, message in ((2 * np.pi, "rad/s"), (0.001, "kHz"), ([1, 1, 1, 1, 1, 5], "1 of 6 modes are .*, f6 ")):
         with pytest.raises(ValueError, match=message):
             identify_damage(fem, WEATHER, F * factors, GROUPS)

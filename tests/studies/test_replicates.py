@@ -20,7 +20,7 @@ MODELS = [make_truss().damaged({"bottom": loss}) for loss in (-0.03, 0.04, 0.0)]
 
 
 def study_of(fem, uncertainty, **options):
-    options = {"uncertainty": uncertainty, "n_replicates": 2} | options
+    options = {"uncertainty": uncertainty, "n_replicates": 2, "noise": "fitted"} | options
     return shared.study_of(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), groups=["bottom"]), **options)
 
 
@@ -117,7 +117,7 @@ def test_replicates_that_fail_are_counted(fem, monkeypatch):
 
 def test_uncertain_damage_differs_from_replicate_to_replicate(fem):
     uncertain = UncertainDamage("some", pd.DataFrame({"bottom": np.linspace(0.05, 0.3, 6)}))
-    study = shared.ran(fem, [uncertain], noise=0.01, uncertainty="weather", n_replicates=4)
+    study = shared.ran(fem, [uncertain], uncertainty="weather", n_replicates=4)
     rates = study.replicates_.rates["MahalanobisDetector", "some"][:, -1]
     assert len(np.unique(rates.round(2))) == 4
 

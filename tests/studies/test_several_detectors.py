@@ -140,7 +140,7 @@ def test_calibration_records_are_healthy_and_have_noise_of_their_own(study):
 
 def test_a_mapping_of_groups_to_severities_is_a_scenario(fem):
     given = [{}, {"bottom": 0.18, "top": 0.05}, pd.Series({"top": -0.1}), Scenario("other", {"top": 0.2})]
-    study = study_of(fem, MahalanobisDetector(), given, n_repeats=1, noise=0.01)
+    study = study_of(fem, MahalanobisDetector(), given, n_repeats=1)
     results = study.run(WEATHER)
     assert results["scenario"].tolist() == ["healthy", "bottom 18 %, top 5 %", "top -10 %", "other"]
     assert results["measure"].tolist() == ["PFA", "POD", "POD", "POD"]

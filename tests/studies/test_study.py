@@ -64,13 +64,13 @@ def test_all_scenarios_share_the_noise_and_repeats_do_not(fem):
 
 def test_without_a_baseline_the_detector_learns_what_the_chain_has_learned(fem):
     for detector, baseline in ((MahalanobisDetector(), YEAR.frequencies), (compensated(), SIDE_BY_SIDE)):
-        study = study_of(fem, detector, [{"top": 0.2}], n_repeats=1, noise=0.01)
+        study = study_of(fem, detector, [{"top": 0.2}], n_repeats=1)
         pd.testing.assert_frame_equal(study.run(WEATHER), study.run(WEATHER, baseline))
 
 
 def test_a_detector_that_compensates_gets_the_simulated_temperatures(fem):
     scenarios = sweep(fem, (0.1,), ["top"])
-    study = study_of(fem, compensated(), scenarios, n_repeats=1, noise=0.01)
+    study = study_of(fem, compensated(), scenarios, n_repeats=1)
     study.run(WEATHER, SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     detector = compensated().fit(SIDE_BY_SIDE[[*MODES, "T2", "T1", "T3"]])
     records = fem.simulate(WEATHER, damage={"top": 0.1}, noise=0.01, random_state=first_seed(0))
@@ -86,7 +86,7 @@ def test_a_reference_that_equals_the_simulation_has_its_rates(fem):
             return None
         return fem.simulate(WEATHER, **scenario.changes(WEATHER), noise=0.01, random_state=seed)
 
-    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=3, noise=0.01)
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=3)
     results = study.run(WEATHER, reference=truth)
     assert results["source"].tolist() == ["simulated", "simulated", "reference"]
     simulated, true = results[results["scenario"] == "top 10 %"].itertuples()
@@ -103,7 +103,7 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
     side_by_side = measured.temperatures.join(frequencies)
     scenarios = [{"top": 0.3}]
     for detector, records in ((MahalanobisDetector(), frequencies), (compensated(), side_by_side)):
-        study = study_of(fem, detector, scenarios, n_repeats=1, noise=0.01)
+        study = study_of(fem, detector, scenarios, n_repeats=1)
         results = study.run(WEATHER, reference={"top 30 %": records}).set_index(["scenario", "source"])
         row = results.loc[("top 30 %", "reference")]
         decision = study.detectors_[study.detector_name()].decision_function(records)
@@ -116,7 +116,7 @@ def test_measured_records_may_have_rows_gaps_and_temperatures_of_their_own(fem):
 
 
 def test_a_reference_on_the_same_rows_takes_their_temperatures(fem):
-    study = study_of(fem, compensated(), [{"top": 0.3}], n_repeats=1, noise=0.01)
+    study = study_of(fem, compensated(), [{"top": 0.3}], n_repeats=1)
     damaged = make_truss_campaign(damage={"top": 0.3}, random_state=1)
     T, F = damaged.temperatures[::3], damaged.frequencies[::3]
     alone = study.run(WEATHER, reference={"top 30 %": F})
@@ -130,7 +130,7 @@ def test_progressive_damage_counts_from_its_onset(fem):
         ProgressiveDamage("by time", {"top": 0.4}, onset, WEATHER.index[81]),
         ProgressiveDamage("by number", {"top": 0.4}, 20, 81),
     ]
-    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=1, noise=0.01)
+    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=1)
     results = study.run(WEATHER)
     assert results[["pi_low", "pi_high"]].isna().all(axis=None)  # one repeat has no band
     results = results.drop(columns=["scenario", "pi_low", "pi_high"])
@@ -290,7 +290,7 @@ def test_a_detector_sees_temperatures_with_their_gaps(in_service):
 def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
     scenarios, numbers = sweep(fem, (0.1, 0.2), ["bottom"]), []
     for tol, uncertainty in ((0.2, "weather"), (0.04, "noise"), (0.001, "noise")):
-        options = {"uncertainty": uncertainty, "n_replicates": 2, "noise": 0.01}
+        options = {"uncertainty": uncertainty, "n_replicates": 2}
         study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol, **options)
         results = study.run(WEATHER)
         (number,) = results["n_repeats"].unique()
