@@ -24,7 +24,6 @@ from tests.detection.compensated import (
     F,
     T,
     X,
-    chain,
     compensator,
     hourly,
     with_gaps,
@@ -59,27 +58,6 @@ def test_lags_within_go_by_time():
         shuffled = compensator(lagged).fit(X.iloc[order]).transform(X.iloc[order])
     np.testing.assert_allclose(shuffled.loc[X.index], expected, rtol=0, atol=1e-9)
     assert list(compensator(lagged).fit(X).estimator_[0].feature_names_in_) == list(T.columns)
-
-
-@pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*no-earlier-records")  # before the first row of a fold, without stamps
-@pytest.mark.parametrize("bare", [True, False])
-def test_the_data_informed_model_gets_every_row_and_shares_its_fe_model(bare):
-    """Alone with a frame, and at the end of a pipeline with an array."""
-    holed = with_gaps(["f1"], [20, 21, 130])
-    fem = chain(make_pipeline(LagFeatures([0, 2]), TemperatureMapper(LinearRegression())))
-    estimator = fem if bare else make_pipeline(StandardScaler(), fem)
-    data, temperatures, frequencies = (part if bare else part.to_numpy() for part in (holed, T, holed[MODES]))
-    fitted = compensator(estimator, targets=POSITIONS, cv=2)
-    residuals = np.asarray(fitted.fit_transform(data))
-    np.testing.assert_array_equal(np.argwhere(np.isnan(residuals)), [[20, 0], [21, 0], [130, 0]])
-    predicted = clone(estimator).fit(temperatures, frequencies).predict(temperatures)
-    np.testing.assert_allclose(fitted.estimator_.predict(temperatures), predicted, rtol=1e-12)
-    # where a prediction is less certain than it usually is, its residual counts less
-    whole, counted = (np.asarray(part) for part in (np.log(frequencies / predicted), fitted.transform(data)))
-    excess = np.abs(whole - counted)
-    np.testing.assert_allclose(excess, np.abs(whole) - np.abs(counted), atol=1e-9)
-    assert np.nanmedian(excess) < 1e-9
 
 
 @pytest.mark.one_case

@@ -67,7 +67,7 @@ def test_the_recommended_mode_gains_as_much_in_true_records(table):
 @pytest.mark.filterwarnings("ignore:.*few-records")  # without T3, residuals follow the season
 def test_a_sensor_that_explains_the_frequencies_gains_more_than_one_that_does_not():
     known = YEAR.temperatures[["T1", "T2"]]
-    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300)
+    inverse = InverseSurrogate(regressor=LinearRegression(), n_samples=300, noise=0.01)
     fem = DataInformedFEM(make_truss(), inverse=inverse, random_state=0).fit(known, YEAR.frequencies)
     detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=MODES), MahalanobisDetector())
     study = study_of(fem, detector, sweep(fem, (0.1, 0.2, 0.3), ["top"]))

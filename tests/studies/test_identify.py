@@ -242,11 +242,10 @@ def test_a_group_is_not_both_weaker_and_stiffer(fem):
 
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")
 def test_shifts_that_no_group_makes_are_something_else(fem, healthy):
-    for change in (1.05, [1, 1, 1, 1.03, 1, 1]):
-        found = identify_damage(fem, WEATHER, healthy * change, GROUPS, random_state=0)
-        assert found.most_probable == ("something else",)
-        assert found.probability_other > 0.9
-        assert found.damage == {}
+    found = identify_damage(fem, WEATHER, healthy * [1, 1, 1, 1.03, 1, 1], GROUPS, random_state=0)
+    assert found.most_probable == ("something else",)
+    assert found.probability_other > 0.9
+    assert found.damage == {}
     F = simulated(fem, {"top": 0.4})
     F.iloc[:, 5] *= 1.02
     found = identify_damage(fem, WEATHER, F, GROUPS, random_state=0)
