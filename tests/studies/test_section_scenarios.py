@@ -74,6 +74,7 @@ def test_studies_find_the_loss_that_is_simulated(fem):
     assert (np.abs(rows[:, np.newaxis] / of_model(fem, {"diagonal": 0.3}) - 1).max(axis=2) < 1e-9).any()
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("with_structure", [False, True])
 def test_shifts_are_explained_by_losses_of_section(fem, with_structure):
     some = LATER.temperatures if with_structure else LATER.temperatures[::5]

@@ -6,11 +6,13 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.linear_model import LinearRegression
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.metrics import probability_of_detection, time_to_detection
 from skthermo.studies import ProgressiveDamage, Scenario, compare_extensions, detection_task, sweep
+from skthermo.surrogate import TemperatureMapper
 from tests.studies.studies import (
     LATER,
     MODES,
@@ -253,12 +255,12 @@ def test_a_study_must_be_run_before_it_is_asked(fem):
 @pytest.fixture(scope="module")
 def in_service():
     """A chain whose training records have an outage, and a sensor that failed."""
-    T, F = YEAR.temperatures[::2].copy(), YEAR.frequencies[::2].copy()
-    T.iloc[100:130, 1] = np.nan
-    F.iloc[20:30] = np.nan
+    T, F = YEAR.temperatures[::3].copy(), YEAR.frequencies[::3].copy()
+    T.iloc[60:80, 1] = np.nan
+    F.iloc[15:25] = np.nan
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the gaps, which are meant
-        return chain(random_state=0).fit(T, F)
+        return chain(mapper=TemperatureMapper(LinearRegression()), random_state=0).fit(T, F)
 
 
 @pytest.mark.nightly
