@@ -290,9 +290,9 @@ def test_a_detector_sees_temperatures_with_their_gaps(in_service):
 
 
 def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
-    scenarios, numbers = sweep(fem, (0.1, 0.2), ["bottom"]), []
-    for tol, uncertainty in ((0.2, "weather"), (0.04, "noise"), (0.001, "noise")):
-        options = {"uncertainty": uncertainty, "n_replicates": 2}
+    numbers, options = [], {"uncertainty": "weather", "n_replicates": 2}
+    for tol in (0.2, 0.04, 0.001):
+        scenarios = [{}] if tol == 0.001 else sweep(fem, (0.1, 0.2), ["bottom"])
         study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats="auto", tol=tol, **options)
         results = study.run(WEATHER)
         (number,) = results["n_repeats"].unique()
@@ -303,6 +303,7 @@ def test_repeats_grow_until_rates_are_as_certain_as_asked(fem):
             pd.testing.assert_frame_equal(results, fixed)
     assert numbers == sorted(numbers)
     assert (numbers[0], numbers[-1]) == (3, 20)
+    assert study_of(fem, MahalanobisDetector(), [{}], n_repeats="auto").run(WEATHER[:9])["n_repeats"].item() == 20
     with pytest.raises(ValueError, match="n_repeats"):
         study_of(fem, MahalanobisDetector(), scenarios, n_repeats="many").run(WEATHER)
     with pytest.raises(ValueError, match="tol"):
