@@ -22,7 +22,7 @@ SCENARIOS = [{}, {"bottom": 0.1}, {"top": 0.2}]
 def detectors():
     return {
         "raw": MahalanobisDetector(),
-        "forest": OutlierDetector(IsolationForest(n_estimators=20)),
+        "forest": OutlierDetector(IsolationForest(n_estimators=10)),
         "lines": compensated(),
     }
 
