@@ -164,8 +164,7 @@ def test_rates_that_are_expected_are_those_of_shifted_normal_records():
     def normal(n):
         return level * (1 + random.standard_normal((n, 6)) @ root)
 
-    baseline = normal(3000)
-    detector = DirectionalDetector(make_truss()).fit(baseline)
+    detector = DirectionalDetector(make_truss()).fit(normal(3000))
     losses = [0.0, 0.03, 0.06]
     expected = detector.pod(losses).join(detector.pod(losses, kind="section"))
     assert list(expected) == [*GROUPS, *(f"{group}, section" for group in GROUPS)]
@@ -173,9 +172,10 @@ def test_rates_that_are_expected_are_those_of_shifted_normal_records():
         for loss, rate in zip(losses, expected[name], strict=True):
             moved = normal(4000) + loss * level * detector.directions_.loc[name].to_numpy()
             assert rate == pytest.approx((detector.predict(moved) == -1).mean(), abs=0.03)
-    two = DirectionalDetector(detector.directions_.loc[["bottom", "diagonal"]]).fit(baseline)
-    for group, loss in two.minimum_detectable_damage(0.8).items():
-        below, at = two.pod([0.97 * loss, loss])[group]
+    smallest = detector.minimum_detectable_damage(0.8)
+    assert np.isfinite(smallest).tolist() == [True, True, True, False]  # of verticals, no loss is found often enough
+    for group, loss in smallest[["bottom", "diagonal"]].items():
+        below, at = detector.pod([0.97 * loss, loss])[group]
         assert below < at
         assert at >= 0.8 > below - 0.02
     with pytest.raises(ValueError, match=r"1\.5"):

@@ -104,6 +104,9 @@ def test_only_rows_without_any_mode_have_no_index_and_are_not_evaluated():
 
 def test_false_alarms_are_alike_in_all_patterns():
     baseline, later = (with_gaps(records(n, n), 0.5, n) for n in (20_000, 50_000))
+    learned = MahalanobisDetector().fit(baseline)
+    level = learned.report_["level"].to_numpy()
+    np.testing.assert_allclose(learned.covariance_.covariance_ * np.outer(level, level), COVARIANCE, atol=5e-4)
     for detector in (MahalanobisDetector(), DirectionalDetector()):
         alarms, missing = detector.fit(baseline).predict(later) == -1, np.isnan(later).sum(axis=1)
         rates = [alarms[missing == number].mean() for number in range(3)]
