@@ -16,7 +16,7 @@ from skthermo.studies import (
     identify_damage,
     sweep,
 )
-from skthermo.surrogate import with_model
+from skthermo.surrogate import DataInformedFEM, with_model
 
 YEAR, LATER = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
 T = LATER.temperatures[:60]
@@ -27,6 +27,16 @@ def of_model(fem, damage):
     theta = np.asarray(fem.predict_parameters(T))
     clean = make_truss().damaged(damage, kind="section").frequencies(theta)
     return np.asarray(fem.aligner_.inverse_transform(clean)) * np.exp(fem.discrepancy_(T))
+
+
+@pytest.mark.nightly
+def test_a_chain_with_a_reduced_model_loses_sections_as_the_whole_one_does(fem):
+    damage = {"bottom": 0.2, "top": 0.1}
+    expected = of_model(fem, damage)
+    assert np.asarray(fem.simulate(T, damage=damage, kind="section")) == pytest.approx(expected, rel=1e-9)
+    reduced = DataInformedFEM(make_truss(), reduce=True, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
+    theirs = reduced.simulate(T, damage=damage, kind="section") / reduced.predict(T)
+    assert theirs.to_numpy() == pytest.approx(expected / np.asarray(fem.predict(T)), rel=1e-4)
 
 
 def test_a_chain_of_a_function_says_what_it_does_not_know(fem):
