@@ -16,7 +16,7 @@ from skthermo.studies import (
     identify_damage,
     sweep,
 )
-from skthermo.surrogate import DataInformedFEM, with_model
+from skthermo.surrogate import with_model
 
 YEAR, LATER = make_truss_campaign(random_state=0), make_truss_campaign(random_state=1)
 T = LATER.temperatures[:60]
@@ -30,12 +30,11 @@ def of_model(fem, damage):
 
 
 @pytest.mark.nightly
-def test_a_chain_with_a_reduced_model_loses_sections_as_the_whole_one_does(fem):
+def test_a_chain_with_a_reduced_model_loses_sections_as_the_whole_one_does(fem, reduced_fem):
     damage = {"bottom": 0.2, "top": 0.1}
     expected = of_model(fem, damage)
     assert np.asarray(fem.simulate(T, damage=damage, kind="section")) == pytest.approx(expected, rel=1e-9)
-    reduced = DataInformedFEM(make_truss(), reduce=True, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
-    theirs = reduced.simulate(T, damage=damage, kind="section") / reduced.predict(T)
+    theirs = reduced_fem.simulate(T, damage=damage, kind="section") / reduced_fem.predict(T)
     assert theirs.to_numpy() == pytest.approx(expected / np.asarray(fem.predict(T)), rel=1e-4)
 
 
