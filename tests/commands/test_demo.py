@@ -1,10 +1,12 @@
 """Files of a synthetic bridge that a newcomer tries the commands on."""
 
 import pandas as pd
+import pytest
 
 from tests.commands.folders import run
 
 
+@pytest.mark.usefixtures("one_detector")
 def test_the_files_follow_each_other_and_the_other_commands_take_them(tmp_path):
     folder = tmp_path / "trial"
     done = run("demo", folder)
@@ -20,5 +22,8 @@ def test_the_files_follow_each_other_and_the_other_commands_take_them(tmp_path):
     assert pd.Timedelta(0) <= pd.Timestamp.now("UTC") - stamps[-1] < pd.Timedelta(hours=7)
     assert (damaged[list(F)].median() / new[list(F)].median() - 1).max() < 0
 
+    for file in (folder / "T.csv", folder / "F.csv"):  # the last month is enough to fit
+        names, *rows = file.read_text(encoding="utf-8").splitlines(keepends=True)
+        file.write_text("".join([names, *rows[-240:]]), encoding="utf-8")
     assert run("init", folder / "T.csv", folder / "F.csv", "--into", folder / "bridge").code == 0
     assert run("fit", folder / "bridge").code == 0

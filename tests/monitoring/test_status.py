@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from skthermo.monitoring import load_monitor
-from tests.monitoring.nightly import DAMAGED, FIRST, fitted_monitor, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, truss_records
 
 SPOILT = slice(FIRST + 5, FIRST + 20)  # records in which a thermometer repeats its value
 
@@ -23,19 +23,9 @@ def records():
 
 
 @pytest.fixture(scope="module")
-def fitted(records):
-    return fitted_monitor(records)
-
-
-@pytest.fixture
-def monitor(fitted):
-    return copy.deepcopy(fitted)
-
-
-@pytest.fixture(scope="module")
-def after(fitted, records):
+def after(truss_monitor, records):
     """With all records, in one batch."""
-    monitor = copy.deepcopy(fitted)
+    monitor = copy.deepcopy(truss_monitor)
     monitor.update(records[FIRST:])
     return monitor
 
