@@ -32,10 +32,9 @@ def test_a_year_of_records_gives_the_same_in_one_batch_as_in_many(zone):
     assert whole.days_["n_records"].sum() == len(records) - N_BASELINE
     assert (whole.days_.index == parts.days_.index).all()
     assert whole.status(now=records.index[-1]).state == whole.status(whole.last_).state
-    utc = quietly(Monitor(targets=MODES, sensors=False, random_state=0).fit, records[:N_BASELINE].tz_convert("UTC"))
-    local = quietly(Monitor(targets=MODES, sensors=False, random_state=0).fit, records[:N_BASELINE])
-    one, other = (monitor.update(records[N_BASELINE:].tz_convert(monitor.last_.tz)) for monitor in (utc, local))
-    pd.testing.assert_frame_equal(one, other.tz_convert("UTC"), check_freq=False)
+    utc = quietly(Monitor(targets=MODES, random_state=0).fit, records[:N_BASELINE].tz_convert("UTC"))
+    of_utc = utc.update(records[N_BASELINE : cuts[1]].tz_convert("UTC"))
+    np.testing.assert_array_equal(of_utc["index"], expected["index"][: len(of_utc)])
 
 
 @pytest.mark.one_case

@@ -1,6 +1,5 @@
 """A saved monitor goes on where it stopped, and what is no whole monitor is refused."""
 
-import copy
 import json
 import sys
 import zipfile
@@ -18,7 +17,7 @@ from skthermo.datasets import make_truss
 from skthermo.detection import MahalanobisDetector
 from skthermo.monitoring import Monitor, load_monitor
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor
 
 ENDINGS = ("joblib", "skops")
 each_form = pytest.mark.parametrize("ending", ENDINGS)
@@ -26,16 +25,6 @@ each_form = pytest.mark.parametrize("ending", ENDINGS)
 
 class OwnRegression(LinearRegression):
     """A regressor of a package that skthermo does not know."""
-
-
-@pytest.fixture(scope="module")
-def records():
-    return truss_records()
-
-
-@pytest.fixture
-def monitor(truss_monitor):
-    return copy.deepcopy(truss_monitor)
 
 
 @pytest.fixture
@@ -129,9 +118,9 @@ def test_a_file_of_skops_runs_nothing_of_others(monitor, tmp_path, module, name)
         load_monitor(path)
 
 
-def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_path):
+def test_a_part_that_skops_could_not_read_again_is_refused_at_once(monitor, tmp_path):
     pytest.importorskip("skops.io")
-    monitor = fitted_monitor(records, OwnRegression())
+    monitor.set_params(detector=OwnRegression())
     with pytest.raises(ValueError, match=r"would hold \[.*OwnRegression'\].*; expected a path that ends with .joblib"):
         monitor.save(tmp_path / "bridge.skops")
     assert not list(tmp_path.iterdir())

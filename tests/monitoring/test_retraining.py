@@ -1,6 +1,5 @@
 """Laws of retraining: what may train, when a new detector takes over, and a new baseline after an intervention."""
 
-import warnings
 from copy import deepcopy
 
 import numpy as np
@@ -12,21 +11,12 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
+from tests.monitoring.nightly import joined, quietly
 
 YEAR = 365
 STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.015}, "repaired": {"diagonal": -0.15}}
 SAME = {"check_freq": False, "check_index_type": False}
 WEEK, DAY = pd.Timedelta("7D"), pd.Timedelta("1D").value
-
-
-def joined(campaign):
-    return campaign.temperatures.join(campaign.frequencies)
-
-
-def quietly(call, *args, **settings):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what a year tells of one alarm a year
-        return call(*args, **settings)
 
 
 def put_into_service(healthy, last=None):
@@ -129,6 +119,8 @@ def test_after_an_intervention_indices_are_as_before(renewed, fitted, records):
     assert monitor.status(monitor.last_).state == "healthy"
     assert monitor.events_["end"].notna().all()
     assert monitor.events_["note"].str.contains("new baseline").any()
+    what = [one["what"] for one in monitor.transitions()]
+    assert "closed" in what[what.index("rebaseline") :]
     later = slice(YEAR + 21, 2 * YEAR)
     fresh, old = decisions(monitor, records["repaired"][later]), decisions(fitted, records["healthy"][later])
     ratios = [float((one["index"] / one["threshold"]).median()) for one in (fresh, old)]
