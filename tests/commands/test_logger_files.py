@@ -368,7 +368,7 @@ def test_what_loggers_write_is_read_as_it_was_meant(kind, tmp_path):
     assert [list(T), list(F)] == [names[:1], names[1:]]
 
 
-@pytest.mark.parametrize("kind", by_day([*UNDERSTOOD][::3], at_night=UNDERSTOOD))
+@pytest.mark.parametrize("kind", by_day([*UNDERSTOOD][::4], at_night=UNDERSTOOD))
 def test_the_settings_of_what_loggers_write_read_it_again(kind, tmp_path):
     one = UNDERSTOOD[kind]()
     done, file = begin(one, tmp_path)

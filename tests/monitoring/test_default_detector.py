@@ -61,15 +61,17 @@ def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_
     assert list(last.directions_.index[:5]) == ["bottom", "top", "diagonal", "vertical", "bottom, section"]
     for group in groups:
         loss = LOSSES[group]
-        changed = records({group.strip(): loss}, 1, "2026-01-01")[:16]
+        changed = records({group.strip(): loss}, 1, "2026-01-01")[:28]
         whole, parts = copy.deepcopy(fresh), copy.deepcopy(fresh)
         answers = whole.update(changed)
-        assert (answers["groups"] == pd.concat([parts.update(changed[:9]), parts.update(changed[9:])])["groups"]).all()
+        assert (
+            answers["groups"] == pd.concat([parts.update(changed[:20]), parts.update(changed[20:])])["groups"]
+        ).all()
         event = whole.events_.iloc[-1]
         assert event["kind"] == "damage"
         assert event["groups"].split(", ")[0] == (group if loss > 0 else "")
         assert event["size"] == pytest.approx(loss, rel=0.3) if loss > 0 else np.isnan(event["size"])
-        status, names = whole.status("2026-01-17"), [name for name in event["groups"].split(", ") if name]
+        status, names = whole.status("2026-01-29"), [name for name in event["groups"].split(", ") if name]
         assert (status.state, list(status.events[-1]["groups"])) == ("alarm", names)
 
 

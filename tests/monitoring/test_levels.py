@@ -22,7 +22,7 @@ def two_levels(records):
 @pytest.fixture(scope="module")
 def whole(two_levels, records):
     """The monitor with two levels and its answers, after the truss was damaged for weeks."""
-    return served(two_levels, records[FIRST : DAMAGED + 20])
+    return served(two_levels, records[FIRST + 10 : DAMAGED + 14])
 
 
 def served(monitor, new):
@@ -42,7 +42,7 @@ def test_the_lower_level_changes_no_alarm(truss_monitor, two_levels, whole, reco
     assert two_levels.threshold_ == truss_monitor.threshold_
     assert truss_monitor.watch_threshold_ is None
     assert max(two_levels.clear_threshold_, two_levels.watch_threshold_) < two_levels.threshold_
-    (one, answers), (two, with_watch) = served(truss_monitor, records[FIRST : DAMAGED + 20]), whole
+    (one, answers), (two, with_watch) = served(truss_monitor, records[FIRST + 10 : DAMAGED + 14]), whole
     assert (with_watch["state"] == "alarm").equals(answers["state"] == "alarm")
     pd.testing.assert_series_equal(with_watch["index"], answers["index"])
     events = two.events_[two.events_["kind"] != "watch"].reset_index(drop=True)
@@ -121,10 +121,14 @@ def test_discarded_records_are_as_if_they_had_never_come(truss_monitor, records,
 
 def test_all_records_since_the_baseline_may_be_discarded_and_those_of_the_baseline_not(truss_monitor, records):
     before, _ = served(truss_monitor, records[FIRST : FIRST + 5])
-    monitor, _ = served(before, records[FIRST + 5 : DAMAGED + 6])
+    later = records[FIRST + 5 : DAMAGED + 6].copy()
+    later.iloc[5:, 0] = later.iloc[5, 0]  # a thermometer that is stuck
+    monitor, _ = served(before, later)
     assert monitor.status(monitor.last_).state == "alarm"
+    assert len(monitor.faults_) == 1
     assert monitor.discard(records.index[FIRST + 5]) == DAMAGED - FIRST + 1
     assert_as_if_never_come(monitor, before)
+    assert "put back" in {one["what"] for one in monitor.transitions()}
     assert monitor.discard(records.index[FIRST]) == 5
     assert monitor.status(monitor.last_).state == "not evaluated"
     assert monitor.last_ == records.index[FIRST - 1]
