@@ -78,14 +78,9 @@ def toa5(width, records=RECORDS):
     """Four header lines, the first of which is as long as the records if these have eight columns."""
     names, *cells = rows(records)
     more = [f"V{n}" for n in range(width - 5)]
-    first = ["TOA5", "Bridge", "CR1000X", "1234", "CR1000X.Std.05", "CPU:bridge.CR1X", "5678", "Hourly"]
-    units = ["TS", "RN", "Deg C", "Hz", "", *("Volts" for _ in more)]
-    head = [
-        first,
-        ["TIMESTAMP", "RECORD", *names[1:], *more],
-        units,
-        ["", "", "Avg", "Avg", "Avg", *("Smp" for _ in more)],
-    ]
+    head = [["TOA5", "Bridge", "CR1000X", "1234", "CR1000X.Std.05", "CPU:bridge.CR1X", "5678", "Hourly"],
+            ["TIMESTAMP", "RECORD", *names[1:], *more], ["TS", "RN", "Deg C", "Hz", "", *("Volts" for _ in more)],
+            ["", "", "Avg", "Avg", "Avg", *("Smp" for _ in more)]]  # fmt: skip
     body = [[f'"{stamp}"', str(n), *(one or '"NAN"' for one in values), *("12.5" for _ in more)]
             for n, (stamp, *values) in enumerate(cells)]  # fmt: skip
     return quoted(head), body
@@ -118,13 +113,7 @@ def in_cells(records=RECORDS, *stamps):
 
 def with_commas(cells, *columns):
     """Numbers of some columns as texts with decimal commas."""
-    return [
-        [
-            repr(cell).replace(".", ",") if isinstance(cell, float) and n in columns else cell
-            for n, cell in enumerate(row)
-        ]
-        for row in cells
-    ]
+    return [[comma(c) if isinstance(c, float) and n in columns else c for n, c in enumerate(row)] for row in cells]
 
 
 def with_texts_for_times(cells):

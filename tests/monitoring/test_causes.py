@@ -99,19 +99,6 @@ def test_values_since_a_fault_began_are_left_out_and_no_alarm_rests_on_them(fitt
 
 
 @pytest.mark.nightly
-def test_any_division_gives_the_same_events_faults_and_tests(fitted, failing):
-    whole, other, random = served(fitted, failing), copy.deepcopy(fitted), np.random.default_rng(1)
-    n = len(failing)
-    order = np.argsort(np.arange(n) + random.integers(0, 10, n), kind="stable")
-    cuts = np.sort(random.choice(np.arange(1, n), 12, replace=False))
-    answers = pd.concat([other.update(failing.iloc[rows]) for rows in np.split(order, cuts)])
-    for name in ("events_", "evaluations_", "days_", "faults_", "corrected_", "weeks_"):
-        pd.testing.assert_frame_equal(getattr(other, name), getattr(whole, name), check_exact=True, check_freq=False)
-    answers = answers[~answers.index.duplicated(keep="last")].sort_index().drop(columns="revised")
-    pd.testing.assert_frame_equal(answers, whole.evaluations_, check_freq=False)
-
-
-@pytest.mark.nightly
 def test_a_loss_that_creeps_is_a_drift_which_becomes_damage_under_the_same_number(fitted):
     n = len(SERVICE)
     one = served(fitted, lowered(np.maximum(np.arange(n) - 100, 0) / n * 0.008, 100), parts=10)

@@ -63,10 +63,8 @@ def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_
         loss = LOSSES[group]
         changed = records({group.strip(): loss}, 1, "2026-01-01")[:28]
         whole, parts = copy.deepcopy(fresh), copy.deepcopy(fresh)
-        answers = whole.update(changed)
-        assert (
-            answers["groups"] == pd.concat([parts.update(changed[:20]), parts.update(changed[20:])])["groups"]
-        ).all()
+        answers, of_parts = whole.update(changed), [parts.update(changed[:20]), parts.update(changed[20:])]
+        assert (answers["groups"] == pd.concat(of_parts)["groups"]).all()
         event = whole.events_.iloc[-1]
         assert event["kind"] == "damage"
         assert event["groups"].split(", ")[0] == (group if loss > 0 else "")

@@ -114,7 +114,7 @@ def last_of_each(parts):
 
 def assert_same_history(monitor, answers, after, parts):
     pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True)
-    for name in ("events_", "days_", "evaluations_", "faults_", "records_", "corrected_"):
+    for name in ("events_", "days_", "evaluations_", "faults_", "records_", "corrected_", "weeks_"):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True)
     for count in ("n_records", "n_not_evaluated", "n_left_out"):
         assert monitor.counts_[count] == after.counts_[count]

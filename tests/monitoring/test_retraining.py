@@ -19,10 +19,9 @@ SAME = {"check_freq": False, "check_index_type": False}
 WEEK, DAY = pd.Timedelta("7D"), pd.Timedelta("1D").value
 
 
-def put_into_service(healthy, last=None):
+def put_into_service(healthy):
     targets = [name for name in healthy if name.startswith("f")]
-    compensator = TemperatureCompensator(LinearRegression(), targets=targets)
-    detector = make_pipeline(compensator, last or MahalanobisDetector())
+    detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=targets), MahalanobisDetector())
     return quietly(Monitor(detector, sensors=False, random_state=0, persistence=1).fit, healthy[:YEAR])
 
 
