@@ -118,9 +118,9 @@ def test_a_file_of_skops_runs_nothing_of_others(monitor, tmp_path, module, name)
         load_monitor(path)
 
 
-def test_a_part_that_skops_could_not_read_again_is_refused_at_once(monitor, tmp_path):
+def test_a_part_that_skops_could_not_read_again_is_refused_at_once(records, tmp_path):
     pytest.importorskip("skops.io")
-    monitor.set_params(detector=OwnRegression())
+    monitor = fitted_monitor(records, OwnRegression())
     with pytest.raises(ValueError, match=r"would hold \[.*OwnRegression'\].*; expected a path that ends with .joblib"):
         monitor.save(tmp_path / "bridge.skops")
     assert not list(tmp_path.iterdir())

@@ -16,7 +16,7 @@ from tests.monitoring.nightly import joined, quietly
 YEAR = 365
 STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.015}, "repaired": {"diagonal": -0.15}}
 SAME = {"check_freq": False, "check_index_type": False}
-WEEK, DAY = pd.Timedelta("7D"), pd.Timedelta("1D").value
+WEEK = pd.Timedelta("7D")
 
 
 def put_into_service(healthy):
@@ -43,14 +43,6 @@ def fitted(records):
 @pytest.fixture
 def monitor(fitted):
     return deepcopy(fitted)
-
-
-@pytest.fixture(scope="module")
-def with_event(fitted, records):
-    """A monitor after a year with seven weeks of damage."""
-    healthy, monitor = records["healthy"], deepcopy(fitted)
-    quietly(monitor.update, pd.concat([healthy[YEAR:450], records["damaged"][450:500], healthy[500 : 2 * YEAR]]))
-    return monitor
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +77,9 @@ def test_nothing_new_changes_nothing(monitor, records):
 
 
 @pytest.mark.nightly
-def test_rows_of_an_event_never_train(with_event):
-    monitor = deepcopy(with_event)
+def test_rows_of_an_event_never_train(monitor, records):
+    healthy, damaged = records["healthy"], records["damaged"][450:500]  # seven weeks
+    quietly(monitor.update, pd.concat([healthy[YEAR:450], damaged, healthy[500 : 2 * YEAR]]))
     event = monitor.events_.loc[1]
     found = quietly(monitor.refit)
     assert not found.baseline.index.to_series().between(event["start"] - WEEK, event["end"]).any()
