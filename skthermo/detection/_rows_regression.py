@@ -86,8 +86,8 @@ class RowsRegression:
 def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:
     """A clone fitted to the rows that it can take; where gaps of the targets differ, a clone for each target."""
     usable = np.ones(inputs.shape[0], dtype=bool) if takes_nan(estimator) else are_complete(inputs)
-    present = ~np.isnan(as_floats(F))
-    if is_model(getattr(last_step(estimator), "model", None)):  # a chain leaves out incomplete rows itself
+    present, last = ~np.isnan(as_floats(F)), last_step(estimator)
+    if is_model(getattr(last, "model", None)) or getattr(last, "_leaves_out_gaps", False):  # as a chain does itself
         present[:] = True
     rows = usable[:, np.newaxis] & present
     if not rows.any(axis=0).all():
@@ -97,7 +97,7 @@ def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:
             f"target and every other column for {type(estimator).__name__}"
         )
     if (rows == usable[:, np.newaxis]).all():
-        takes_columns = F.shape[1] > 1 or not get_tags(last_step(estimator)).target_tags.single_output
+        takes_columns = F.shape[1] > 1 or not get_tags(last).target_tags.single_output
         targets = rows_of(F, usable)
         return fit_outputs(estimator, rows_of(inputs, usable), targets if takes_columns else targets.squeeze(axis=1))
     one = estimator.estimator if isinstance(estimator, MultiOutputRegressor) else estimator

@@ -117,6 +117,7 @@ class FleetMapper(TableRegressor):
     """
 
     _parameter_constraints: dict = {"mappers": ["array-like", Mapping]}
+    _leaves_out_gaps = True  # output by output
 
     def __init__(self, mappers: Sequence[Any] | Mapping[Hashable, Any] = ()):
         self.mappers = mappers

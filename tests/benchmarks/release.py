@@ -84,7 +84,6 @@ PARTS = {
     "record-checks": Part("record_checks.py", **Z24),
     "record-defects": Part("record_defects.py"),
     "study-bands": Part("study_bands.py"),
-    "study-rates": Part("study_rates.py", "--structures truss --repeats 1"),
     "explained-damage": Part("explained_damage.py"),
     "explained-kw51": Part("explained_damage.py --structures KW51 --designs frequencies shapes"),
     "located-damage": Part("located_damage.py"),
