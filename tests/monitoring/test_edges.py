@@ -30,9 +30,9 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*(few-records|doubtful-values|n
 MODES = ["f1", "f2", "f3", "f4", "f5", "f6"]
 
 
-def detector(targets, last=None, window=None):
+def detector(targets, last=None, window=None, **options):
     last = MahalanobisDetector() if last is None else last
-    return CompensatedDetector(last, LinearRegression(), targets=targets, window=window, regimes=None)
+    return CompensatedDetector(last, LinearRegression(), targets=targets, window=window, **options)
 
 
 TESTS = {
@@ -49,7 +49,7 @@ ALARMS = by_day(
 @cache
 def saved(window=None, test="any direction", **options):
     """A monitor of the truss after its baseline."""
-    monitor = Monitor(detector(MODES, TESTS[test](), window), **options)
+    monitor = Monitor(detector(MODES, TESTS[test](), window, regimes=None), **options)
     return pickle.dumps(quietly(monitor.fit, six_hourly()[:N_BASELINE]))
 
 
