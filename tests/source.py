@@ -2,10 +2,14 @@
 
 import ast
 import functools
+import importlib
 import io
+import pkgutil
 import re
 import tokenize
 from collections import defaultdict
+
+import skthermo
 
 GROUND = ("_core", "fem", "preprocessing", "residuals", "surrogate", "updating", "detection", "metrics", "datasets")
 """Rooms in which equal inputs give equal results, by their source."""
@@ -25,6 +29,13 @@ HIDDEN = {  # names by which state is hidden, and what they look at
     "catch_warnings": "filters of warnings",
 }
 OWN = {"self", "cls", "twin"}  # a twin is a copy that a method has just made
+
+
+def public():
+    """Names that users import: triples of package, name and thing."""
+    for package in pkgutil.iter_modules(skthermo.__path__, "skthermo."):
+        module = importlib.import_module(package.name) if package.ispkg and "._" not in package.name else None
+        yield from ((package.name[9:], name, getattr(module, name)) for name in getattr(module, "__all__", ()))
 
 
 @functools.cache

@@ -135,21 +135,20 @@ def test_only_core_dependencies_are_imported_and_private_scikit_learn_in_one_pla
     assert not wrong, "\n".join([remedy, *wrong])
 
 
-def test_import_loads_nothing_optional_or_slow_and_fem_neither_pandas_nor_scikit_learn():
-    unwanted = ("matplotlib", "jinja2", "dask", "distributed", "hypothesis", "scipy.signal", "sklearn.ensemble")
-    code = "import sys, skthermo.fem; print([m for m in ('pandas', 'sklearn') if m in sys.modules])\n"
-    code += f"import {', '.join(f'skthermo.{room}' for room in ROOMS)}; "
-    code += f"print([m for m in {unwanted} if m in sys.modules])"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert loaded.stdout.split() == ["[]", "[]"]
-
-
-def test_a_job_with_a_monitor_loads_no_chain_and_no_study():
-    unwanted = ("scipy.io", *(f"skthermo.{room}" for room in ("surrogate", "studies", "updating", "datasets")))
-    code = "import sys, skthermo.commands.main, skthermo.reporting; "
-    code += f"print([m for m in {unwanted} if m in sys.modules])"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert loaded.stdout.split() == ["[]"]
+def test_imports_load_no_more_than_they_need():
+    """fem neither pandas nor scikit-learn, a job with a monitor no chain and no study, all rooms nothing optional."""
+    heavy = [f"skthermo.{room}" for room in ("surrogate", "studies", "updating", "datasets")]
+    optional = ["matplotlib", "jinja2", "dask", "distributed", "hypothesis", "scipy.signal", "sklearn.ensemble"]
+    steps = {
+        "skthermo.fem": ["pandas", "sklearn"],
+        "skthermo.commands.main, skthermo.reporting": ["scipy.io", *heavy],
+        ", ".join(f"skthermo.{room}" for room in ROOMS): optional,
+    }
+    each = [
+        f"import sys, {names}; print([m for m in {unwanted} if m in sys.modules])" for names, unwanted in steps.items()
+    ]
+    loaded = subprocess.run([sys.executable, "-c", "\n".join(each)], capture_output=True, text=True, check=True)
+    assert loaded.stdout.split() == ["[]", "[]", "[]"]
 
 
 def test_a_missing_extra_is_named(monkeypatch):

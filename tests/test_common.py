@@ -1,9 +1,7 @@
 """scikit-learn's own estimator checks, every expected failure named with its reason."""
 
-import importlib
 import inspect
 import pickle
-import pkgutil
 import re
 from pathlib import Path
 
@@ -18,11 +16,10 @@ from sklearn.impute import KNNImputer
 from sklearn.linear_model import Ridge
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import Pipeline
 from sklearn.svm import OneClassSVM
 from sklearn.utils.estimator_checks import check_estimator
 
-import skthermo
-from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import (
     CompensatedDetector,
     DamageDetector,
@@ -32,16 +29,12 @@ from skthermo.detection import (
     TemperatureCompensator,
 )
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import (
-    BiasAligner,
-    ExponentialMeans,
-    HampelFilter,
-    LagFeatures,
-    ModeTracker,
-)
-from skthermo.studies import DetectabilityStudy, sweep
-from skthermo.surrogate import DataInformedFEM, FleetMapper, InverseSurrogate, PosteriorInverse, TemperatureMapper
+from skthermo.preprocessing import BiasAligner, ExponentialMeans, HampelFilter, LagFeatures, ModeTracker
+from skthermo.studies import DetectabilityStudy
+from skthermo.surrogate import DataInformedFEM, InverseSurrogate, PosteriorInverse, TemperatureMapper
 from skthermo.updating import ModelUpdater
+from tests.estimators import CASES, T, assert_same, fitted
+from tests.source import public
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference" / "scikit_learn.rst"
 
@@ -105,18 +98,20 @@ def expected_failures(estimator):
 
 def public_estimators():
     """All classes of estimators that users can name, sorted by name."""
-    rooms = [importlib.import_module(m.name) for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg]
-    public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
-    classes = {thing for thing in public if isinstance(thing, type) and not inspect.isabstract(thing)}
+    classes = {thing for *_, thing in public() if isinstance(thing, type) and not inspect.isabstract(thing)}
     return sorted((one for one in classes if issubclass(one, BaseEstimator)), key=lambda kind: kind.__name__)
 
 
-def made(kind, arguments):
+def test_every_public_estimator_has_a_case():
+    assert set(public_estimators()) <= {type(case.estimator) for case in CASES.values()}, "tests/estimators.py"
+
+
+def made(kind):
     """An estimator with its arguments, or with its defaults."""
     try:
-        return arguments[kind] if kind in arguments else kind()
+        return ARGUMENTS[kind] if kind in ARGUMENTS else kind()
     except TypeError as error:
-        raise TypeError(f"{__file__}: {error}; add one to ARGUMENTS and ARGUMENTS_ON_RECORDS") from error
+        raise TypeError(f"{__file__}: {error}; add one to ARGUMENTS") from error
 
 
 OF_MODELS = {DataInformedFEM, DetectabilityStudy, ModelUpdater, ModeTracker, Monitor, PosteriorInverse}
@@ -125,14 +120,15 @@ ARGUMENTS = {  # of estimators that need some, or are slow without
     CompensatedDetector: CompensatedDetector(MahalanobisDetector(), Ridge(), targets=[1]),
     DirectionalDetector: InHundredths(),
     ExponentialMeans: ExponentialMeans(half_lives=[3]),
-    InverseSurrogate: InverseSurrogate(
-        regressor=MLPRegressor(hidden_layer_sizes=(8,), learning_rate_init=0.01, max_iter=1000, tol=0.001)
-    ),
+    InverseSurrogate: InverseSurrogate(regressor=Ridge()),
     OutlierDetector: OutlierDetector(OneClassSVM()),
     TemperatureCompensator: TemperatureCompensator(Ridge(), targets=[1]),
 }
-ESTIMATORS = [made(kind, ARGUMENTS) for kind in public_estimators() if kind not in OF_MODELS]
+ESTIMATORS = [made(kind) for kind in public_estimators() if kind not in OF_MODELS]
 OTHER_SETTINGS = [
+    InverseSurrogate(
+        regressor=MLPRegressor(hidden_layer_sizes=(8,), learning_rate_init=0.01, max_iter=1000, tol=0.001)
+    ),
     HampelFilter(targets=[0]),
     BiasAligner(method="scale"),
     MahalanobisDetector(threshold="quantile"),
@@ -174,120 +170,37 @@ def test_the_reference_lists_every_failing_check_with_its_reason():
     assert listed == {kind.__name__: failures for kind, failures in EXPECTED_FAILURES.items()}
 
 
-RECORDS = pd.DataFrame(
-    np.random.default_rng(0).normal([10, 4, 9], 0.1, (60, 3)),
-    index=pd.date_range("2025", periods=60, freq="h"),
-    columns=["T1", "f1", "f2"],
-)
-TRUSS, YEAR = make_truss(), make_truss_campaign(random_state=0)
-T, F = YEAR.temperatures, YEAR.frequencies
-LINEAR_INVERSE = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=100, noise=0.01, random_state=0)
-CHAIN = DataInformedFEM(TRUSS, mapper=TemperatureMapper(Ridge()), reduce=True)
-NOMINAL, SHAPES = (values[0] for values in TRUSS.modes(np.ones((1, 4))))
-
-
-BOUND = [  # estimators and what they learn from
-    (TemperatureMapper(), (T, F / F.mean())),
-    (FleetMapper(), (T, F)),
-    (LINEAR_INVERSE, (F[:20],)),
-    (PosteriorInverse(TRUSS), (F[:20],)),
-    (CHAIN, (T, F)),
-    (
-        DataInformedFEM(TRUSS, inverse=LINEAR_INVERSE, mapper=TemperatureMapper(Ridge())),
-        (T, F.mask(F.quantile(0.99) < F)),
-    ),
-    (ModelUpdater(TRUSS), (TRUSS.frequencies([[1.05, 0.97, 1.02, 1]]),)),
-    (ModeTracker((NOMINAL, SHAPES)), ()),
-]
-ARGUMENTS_ON_RECORDS = {  # of estimators that need some, to learn from records
-    CompensatedDetector: CompensatedDetector(MahalanobisDetector(), Ridge(), targets=["f1", "f2"]),
-    ExponentialMeans: ExponentialMeans(half_lives=["3h"]),
-    OutlierDetector: OutlierDetector(OneClassSVM()),
-    TemperatureCompensator: TemperatureCompensator(Ridge(), targets=["f1", "f2"]),
-}
-ON_OTHERS = {type(estimator) for estimator, _ in BOUND} | OF_MODELS
-TRANSFORMERS_AND_DETECTORS = [
-    *(made(kind, ARGUMENTS_ON_RECORDS) for kind in public_estimators() if kind not in ON_OTHERS),
-    clone(ARGUMENTS_ON_RECORDS[CompensatedDetector]).set_params(window="6h"),
-]
-STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, random_state=0, uncertainty="noise")
-MONITOR = Monitor(MahalanobisDetector(), targets=["f1", "f2"])  # takes frames on a DatetimeIndex only
-YEAR = pd.DataFrame(
-    np.random.default_rng(0).normal([10, 4, 9], 0.1, (400, 3)),
-    index=pd.date_range("2025", periods=400),
-    columns=["T1", "f1", "f2"],
-)
-
-
-def fitted(estimator, *data):
-    return pickle.loads(pickle.dumps(estimator)).fit(*data)
-
-
-def check_names_of_state(estimator, fit):
-    state = set(vars(fit)) - set(vars(estimator))
-    if isinstance(estimator, KNNImputer):
-        state -= set(vars(KNNImputer().fit(RECORDS)))  # scikit-learn's own
-    assert state
-    assert not [name for name in state if name.startswith("_") or not name.endswith("_")]
-
-
-def run(study):
-    """A study that has been run, which is how it learns."""
-    chain = fitted(CHAIN, T, F)
-    study = clone(study).set_params(fem=chain, scenarios=sweep(chain, (0.1, 0.2), groups=["bottom"]))
-    study.run(T)
-    return study
-
-
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("as_frames", [True, pytest.param(False, marks=pytest.mark.nightly)], ids=["frames", "arrays"])
-@pytest.mark.parametrize(
-    ("estimator", "data"),
-    [*((estimator, (RECORDS,)) for estimator in TRANSFORMERS_AND_DETECTORS), *BOUND],
-    ids=lambda given: type(given).__name__,
-)
-def test_what_fit_keeps_has_a_trailing_underscore_and_does_not_change_with_what_it_was_given(
-    estimator, data, as_frames
-):
-    arrays = [np.array(table, dtype=float) for table in data]
-    tables = list(arrays)
-    if as_frames:
-        tables = [
-            pd.DataFrame(array, table.index, table.columns, copy=False) if isinstance(table, pd.DataFrame) else array
-            for array, table in zip(arrays, data, strict=True)
-        ]
-    elif "targets" in estimator.get_params() or getattr(estimator, "window", 0) == "6h":
+@pytest.mark.parametrize("name", CASES)
+def test_what_fit_keeps_has_a_trailing_underscore_and_does_not_change_with_what_it_was_given(name, as_frames):
+    case = CASES[name]
+    if not as_frames and case.needs_frames:
         pytest.skip("needs names or stamps")
-    elif isinstance(estimator, ExponentialMeans):
-        pytest.skip("its half-life needs stamps")
-    fit = fitted(estimator, *tables)
-    check_names_of_state(estimator, fit)
+    arrays = [np.array(table, dtype=float) for table in case.tables]
+    frames = [
+        pd.DataFrame(array, table.index, table.columns, copy=False)
+        for array, table in zip(arrays, case.tables, strict=True)
+    ]
+    fit = fitted(clone(case.estimator), *(frames if as_frames else arrays))
+    state = set(vars(fit)) - set(vars(case.estimator))
+    if isinstance(fit, KNNImputer):
+        state -= set(vars(KNNImputer().fit(arrays[0])))  # scikit-learn's own
+    assert state or isinstance(fit, Pipeline)
+    assert not [name for name in state if name.startswith("_") or not name.endswith("_")]
     kept = pickle.dumps(fit)
     for array in arrays:
         array[:] = 777.0
     assert pickle.dumps(fit) == kept
 
 
-@pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)")
-def test_what_studies_monitors_and_priors_keep_has_a_trailing_underscore():
-    for estimator, fit in [(STUDY, run(STUDY)), (MONITOR, fitted(MONITOR, YEAR))]:
-        check_names_of_state(estimator, fit)
-
-
 @pytest.mark.nightly
-@pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)")
-def test_metadata_routing_changes_no_result():
-    def results(estimator, data):
-        fit = fitted(estimator, *data)
-        output = next(name for name in ("transform", "damage_index", "predict") if hasattr(fit, name))
-        return getattr(fit, output)(data[0])
-
-    cases = [(estimator, (RECORDS,)) for estimator in TRANSFORMERS_AND_DETECTORS]
-    cases += [(estimator, data) for estimator, data in BOUND if data and hasattr(estimator, "predict")]
-    for estimator, data in cases:
-        off = results(estimator, data)
-        with config_context(enable_metadata_routing=True):
-            np.testing.assert_array_equal(results(estimator, data), off, err_msg=shown(estimator))
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", CASES)
+def test_metadata_routing_changes_no_result(name):
+    off = CASES[name].results()
+    with config_context(enable_metadata_routing=True):
+        assert_same(CASES[name].results(), off)
 
 
 NEED_NO_FIT = re.compile(  # beginnings of names
@@ -296,10 +209,9 @@ NEED_NO_FIT = re.compile(  # beginnings of names
 
 
 def test_every_method_says_that_the_estimator_is_not_fitted():
-    estimators = [*TRANSFORMERS_AND_DETECTORS, *(estimator for estimator, _ in BOUND), STUDY, MONITOR]
     wrong = []
-    for kind in {type(estimator): estimator for estimator in estimators}.values():
-        for name in dir(type(kind)):
+    for kind in {type(case.estimator): case.estimator for case in CASES.values()}.values():
+        for name in dir(type(kind)) if not isinstance(kind, Pipeline) else ():
             if NEED_NO_FIT.match(name) or not hasattr(clone(kind), name):  # a score that such an estimator has not
                 continue
             try:
@@ -313,15 +225,14 @@ def test_every_method_says_that_the_estimator_is_not_fitted():
                 pass
             except Exception as error:
                 wrong.append(f"{type(kind).__name__}.{name} raises {error!r}")
-    assert not wrong, "\n" + "\n".join(wrong)
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.filterwarnings("ignore:.*not-evaluated")
-@pytest.mark.parametrize("estimator", TRANSFORMERS_AND_DETECTORS, ids=lambda estimator: type(estimator).__name__)
-def test_fitted_estimators_are_pickled(estimator):
-    fitted = pickle.loads(pickle.dumps(estimator)).fit(RECORDS)
-    output = "transform" if hasattr(estimator, "transform") else "damage_index"
-    later = RECORDS.shift(freq="30h")
-    later.iloc[3, 0] = np.nan
-    once, again = (getattr(copy, output)(later) for copy in (fitted, pickle.loads(pickle.dumps(fitted))))
-    np.testing.assert_array_equal(again, once)
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.nightly] * case.is_slow) for name, case in CASES.items()]
+)
+def test_fitted_estimators_are_pickled(name):
+    case, X = CASES[name], CASES[name].tables[0]
+    fit = fitted(clone(case.estimator), *case.tables)
+    assert_same(case.answered(pickle.loads(pickle.dumps(fit)), X), case.answered(fit, X))

@@ -8,6 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 import skthermo
+from tests.source import public
 
 PACKAGE = Path(skthermo.__file__).parent
 HOUSE = Path(__file__).parents[1] / "docs" / "contributing" / "house.rst"
@@ -15,7 +16,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MOST_SIDE_BY_SIDE = 15  # modules of a package, beside its __init__.py
 SHORT = 40
 SHORT_FILES = {  # private files of fewer lines, and why they stand alone
-    "fem/_samples.py": "it imports scikit-learn, which importing fem must not",
+    "fem/_samples.py": "it imports scikit-learn, which importing fem must not"
 }
 
 
@@ -24,13 +25,6 @@ def classes():
     modules = [importlib.import_module(m.name) for m in pkgutil.walk_packages(skthermo.__path__, "skthermo.")]
     found = {member for module in modules for _, member in inspect.getmembers(module, inspect.isclass)}
     return {one for one in found if one.__module__.startswith("skthermo") and "_core.estimators" not in one.__module__}
-
-
-def public():
-    """Names that users import."""
-    rooms = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
-    modules = map(importlib.import_module, rooms)
-    return {getattr(module, name) for module in modules for name in module.__all__ if callable(getattr(module, name))}
 
 
 def place(thing):
@@ -42,8 +36,8 @@ def assert_none(wrong, instead):
 
 
 def test_no_private_class_has_one_child():
-    ours = classes()
-    children = Counter(base for thing in ours for base in thing.__bases__ if base in ours - public())
+    ours, shown = classes(), {thing for *_, thing in public() if callable(thing)}
+    children = Counter(base for thing in ours for base in thing.__bases__ if base in ours - shown)
     single = {base for base, number in children.items() if number == 1}
     chains = [
         f"{place(thing)}: {thing.__qualname__}({base.__qualname__})"

@@ -84,10 +84,7 @@ def test_a_model_is_sent_once():
 def test_a_grid_search_is_that_of_one_process():
     year = make_truss_campaign(samples_per_year=100, random_state=0)
     chain = DataInformedFEM(
-        TRUSS,
-        inverse=PosteriorInverse(noise=0.01),
-        mapper=TemperatureMapper(Ridge()),
-        random_state=0,
+        TRUSS, inverse=PosteriorInverse(noise=0.01), mapper=TemperatureMapper(Ridge()), random_state=0
     )
     grid = {"mapper__regressor__alpha": [0.1, 10.0]}
     search = GridSearchCV(chain, grid, cv=KFold(2), scoring=frequency_scorer, refit="neg_mape")

@@ -5,43 +5,45 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from sklearn.linear_model import Ridge
 
 from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.monitoring import Monitor
 from skthermo.studies import DetectabilityStudy, identify_damage, sweep
-from skthermo.surrogate import DataInformedFEM
+from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
 PAGE = (Path(__file__).parents[1] / "docs" / "reference" / "data_model.rst").read_text()
 
 
 @pytest.fixture(scope="module")
 def year():
-    return make_truss_campaign(random_state=0)
+    return make_truss_campaign(samples_per_year=120, random_state=0)
 
 
 @pytest.fixture(scope="module")
 def fem(year):
-    return DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    inverse = PosteriorInverse(noise=0.01)
+    chain = DataInformedFEM(make_truss(), inverse=inverse, mapper=TemperatureMapper(Ridge()), random_state=0)
+    return chain.fit(year.temperatures, year.frequencies)
 
 
 def study(fem, year):
-    study = DetectabilityStudy(
-        fem, MahalanobisDetector(), sweep(fem, (0.2,), ["bottom"]), n_repeats=2, random_state=0, uncertainty="noise"
-    )
-    return study.run(year.temperatures)
+    scenarios, options = sweep(fem, (0.2,), ["bottom"]), {"n_repeats": 1, "uncertainty": "noise", "random_state": 0}
+    return DetectabilityStudy(fem, MahalanobisDetector(), scenarios, **options).run(year.temperatures)
 
 
 def update(fem, year):
-    records = year.temperatures.join(year.frequencies)
-    later = records.set_index(records.index + pd.DateOffset(years=1))
-    return Monitor(targets=list(year.frequencies), units="Hz").fit(records).update(later[:5])
+    records = year.frequencies
+    later = records[:5].set_index(records.index[:5] + pd.DateOffset(years=1))
+    return Monitor(MahalanobisDetector(), targets=list(records), watch_per_year=12).fit(records).update(later)
 
 
 def identified(fem, year):
     return identify_damage(fem, year.temperatures[:60], year.frequencies[:60], ["bottom", "top"], random_state=0).table
 
 
+@pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     ("title", "table"),
     [("Results of a study", study), ("States of a monitor", update), ("Identified damage", identified)],

@@ -1,9 +1,7 @@
 """Docstrings agree with signatures, and every public name is typed and shown at work."""
 
 import functools
-import importlib
 import inspect
-import pkgutil
 import re
 import typing
 from pathlib import Path
@@ -14,9 +12,10 @@ from numpydoc.validate import Validator, validate
 
 import skthermo
 import skthermo.fem
+from tests.source import public
 
 ROOT = Path(__file__).parents[1]
-ROOMS = [m.name for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg and "._" not in m.name]
+PUBLIC = [(f"skthermo.{room}.{name}", thing) for room, name, thing in public()]
 
 # Parts of numpydoc's standard that are not asked for.
 NOT_ASKED = {
@@ -27,13 +26,6 @@ NOT_ASKED = {
 }
 
 
-def public_objects():
-    for room in ROOMS:
-        module = importlib.import_module(room)
-        for name in module.__all__:
-            yield f"{room}.{name}", getattr(module, name)
-
-
 def public_members(thing):
     """Members of a class and of its bases in skthermo."""
     ours = [base for base in thing.__mro__[::-1] if base.__module__.startswith("skthermo")]
@@ -42,7 +34,7 @@ def public_members(thing):
 
 def public_callables():
     """Functions, classes and their methods, those of bases in skthermo included."""
-    for name, thing in public_objects():
+    for name, thing in PUBLIC:
         if isinstance(thing, type):
             yield name, thing.__init__, thing
             for attribute, member in public_members(thing).items():
@@ -54,7 +46,7 @@ def public_callables():
 
 
 CALLABLES = list(public_callables())
-OBJECTS = [(name, thing) for name, thing in public_objects() if inspect.isfunction(thing) or inspect.isclass(thing)]
+OBJECTS = [(name, thing) for name, thing in PUBLIC if inspect.isfunction(thing) or inspect.isclass(thing)]
 PROTOCOLS = {name for name, thing in OBJECTS if getattr(thing, "_is_protocol", False)}
 ELEMENT_METHODS = {name for name in vars(skthermo.fem.Element) if name[0] != "_"}
 LONGEST_SIGNATURE = 700  # characters that help() prints
@@ -171,6 +163,7 @@ def test_every_public_property_has_a_summary():
     assert_none(wrong, "write a summary that ends with a full stop")
 
 
+source_of = functools.cache(inspect.getsource)
 ASSIGNED = re.compile(r"self\.([a-z]\w*_)\b(?=[^=\n]*=[^=])")  # self.a_, self.b_ = ...
 
 
@@ -178,7 +171,7 @@ def test_every_fitted_attribute_is_documented():
     wrong = []
     for name, thing in CLASSES:
         ours = [base for base in thing.__mro__ if base.__module__.startswith("skthermo")]
-        sources = [re.sub(r" +(>>>|\.\.\.) .*", "", inspect.getsource(base)) for base in ours]  # without examples
+        sources = [re.sub(r" +(>>>|\.\.\.) .*", "", source_of(base)) for base in ours]  # without examples
         fitted = {attribute for source in sources for attribute in ASSIGNED.findall(source)}
         documented = {part.strip() for entry in ClassDoc(thing)["Attributes"] for part in entry.name.split(",")}
         wrong += [f"{name}: {attribute}" for attribute in sorted(fitted - documented)]

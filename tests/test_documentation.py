@@ -24,7 +24,7 @@ PACKAGES = [m.name for m in pkgutil.iter_modules(skthermo.__path__) if not m.nam
 ROOMS = [name for name in PACKAGES if importlib.import_module(f"skthermo.{name}").__all__]  # with public names
 README, HOME = ROOT / "README.md", ROOT / "docs" / "index.rst"
 LONG = {  # pages whose code takes seconds
-    "choices.rst", "detection.rst", "estimation.rst", "identify.rst", "many_bridges.rst",
+    "choices.rst", "detection.rst", "estimation.rst", "identify.rst", "in_service.rst", "many_bridges.rst",
     "method.rst", "models.rst", "preparing_records.rst", "quickstart.rst",
     "records_theory.rst", "studies.rst", "three_steps.rst", "validation.rst",
 }  # fmt: skip

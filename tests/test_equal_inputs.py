@@ -1,166 +1,30 @@
 """Equal inputs give equal results: every public estimator, whatever holds the numbers that it is given."""
 
 import functools
-import importlib
-import inspect
 import io
 import os
 import pickle
-import pkgutil
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import clone
 from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import OneClassSVM
 
-import skthermo
-from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import (
-    CompensatedDetector,
-    DirectionalDetector,
-    MahalanobisDetector,
-    OutlierDetector,
-    TemperatureCompensator,
-)
-from skthermo.monitoring import Monitor
-from skthermo.preprocessing import (
-    BiasAligner,
-    ExponentialMeans,
-    HampelFilter,
-    HingeFeatures,
-    KNNGapImputer,
-    LagFeatures,
-    ModeTracker,
-    SensorMeans,
-    check_records,
-)
-from skthermo.studies import DetectabilityStudy, sweep
-from skthermo.surrogate import DataInformedFEM, FleetMapper, InverseSurrogate, PosteriorInverse, TemperatureMapper
-from skthermo.updating import ModelUpdater
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import DirectionalDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.preprocessing import check_records
+from tests.estimators import BOTH, CASES, COMPENSATOR, FEW, GAPPED, TRUSS, T, assert_same
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 ROOT = Path(__file__).parents[1]
-
-TRUSS = make_truss()
-YEAR = make_truss_campaign(samples_per_year=90, random_state=0)
-T = YEAR.temperatures.reset_index(drop=True)
-F = YEAR.frequencies.reset_index(drop=True)
-MODES = list(F)
-GAPPED = F.mask(np.random.default_rng(0).random(F.shape) < 0.03)
-ONE_GAP = F.mask(F["f3"].max() == F)
-BOTH = T.join(GAPPED)
-FEW = F[MODES[:2]]  # to detectors that draw many samples
-MEASURED = F[:5]
-STAMPED = T.join(FEW).set_axis(pd.date_range("2025-01-01", periods=len(T), name="time"))
-NOMINAL, SHAPES = (values[0] for values in TRUSS.modes(np.ones((1, 4))))
-LINEAR = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, n_samples=50, noise=0.01, random_state=0)
-CHAIN = DataInformedFEM(TRUSS, inverse=LINEAR, mapper=TemperatureMapper(Ridge()), random_state=0)
-COMPENSATOR = TemperatureCompensator(Ridge(), targets=MODES)
-COMPENSATED = CompensatedDetector(MahalanobisDetector(), Ridge(), targets=MODES)
-PIPELINE = make_pipeline(COMPENSATOR, MahalanobisDetector())
-
-
-@dataclass
-class Case:
-    """A public estimator, the tables that it learns from, and what it answers for the first of them."""
-
-    estimator: BaseEstimator
-    tables: tuple[pd.DataFrame, ...]
-    answers: Callable[..., dict[str, np.ndarray]]
-    needs_frames: bool = False  # settings name columns, or rows have stamps
-    is_slow: bool = False
-
-    def results(self, form=pd.DataFrame):
-        tables = [form(table) for table in self.tables]
-        found = self.answers(clone(self.estimator), *tables)
-        return {name: np.asarray(values, float) for name, values in found.items()}
-
-
-def after_fit(*methods):
-    def answers(estimator, *tables):
-        fitted = estimator.fit(*tables)
-        return {name: getattr(fitted, name)(tables[0]) for name in methods}
-
-    return answers
-
-
-def simulated(chain, *tables):
-    fitted = chain.fit(*tables)
-    (mean, std), ends = fitted.predict(tables[0], return_std=True), fitted.predict_interval(tables[0])
-    drawn = fitted.simulate(tables[0], damage={"top": 0.1}, noise="fitted", gaps="fitted", random_state=0)
-    return {"predict": mean, "std": std, "lowest": ends[0], "drawn": drawn, "theta": fitted.parameters_}
-
-
-def parameters(updater, X):
-    fitted = updater.fit(X)
-    return {"theta": fitted.theta_, "covariance": fitted.covariance_}
-
-
-def tracked(tracker, X):
-    modes = tracker.fit().transform({"frequencies": X, "shapes": np.tile(SHAPES.T, (len(X), 1, 1))})
-    return {"frequencies": modes.frequencies, "mac": modes.mac}
-
-
-def rates(study, X):
-    chain = fitted_chain()
-    study.set_params(fem=chain, scenarios=sweep(chain, (0.1,), groups=["bottom"]))
-    return {"rates": study.run(X)["rate"]}
-
-
-def evaluated(monitor, X):
-    later = X[:10].set_axis(X.index[:10] + pd.Timedelta(days=365))
-    return {"index": monitor.fit(X).update(later)["index"]}
-
-
-@functools.cache
-def fitted_chain():
-    return clone(CHAIN).fit(T, F)
-
-
-TRANSFORMED = after_fit("transform")
-DETECTED = after_fit("predict", "score_samples", "damage_index")
-BY_POSITION = TemperatureCompensator(Ridge(), targets=[3])
-STUDY = DetectabilityStudy(None, MahalanobisDetector(), [], n_repeats=2, uncertainty="noise", random_state=0)
-CASES = {
-    "lags": Case(LagFeatures(3), (BOTH,), TRANSFORMED),
-    "means": Case(ExponentialMeans(half_lives=[3]), (BOTH,), TRANSFORMED),
-    "outliers": Case(HampelFilter(), (BOTH,), TRANSFORMED),
-    "hinges": Case(HingeFeatures(), (T,), TRANSFORMED),
-    "sensors": Case(SensorMeans(), (T,), TRANSFORMED),
-    "gaps": Case(KNNGapImputer(), (BOTH,), TRANSFORMED),
-    "shift": Case(BiasAligner(NOMINAL), (GAPPED,), TRANSFORMED),
-    "scale": Case(BiasAligner(NOMINAL, method="scale"), (GAPPED,), TRANSFORMED),
-    "modes": Case(ModeTracker((NOMINAL, SHAPES)), (F,), tracked),
-    "inverse": Case(LINEAR, (F,), TRANSFORMED),
-    "posterior inverse": Case(PosteriorInverse(TRUSS), (GAPPED,), TRANSFORMED),
-    "mapper": Case(TemperatureMapper(), (T, F / F.mean()), after_fit("predict")),
-    "fleet mapper": Case(FleetMapper(), (T, F / F.mean()), after_fit("predict")),
-    "updater": Case(ModelUpdater(TRUSS), (MEASURED,), parameters),
-    "chain": Case(DataInformedFEM(TRUSS, random_state=0), (T, ONE_GAP), simulated, is_slow=True),
-    "study": Case(STUDY, (T[:40],), rates, is_slow=True),
-    "Mahalanobis": Case(MahalanobisDetector(), (F,), DETECTED),
-    "Mahalanobis, gaps": Case(MahalanobisDetector(), (GAPPED,), DETECTED),
-    "softening": Case(DirectionalDetector(), (FEW,), DETECTED, is_slow=True),
-    "directions": Case(DirectionalDetector(TRUSS), (GAPPED,), DETECTED, is_slow=True),
-    "novelty": Case(OutlierDetector(OneClassSVM()), (F,), DETECTED),
-    "compensator by position": Case(BY_POSITION, (BOTH,), TRANSFORMED, is_slow=True),
-    "compensator": Case(COMPENSATOR, (BOTH,), TRANSFORMED, needs_frames=True, is_slow=True),
-    "pipeline": Case(PIPELINE, (BOTH,), after_fit("predict", "score_samples"), needs_frames=True, is_slow=True),
-    "compensated": Case(COMPENSATED, (BOTH,), DETECTED, needs_frames=True, is_slow=True),
-    "monitor": Case(
-        Monitor(MahalanobisDetector(), targets=list(FEW)), (STAMPED[:60],), evaluated, needs_frames=True, is_slow=True
-    ),
-}
 
 
 def within(table, order="C"):
@@ -198,30 +62,43 @@ def in_float32(table):
     return table.to_numpy().astype(np.float32)
 
 
+def in_rows(table):
+    """A copy in C order."""
+    return table.to_numpy().copy(order="C")
+
+
+def frame_in_rows(table):
+    return framed(in_rows(table), table)
+
+
 ARRAYS = {  # equal to an array in C order
-    "again": lambda table: table.to_numpy().copy(order="C"),
-    "part of a larger array": within,
-    "backwards in memory": lambda table: table.to_numpy()[::-1].copy()[::-1],
     "Fortran order": lambda table: np.asfortranarray(table.to_numpy()),
+    "part of a larger array": within,
     "lists": lambda table: table.to_numpy().tolist(),
-    "pickled": lambda table: pickle.loads(pickle.dumps(table.to_numpy().copy(order="C"))),
-    "frame": lambda table: framed(table.to_numpy().copy(order="C"), table),
+    "frame": frame_in_rows,
+    "backwards in memory": lambda table: table.to_numpy()[::-1].copy()[::-1],
 }
 FRAMES = {  # equal to a frame in C order
-    "again": lambda table: framed(table.to_numpy().copy(order="C"), table),
-    "part of a larger array": lambda table: framed(within(table), table),
-    "Fortran": lambda table: framed(np.asfortranarray(table.to_numpy()), table),
     "columns of their own": lambda table: pd.DataFrame({name: table[name].copy() for name in table}),
-    "pickled": lambda table: pickle.loads(pickle.dumps(framed(table.to_numpy().copy(order="C"), table))),
     "CSV": from_csv,
+    "Fortran": lambda table: framed(np.asfortranarray(table.to_numpy()), table),
+    "part of an array": lambda table: framed(within(table), table),
+    "pickled": lambda table: pickle.loads(pickle.dumps(frame_in_rows(table))),
     "Parquet": from_parquet,
 }
-IN_SHORT = {"Fortran order", "lists", "columns of their own", "float32", "polars"}  # of cases that are slow
+AT_NIGHT = {"backwards in memory", "CSV", "Fortran", "part of an array", "pickled", "Parquet"}
+MADE_OF_OTHERS = {"pipeline", "compensated"}
 
 
 def marked(case, form):
-    is_nightly = CASES[case].is_slow and form not in IN_SHORT
+    """Of cases that are slow, one form is tried each time."""
+    in_short = "columns of their own" if CASES[case].needs_frames else "Fortran order"
+    is_nightly = form in AT_NIGHT or case in MADE_OF_OTHERS or (CASES[case].is_slow and form != in_short)
     return pytest.param(case, form, id=f"{case}, {form}", marks=[pytest.mark.nightly] * is_nightly)
+
+
+def by_form(forms):
+    return [pytest.param(form, marks=[pytest.mark.nightly] * (form in AT_NIGHT)) for form in forms]
 
 
 def each(forms, needs_frames=False):
@@ -232,30 +109,12 @@ def each(forms, needs_frames=False):
 
 @functools.cache
 def of_arrays(case):
-    return CASES[case].results(ARRAYS["again"])
+    return CASES[case].results(in_rows)
 
 
 @functools.cache
 def of_frames(case):
-    return CASES[case].results(FRAMES["again"])
-
-
-def assert_same(found, expected, **tolerance):
-    assert found.keys() == expected.keys()
-    for name, values in expected.items():
-        assert not np.isnan(values).all()
-        if tolerance:
-            np.testing.assert_allclose(found[name], values, **tolerance, err_msg=name)
-        else:
-            np.testing.assert_array_equal(found[name], values, err_msg=name)
-
-
-def test_every_public_estimator_has_a_case():
-    rooms = [importlib.import_module(m.name) for m in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if m.ispkg]
-    public = {getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
-    classes = {thing for thing in public if isinstance(thing, type) and not inspect.isabstract(thing)}
-    estimators = {thing for thing in classes if issubclass(thing, BaseEstimator)}
-    assert estimators <= {type(case.estimator) for case in CASES.values()}
+    return CASES[case].results(frame_in_rows)
 
 
 @each(ARRAYS)
@@ -281,10 +140,10 @@ def test_polars_frames_give_equal_results(case, form):
     assert_same(CASES[case].results(in_polars), of_frames(case), rtol=1e-9)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_another_thread_gives_equal_results(case):
+@each(["in a thread"], needs_frames=True)
+def test_another_thread_gives_equal_results(case, form):
     found = []
-    thread = threading.Thread(target=lambda: found.append(CASES[case].results(FRAMES["again"])))
+    thread = threading.Thread(target=lambda: found.append(CASES[case].results(frame_in_rows)))
     thread.start()
     thread.join()
     assert_same(found[0], of_frames(case))
@@ -293,26 +152,26 @@ def test_another_thread_gives_equal_results(case):
 PROGRAM = """
 import pickle, sys, warnings
 warnings.simplefilter("ignore")
-from tests.test_equal_inputs import CASES, FRAMES
-found = {name: case.results(FRAMES["again"]) for name, case in CASES.items()}
+from tests.estimators import CASES
+from tests.test_equal_inputs import frame_in_rows
+found = {name: CASES[name].results(frame_in_rows) for name in CASES}
 sys.stdout.buffer.write(pickle.dumps(found))
 """
 
 
+@pytest.mark.nightly
 def test_another_process_gives_equal_results():
     paths = os.pathsep.join([str(ROOT), *filter(None, sys.path)])
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=os.environ | {"PYTHONPATH": paths}, capture_output=True, check=True
-    )
-    found = pickle.loads(done.stdout)
+    command, env = [sys.executable, "-c", PROGRAM], os.environ | {"PYTHONPATH": paths}
+    found = pickle.loads(subprocess.run(command, env=env, capture_output=True, check=True).stdout)
     for case in CASES:
         assert_same(found[case], of_frames(case))
 
 
-@pytest.mark.parametrize("form", [*FRAMES, "polars"])
+@pytest.mark.parametrize("form", by_form([*FRAMES, "polars"]))
 def test_checks_of_equal_records_find_the_same(form):
     convert = in_polars if form == "polars" else FRAMES[form]
-    found, expected = (check_records(*map(one, (T, GAPPED))) for one in (convert, FRAMES["again"]))
+    found, expected = (check_records(*map(one, (T, GAPPED))) for one in (convert, frame_in_rows))
     pd.testing.assert_frame_equal(found.table, expected.table)
     np.testing.assert_array_equal(found.outliers, expected.outliers)
     pd.testing.assert_frame_equal(found.frequencies, expected.frequencies, check_freq=False)
@@ -329,12 +188,7 @@ def residuals():
     return compensator.fit_transform(BOTH), compensator.transform(later.temperatures.join(later.frequencies))
 
 
-COPIES = {
-    "copied": lambda R: R.copy(),
-    "pickled": lambda R: pickle.loads(pickle.dumps(R)),
-    "CSV": from_csv,
-    "array": lambda R: R.to_numpy(copy=True),
-}
+COPIES = {"loaded": lambda R: pickle.loads(pickle.dumps(R)), "CSV": from_csv, "array": lambda R: R.to_numpy(copy=True)}
 DETECTORS = {
     "Mahalanobis": MahalanobisDetector(),
     "softening": DirectionalDetector(),
@@ -357,7 +211,7 @@ def of_residuals(name):
     return evaluated_residuals(name, lambda R: R)
 
 
-@pytest.mark.parametrize("form", COPIES)
+@pytest.mark.parametrize("form", by_form(COPIES))
 @pytest.mark.parametrize("name", DETECTORS)
 def test_copies_of_residuals_give_equal_results(name, form):
     assert_same(evaluated_residuals(name, COPIES[form]), of_residuals(name))

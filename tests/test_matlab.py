@@ -139,14 +139,8 @@ DAMAGED = {
     "twice": (mat_file(X, X), "after variable 'x': the file holds it twice"),
     "a number": (mat_file(element(9, b"12345678")), "the first variable: an element of type 9"),
     "a swallowed variable": (mat_file(bytes(SWALLOWED)), "2 parts of values; expected 1"),
-    "a lost flag": (
-        mat_file(variable(6, (1, 1), doubles(1.0), doubles(2.0))),
-        "2 parts of values; expected 1",
-    ),
-    "an added flag": (
-        mat_file(variable(6 | 0x0800, (1, 1), doubles(1.0)), X),
-        "1 parts of values; expected 2",
-    ),
+    "a lost flag": (mat_file(variable(6, (1, 1), doubles(1.0), doubles(2.0))), "2 parts of values; expected 1"),
+    "an added flag": (mat_file(variable(6 | 0x0800, (1, 1), doubles(1.0)), X), "1 parts of values; expected 2"),
     "too few values": (mat_file(variable(6, (3, 1), doubles(1.0, 2.0))), "variable 'x': "),
     "too many values": (mat_file(variable(6, (1, 1), doubles(1.0, 2.0))), "variable 'x': "),
     "cut off": (mat_file(X)[:-8], "an element of"),
@@ -159,10 +153,7 @@ DAMAGED = {
     "too few starts": (mat_file(sparse_2x2([0, 1], [0, 1])), "variable 'x': "),
     "too few sparse values": (mat_file(sparse_2x2([0, 1], [0, 1, 2], (1.0,))), "variable 'x': "),
     "a sparse size": (mat_file(sparse_2x2([0, 1], [0, 1, 2], shape=(-2, 2))), "variable 'x': "),
-    "a packed length": (
-        mat_file(packed(X[:4] + struct.pack("<I", len(X)) + X[8:])),
-        "an element of",
-    ),
+    "a packed length": (mat_file(packed(X[:4] + struct.pack("<I", len(X)) + X[8:])), "an element of"),
     "a packed checksum": (mat_file(packed(X)[:-1] + b"\0"), "incorrect data check"),
     "packed, cut off": (mat_file(packed(X)[:-9]), "an element of"),
 }

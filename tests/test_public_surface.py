@@ -4,15 +4,13 @@
 """
 
 import dataclasses
-import importlib
 import inspect
-import pkgutil
 
 import pandas as pd
 import pytest
 from sklearn.utils import Bunch
 
-import skthermo
+from tests.source import public
 
 LIMITS = pd.DataFrame.from_dict(
     {  # of each package, and the most that one of its classes or functions has
@@ -48,14 +46,9 @@ LARGER = {  # what has more, and why
 def surface():
     """Parameters, fields and methods of all public classes and functions, in rows such as "fem.Bar"."""
     rows = {}
-    for room in pkgutil.iter_modules(skthermo.__path__, "skthermo."):
-        module = importlib.import_module(room.name)
-        for name in getattr(module, "__all__", ()) if room.ispkg and "._" not in room.name else ():
-            thing = getattr(module, name)
-            key = f"{room.name.removeprefix('skthermo.')}.{name}"
-            rows[key] = (
-                sizes_of_class(thing) if inspect.isclass(thing) else (len(inspect.signature(thing).parameters), 0, 0)
-            )
+    for room, name, thing in public():
+        of_function = None if inspect.isclass(thing) else (len(inspect.signature(thing).parameters), 0, 0)
+        rows[f"{room}.{name}"] = of_function or sizes_of_class(thing)
     return pd.DataFrame.from_dict(rows, orient="index", columns=list(MOST))
 
 

@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 PROGRAM = """
 import time
 
@@ -36,6 +38,7 @@ assert blas_threads() == {2}
 """
 
 
+@pytest.mark.nightly
 def test_limits_hold_in_every_thread_and_are_lifted_again():
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM],

@@ -1,11 +1,10 @@
 """Every code of a warning has its entry in the guide, and every entry there is of something that the source says."""
 
-import ast
 import re
 from collections import Counter
 from pathlib import Path
 
-from tests.source import kinds_of_warnings
+from tests.source import kinds_of_warnings, trees
 
 ROOT = Path(__file__).parents[1]
 SOURCE = "\n".join(path.read_text() for path in sorted((ROOT / "skthermo").rglob("*.py")))
@@ -17,7 +16,8 @@ def entries(page):
 
 
 def test_every_warning_has_an_entry_and_every_entry_a_warning():
-    given = {(kind, category) for _, kind, category in kinds_of_warnings(ast.parse(SOURCE))}
+    files = trees(ROOT / "skthermo").values()
+    given = {(kind, category) for tree in files for _, kind, category in kinds_of_warnings(tree)}
     listed, kinds = entries("warnings"), {kind for kind, _ in given}
     remedy = "docs/guide/warnings.rst: one entry for each kind of warning, and none for others:"
     assert Counter(listed) == Counter(kinds), f"{remedy} {sorted({*listed} ^ kinds) or 'one stands there twice'}"

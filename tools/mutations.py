@@ -97,6 +97,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("prior", "(theta - 1) / prior", "theta / prior"),
         ("derivative of the prior", "np.diag(1 / prior)", "np.diag(prior)"),
         ("information of shapes", "np.sqrt(2 * max(n_dofs - 1, 1))", "np.sqrt(max(n_dofs - 1, 1))"),
+        ("number of residuals", "max(len(self.dofs) - 1, 0)", "len(self.dofs)"),
+        ("convergence beside failures", "success = bool(result.success) and", "success = bool(result.success) or"),
     ],
     ("updating/_identifiability.py", "updating/test_sensitivity.py"): [
         ("noise of shapes", "np.sqrt(len(shapes)) / shape_noise", "1 / shape_noise"),
@@ -107,12 +109,6 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("updating/_updater.py", "updating/test_ensemble.py"): [
         ("stiffness that a parameter scales drawn twice", "if terms <= own)) == own", "if terms < own)) == own"),
-    ],
-    ("updating/_residuals.py", "updating/test_updater_errors.py"): [
-        ("number of residuals", "max(len(self.dofs) - 1, 0)", "len(self.dofs)"),
-    ],
-    ("updating/_residuals.py", "updating/test_search.py"): [
-        ("convergence beside failures", "success = bool(result.success) and", "success = bool(result.success) or"),
     ],
     ("updating/_diagnostics.py", "updating/test_updater.py"): [
         ("numbers of the optima", 'np.argsort(table["objective"], kind="stable")', "range(len(table))"),
@@ -141,7 +137,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("sensors in unknown weather", "outside = beyond > 0", "outside = beyond > 1e9"),
         ("usual departures of sensors", "np.fmax(3 * usual, least)", "np.fmax(0.5 * usual, least)"),
     ],
-    ("residuals/weather.py", "residuals/test_extrapolation.py"): [
+    ("residuals/weather.py", "residuals/test_doubts.py"): [
         ("growth outside the weather", "1 + np.log1p(self.reach", "1 + 0 * np.log1p(self.reach"),
     ],
     ("detection/_base.py", "detection/test_thresholds.py"): [
@@ -172,7 +168,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("a part too many in a file", "len(parts) != n_values", "len(parts) < n_values"),
         ("unsorted rows in a file", "if not matrix.has_canonical_format", "if False"),
     ],
-    ("fem/external/_texts.py", "fem/test_triplets.py"): [
+    ("fem/external/_texts.py", "fem/test_exported_texts.py"): [
         ("entries on both sides in a file", "if paired or in_order", "if paired"),
     ],
     ("preprocessing/_poles.py", "preprocessing/test_mode_tracker.py"): [

@@ -361,9 +361,9 @@ def make_kw51_campaign(
     Examples
     --------
     >>> from skthermo.datasets import make_kw51_campaign
-    >>> campaign = make_kw51_campaign(n_hours=3000, random_state=0)
+    >>> campaign = make_kw51_campaign(n_hours=300, random_state=0)
     >>> campaign.frequencies.shape, campaign.state.unique().tolist()
-    ((3000, 6), ['before'])
+    ((300, 6), ['before'])
     >>> campaign.clean_frequencies.iloc[0].round(2).tolist()
     [0.51, 1.21, 1.89, 2.51, 2.57, 2.91]
     """

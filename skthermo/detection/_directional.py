@@ -98,15 +98,14 @@ class DirectionalDetector(MahalanobisDetector):
     >>> from skthermo.datasets import make_truss, make_truss_campaign
     >>> from skthermo.detection import DirectionalDetector, MahalanobisDetector, TemperatureCompensator
     >>> from skthermo.surrogate import TemperatureMapper
-    >>> from sklearn.pipeline import make_pipeline
     >>> healthy, damaged = (make_truss_campaign(damage=damage, random_state=0) for damage in (None, {"bottom": 0.08}))
     >>> baseline, later = (campaign.temperatures.join(campaign.frequencies) for campaign in (healthy, damaged))
     >>> regression = TemperatureCompensator(TemperatureMapper(), targets=list(healthy.frequencies))
+    >>> residuals, later = regression.fit_transform(baseline), regression.transform(later)
     >>> of_stiffness = make_truss().damage_directions(kind="stiffness")
     >>> for directions in (None, "softening", make_truss(), of_stiffness):
-    ...     last = MahalanobisDetector() if directions is None else DirectionalDetector(directions)
-    ...     detector = make_pipeline(regression, last).fit(baseline)
-    ...     print(f"{(detector.predict(later) == -1).mean():.0%}")
+    ...     detector = MahalanobisDetector() if directions is None else DirectionalDetector(directions)
+    ...     print(f"{(detector.fit(residuals).predict(later) == -1).mean():.0%}")
     46%
     65%
     70%
@@ -114,7 +113,7 @@ class DirectionalDetector(MahalanobisDetector):
 
     Who looks for losses of section too finds those of stiffness less often. The smallest ones of the last detector:
 
-    >>> detector[-1].minimum_detectable_damage()[["bottom", "top", "diagonal"]].round(2)
+    >>> detector.minimum_detectable_damage()[["bottom", "top", "diagonal"]].round(2)
     direction
     bottom      0.09
     top         0.11

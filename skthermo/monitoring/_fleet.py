@@ -295,8 +295,8 @@ def fit_fleet(
         raise ValueError(
             f"monitor is {type(monitor).__name__!r}; expected a function of a fitted estimator that gives a Monitor"
         )
-    is_seed = isinstance(random_state, int | np.integer)
-    base = random_state if is_seed else as_random_state(random_state).randint(np.iinfo(np.int32).max)
+    generator, is_seed = as_random_state(random_state), isinstance(random_state, int | np.integer)
+    base = random_state if is_seed else generator.randint(np.iinfo(np.int32).max)
     path, restarted = None if folder is None else check_path(folder, "folder"), []
     with only_user(path):
         fleet = Fleet._in(path)

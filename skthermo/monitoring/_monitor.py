@@ -242,11 +242,11 @@ class Monitor(SavesFrames, Estimator):
     >>> from skthermo.datasets import make_truss_campaign
     >>> from skthermo.detection import MahalanobisDetector, TemperatureCompensator
     >>> from skthermo.monitoring import Monitor
-    >>> healthy = make_truss_campaign(3, random_state=0)
+    >>> healthy = make_truss_campaign(2, random_state=0)
     >>> records = healthy.temperatures.join(healthy.frequencies)
     >>> compensator = TemperatureCompensator(LinearRegression(), targets=list(healthy.frequencies))
-    >>> monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:730])
-    >>> answers = monitor.update(records[730:737])
+    >>> monitor = Monitor(make_pipeline(compensator, MahalanobisDetector())).fit(records[:365])
+    >>> answers = monitor.update(records[365:372])
     >>> monitor.status(monitor.last_).state
     'healthy'
     """

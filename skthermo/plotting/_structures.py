@@ -62,16 +62,16 @@ class StructureDisplay(Display):
     Examples
     --------
     >>> import matplotlib.pyplot as plt
-    >>> from skthermo.datasets import kw51_structure
+    >>> from skthermo.datasets import kw51_structure, truss_structure
     >>> from skthermo.plotting import StructureDisplay
     >>> errors = {"arch": 0.2, "girders": 0.5, "braces": 1.4}
     >>> display = StructureDisplay.from_structure(kw51_structure(), errors, label="error (%)")
     >>> display.colorbar_.ax.get_xlabel(), display.members_["lines"].get_clim()
     ('error (%)', (0.2, 1.4))
     >>> plt.close(display.figure_)
-    >>> display = StructureDisplay.from_structure(kw51_structure(), modes=[0])
+    >>> display = StructureDisplay.from_structure(truss_structure(), modes=[0])
     >>> display.ax_.get_title()
-    '$f_{1}$ = 0.477 Hz'
+    '$f_{1}$ = 7.485 Hz'
     >>> plt.close(display.figure_)
     """
 

@@ -103,7 +103,7 @@ def owner_report(
     >>> from skthermo.studies import DetectabilityStudy, sweep
     >>> from skthermo.surrogate import DataInformedFEM
     >>> year = make_truss_campaign(random_state=0)
-    >>> fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
+    >>> fem = DataInformedFEM(make_truss(1), random_state=0).fit(year.temperatures, year.frequencies[["f1"]])
     >>> scenarios = sweep(fem, (0.1, 0.3), ["bottom"])
     >>> study = DetectabilityStudy(fem, MahalanobisDetector(), scenarios, n_repeats=2, uncertainty="noise")
     >>> results = study.run(year.temperatures)

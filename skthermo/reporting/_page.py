@@ -146,6 +146,7 @@ def _place(error: Exception, folder: str = "") -> str:
     return f"{found[-1][0]}, line {found[-1][1]}" if found else ""
 
 
+@lru_cache(maxsize=1)
 def versions() -> list[tuple[str, str]]:
     """Versions of the programs by name."""
     found = {"Python": platform.python_version(), "skthermo": skthermo.__version__}

@@ -17,20 +17,10 @@ from sklearn.neighbors import LocalOutlierFactor
 from skthermo import datasets, detection, fem, metrics, plotting, preprocessing, studies, surrogate, updating
 from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector
 from skthermo.fem import AffineModel, Bar, Beam, Membrane, Spring, evaluate_modes
+from skthermo.monitoring import fit_fleet
 from skthermo.preprocessing import BiasAligner, HampelFilter, KNNGapImputer, LagFeatures
-from tests.bad_input.registry import (
-    EXAMPLES,
-    FOLDER,
-    LEGAL,
-    NOT_CALLED,
-    UNTRIED,
-    USUAL,
-    Example,
-    fitted,
-    is_registered,
-    method,
-    use,
-)
+from tests.bad_input import registry
+from tests.bad_input.registry import FOLDER, fitted, is_registered, methods, use
 from tests.bad_input.values import (
     HUGE,
     INF,
@@ -87,7 +77,7 @@ BOUNDED = by_name(0.2, NAMES, wrong=(20, 1.0, 0, -0.2), but=("too long",)) | {
 }
 PRIOR = by_name(0.2, NAMES, wrong=(20, 30))
 NOISE = by_name(0.01, MODES, wrong=(0.5, 1.0, 5), but=("zero inside",))
-USUAL |= {
+registry.USUAL |= {
     "random_state": (0, seed()),
     "model": (TRUSS, models()),
     "dofs": (DOFS, integers(23)),
@@ -180,9 +170,8 @@ for owner in (TRUSS, REDUCED):
     kind = type(owner).__name__
     rows = table(THETA, nan=False, positive=True, rows=False, but=("no rows",))
     one = table(ROW, nan=False, positive=True, rows=False, but=())
-    for name in ("frequencies", "modes", "jacobian", "linearised"):
-        method(f"fem.{kind}.{name}", owner, theta=(THETA, rows))
-    method(f"fem.{kind}.linearised_modes", owner, usual="dofs", theta=(THETA, rows))
+    methods(owner, "frequencies modes jacobian linearised", theta=(THETA, rows))
+    methods(owner, "linearised_modes", usual="dofs", theta=(THETA, rows))
     use(
         f"fem.{kind}.local_modes",
         lambda owner=owner, **a: owner.local_modes(**a).shapes(DOFS),
@@ -218,9 +207,9 @@ for owner in (TRUSS, REDUCED):
         usual="tol random_state",
         bounds=(0.1, BOUNDED),
     )
-    method(
-        f"fem.{kind}.nominal_mac",
+    methods(
         owner,
+        "nominal_mac",
         shapes=(
             TRUSS.modes(np.ones((1, 4)))[1],
             bad(None, "x", np.ones((23, 2)), np.ones((1, 5, 2)))
@@ -230,8 +219,8 @@ for owner in (TRUSS, REDUCED):
 FULL = {"full": (TRUSS, models()), "bounds": (0.1, BOUNDED)}
 use("fem.ReducedModel", lambda **a: solved(fem.ReducedModel(**a)), usual="tol random_state", **FULL)
 LOCAL = TRUSS.local_modes(ROW)
-method("fem.modal.LocalModes.shapes", LOCAL, usual="dofs")
-method("fem.modal.LocalModes.derivatives", LOCAL, usual="dofs", columns=([0, 1], integers(6)))
+use("fem.modal.LocalModes.shapes", LOCAL.shapes, usual="dofs")
+use("fem.modal.LocalModes.derivatives", LOCAL.derivatives, usual="dofs", columns=([0, 1], integers(6)))
 
 
 def member(cls, **extra):
@@ -372,16 +361,16 @@ use(
     lambda **a: fem.CallableModel(**a).frequencies([[1.0], [1.1]]),
     **PROGRAM,
     n_modes=(1, count(2)),
-    vectorized=(False, flag()),
+    usual="vectorized",
     cache=(None, bad(True, 3, b"c", __file__, Path, NAN)),
     groups=({"g": ["k"]}, bad("k", ["k"], 3, True, {"g": []}, {"g": ["E"]}, {"g": 1}, {"g": None}, {"g": ["k", "k"]})),
 )
 SOFT = pd.DataFrame({"k": [1.0, 1.1]})
 PROGRAMMED = fem.CallableModel(lambda theta: [theta[0] ** 0.5], ["k"], 1)
-method("fem.CallableModel.damaged", PROGRAMMED, damage=({"k": 0.1}, by_key({"k": 0.1}, wrong=(20, 1.0, -15))))
-method(
-    "fem.CallableModel.frequencies",
+methods(PROGRAMMED, "damaged", damage=({"k": 0.1}, by_key({"k": 0.1}, wrong=(20, 1.0, -15))))
+methods(
     PROGRAMMED,
+    "frequencies",
     theta=(SOFT, table(SOFT, nan=False, positive=True, rows=False, but=("no rows", "columns in another order"))),
 )
 use(
@@ -475,14 +464,11 @@ use(
     factor=(2.0, FACTORS),
     check=(
         None,
-        {
-            "a matrix": STIFF,
-            "unknown": ({"x": 2.0}, STIFF),
-            "text": ({"k": "2"}, STIFF),
-            "other stiffness": ({"k": 3.0}, STIFF),
-            "NaN inside": ({"k": 2.0}, STIFF * np.nan),
-            "None": ({"k": 2.0}, None),
-        },
+        (
+            {"a matrix": STIFF, "unknown": ({"x": 2.0}, STIFF), "text": ({"k": "2"}, STIFF)}
+            | {"other stiffness": ({"k": 3.0}, STIFF), "NaN inside": ({"k": 2.0}, STIFF * np.nan)}
+            | {"None": ({"k": 2.0}, None)}
+        ),
     ),
 )
 (FOLDER / "tower.sti").write_text("1 1 800.0\n1 2 -400.0\n2 2 400.0\n")
@@ -509,23 +495,18 @@ fitted(
     BiasAligner,
     (F, PLAIN),
     reference=(NOMINAL[0], by_name(NOMINAL[0], MODES, but=("negative inside",))),
-    method=("shift", choice()),
+    usual="method",
 )
 ALIGNED = BiasAligner(TRUSS).fit(F)
 SAME = table(F, rows=False)
-method("preprocessing.BiasAligner.transform", ALIGNED, X=(F, SAME))
-method("preprocessing.BiasAligner.inverse_transform", ALIGNED, X=(F, SAME))
+methods(ALIGNED, "transform inverse_transform", X=(F, SAME))
 use(
     "preprocessing.BlockedKFold",
     lambda **a: preprocessing.BlockedKFold(**a).fold_of(F),
     n_splits=(3, count(1, 10**6)),
     block=("7D", durations()),
 )
-method(
-    "preprocessing.BlockedKFold.fold_of",
-    preprocessing.BlockedKFold(3),
-    X=(F, bad(None, 3, True, F[:2], F[:0], pd.DataFrame)),
-)
+methods(preprocessing.BlockedKFold(3), "fold_of", X=(F, bad(None, 3, True, F[:2], F[:0], pd.DataFrame)))
 fitted(
     preprocessing.HingeFeatures,
     (T, table(T, fixed=False, rows=False, fitting=True, but=("constant",))),
@@ -540,7 +521,7 @@ use(
         vector(np.ones(len(T)), size=None, but=("zero inside",)) | bad(pd.Series(1.0, T.index.shift(1)), np.ones(3)),
     ),
 )
-method("preprocessing.HingeFeatures.transform", preprocessing.HingeFeatures().fit(T), X=(T, table(T, rows=False)))
+methods(preprocessing.HingeFeatures().fit(T), "transform", X=(T, table(T, rows=False)))
 GAPPY = F.mask(np.arange(len(F))[:, np.newaxis] % 7 == np.arange(6))
 fitted(
     KNNGapImputer,
@@ -548,11 +529,7 @@ fitted(
     usual="n_neighbors weights metric copy add_indicator keep_empty_features",
     missing_values=(NAN, bad("missing", [NAN], float, STAMP, True, b"x")),
 )
-method(
-    "preprocessing.KNNGapImputer.transform",
-    KNNGapImputer().fit(GAPPY),
-    X=(GAPPY, table(GAPPY, rows=False)),
-)
+methods(KNNGapImputer().fit(GAPPY), "transform", X=(GAPPY, table(GAPPY, rows=False)))
 fitted(
     LagFeatures,
     (
@@ -567,13 +544,9 @@ fitted(
     lags=(2, count() | bad(["1"], [0, True], [-1], [1, 1], [0, NAN], [STAMP], [0.5, 1.5])),
     freq=("1h", durations()),
     tolerance=("3h", durations()),
-    padding=("nan", choice()),
+    usual="padding",
 )
-method(
-    "preprocessing.LagFeatures.transform",
-    LagFeatures(2).fit(HOURLY),
-    X=(HOURLY, table(HOURLY, rows=False)),
-)
+methods(LagFeatures(2).fit(HOURLY), "transform", X=(HOURLY, table(HOURLY, rows=False)))
 POLES = {"frequencies": np.array([[2.0, 2.2], [2.1, 2.15]]), "shapes": np.array([[[1, 2.0, 1], [1, 0, -1]]] * 2)}
 REFERENCE = (np.array([2.0, 2.2]), np.array([[1.0, 1], [2, 0], [1, -1]]))
 POLED = {
@@ -583,14 +556,10 @@ POLED = {
 }
 POLED |= {
     f"shapes: {c}": POLES | {"shapes": v}
-    for c, v in {
-        "texts": POLES["shapes"].astype(str),
-        "booleans": POLES["shapes"] > 0,
-        "two axes": POLES["shapes"][0],
-        "infinite": POLES["shapes"] * INF,
-        "other sensors": POLES["shapes"][:, :, :2],
-        "text": "x",
-    }.items()
+    for c, v in (
+        {"texts": POLES["shapes"].astype(str), "booleans": POLES["shapes"] > 0, "two axes": POLES["shapes"][0]}
+        | {"infinite": POLES["shapes"] * INF, "other sensors": POLES["shapes"][:, :, :2], "text": "x"}
+    ).items()
 }
 REFERRED = bad(None, "model", True, 3, (REFERENCE[0],), tuple, ()) | {
     f"frequencies: {c}": (v, REFERENCE[1]) for c, v in vector(REFERENCE[0], size=2).items()
@@ -601,9 +570,7 @@ REFERRED |= {
 }
 use(
     "preprocessing.ModeTracker",
-    lambda **a: (
-        preprocessing.ModeTracker(**{k: v for k, v in a.items() if k != "X"}).fit().transform(a["X"]).frequencies
-    ),
+    lambda X, **a: preprocessing.ModeTracker(**a).fit().transform(X).frequencies,
     X=(POLES, POLED | bad(None, "poles", 3, True, {}, dict)),
     reference=(REFERENCE, REFERRED),
     max_shift=(0.15, number(0, 1, 15, -0.1)),
@@ -617,17 +584,10 @@ use(
 PREDICTING = weather(T, rows=False)
 WEATHER = weather(T, rows=True, fixed=False, fitting=True)
 MEASURED = frequencies(F, rows=True, fitting=True, but=("unknown names", "columns in another order"))
-
-
-def chain_of(**values):
-    X, y = values.pop("X"), values.pop("y")
-    return surrogate.DataInformedFEM(**values).fit(X, y).predict(T)
-
-
 PARTS = {"inverse": surrogate.InverseSurrogate(**INVERSE), "mapper": surrogate.TemperatureMapper(Ridge())}
 use(
     "surrogate.DataInformedFEM",
-    chain_of,
+    lambda X, y, **a: surrogate.DataInformedFEM(**a).fit(X, y).predict(T),
     usual="model n_jobs random_state",
     inverse=(PARTS["inverse"], estimators()),
     mapper=(PARTS["mapper"], estimators()),
@@ -644,26 +604,23 @@ use(
     y=(F, MEASURED),
     shapes=(None, bad("x", 3, True, SHAPES, np.full((120, 6, 3), STAMP), np.ones((120, 6, 3)))),
 )
-for name in ("predict", "predict_parameters", "extrapolation_distance", "predict_interval", "weather"):
-    usual = {"predict": "return_std", "predict_interval": "confidence"}.get(name, "")
-    method(f"surrogate.DataInformedFEM.{name}", CHAIN, usual=usual, X=(T, PREDICTING))
-method(
-    "surrogate.DataInformedFEM.score", CHAIN, X=(T, weather(T, rows=True)), y=(F, table(F, rows=True, positive=True))
-)
-use(
-    "surrogate.DataInformedFEM.estimate_parameters",
-    CHAIN.estimate_parameters,
-    F=(F, frequencies(F, rows=False)),
-    shapes=(None, bad("x", 3, True, SHAPES)),
-)
+methods(CHAIN, "predict_parameters extrapolation_distance weather", X=(T, PREDICTING))
+methods(CHAIN, "predict", usual="return_std", X=(T, PREDICTING))
+methods(CHAIN, "predict_interval", usual="confidence", X=(T, PREDICTING))
+methods(CHAIN, "score", X=(T, weather(T, rows=True)), y=(F, table(F, rows=True, positive=True)))
+NO_SHAPES = (None, bad("x", 3, True, SHAPES))
+methods(CHAIN, "estimate_parameters", F=(F, frequencies(F, rows=False)), shapes=NO_SHAPES)
 CHANGES = {
     "damage": (
         {"top": 0.1},
-        by_key({"top": 0.1}, wrong=(20, 1.0, -15))
+        DAMAGE
         | {
-            "rows too few": {"top": np.full(3, 0.1)},
-            "texts": {"top": np.full(120, "0.1")},
-            "booleans": {"top": np.ones(120, dtype=bool)},
+            cause: {"top": values}
+            for cause, values in (
+                ("rows too few", np.full(3, 0.1)),
+                ("texts", ["0.1"] * 120),
+                ("booleans", [True] * 120),
+            )
         },
     ),
     "parameters": ({"top": 1.02}, PARAMETERS),
@@ -674,7 +631,7 @@ FAULTS = {
     "gaps": (0.1, SHARE_OF_VALUES | bad("often")),
     "outliers": (0.01, SHARE_OF_VALUES | bad("often", np.full((3, 6), 5.0))),
 }
-method("surrogate.DataInformedFEM.simulate", CHAIN, usual="noise random_state", X=(T, PREDICTING), **CHANGES, **FAULTS)
+methods(CHAIN, "simulate", usual="noise random_state", X=(T, PREDICTING), **CHANGES, **FAULTS)
 INVERTING = {
     "regressor": (Ridge(), estimators("None")),
     "bounds": (0.2, BOUNDED),
@@ -683,16 +640,10 @@ INVERTING = {
     "memory": (None, bad(True, 3, b"m", __file__, Path, NAN, ["m"])),
 }
 INVERTED = frequencies(F, rows=False, but=("unknown names", "columns in another order"))
-use(
-    "surrogate.InverseSurrogate",
-    lambda **a: (
-        surrogate.InverseSurrogate(**{k: v for k, v in a.items() if k not in "Xy"}).fit(a["X"], a["y"]).transform(F)
-    ),
-    usual="model n_jobs random_state",
-    **INVERTING,
-    X=(F, INVERTED),
-    y=(None, {}),
-)
+OF_F = lambda estimator, X: estimator.transform(F)  # noqa: E731
+COMMON = "model n_jobs random_state"
+fitted(surrogate.InverseSurrogate, (F, INVERTED), (None, {}), usual=COMMON, after=OF_F, **INVERTING)
+INVERTIBLE = (F, table(F, rows=False, positive=True))
 POSTERIOR = surrogate.PosteriorInverse(TRUSS, noise=0.01).fit(F)
 use(
     "surrogate.PosteriorInverse",
@@ -705,8 +656,8 @@ use(
     X=(F, INVERTED),
 )
 SHAPED = np.hstack([NOMINAL, evaluate_modes(TRUSS, np.ones((1, 4)), DOFS)[1].swapaxes(1, 2).reshape(1, -1)])
-EXAMPLES.append(
-    Example(
+registry.EXAMPLES.append(
+    registry.Example(
         "surrogate.PosteriorInverse",
         surrogate.PosteriorInverse,
         lambda **a: surrogate.PosteriorInverse(TRUSS, dofs=DOFS, noise=0.01, prior=0.1, **a).fit_transform(SHAPED),
@@ -714,26 +665,20 @@ EXAMPLES.append(
         {"shape_noise": by_name(0.01, MODES, wrong=(1.0, 5))},
     )
 )
-INVERTIBLE = (F, table(F, rows=False, positive=True))
-method("surrogate.PosteriorInverse.transform", POSTERIOR, usual="return_std", X=INVERTIBLE)
-method("surrogate.PosteriorInverse.invert", POSTERIOR, X=INVERTIBLE)
+methods(POSTERIOR, "transform", usual="return_std", X=INVERTIBLE)
+methods(POSTERIOR, "invert", X=INVERTIBLE)
 use(
     "surrogate.InverseSurrogate.fit",
     lambda **a: surrogate.InverseSurrogate(None, Ridge()).fit(**a).transform(F),
     X=(F, table(F, rows=True, fixed=False, fitting=True)),
     y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True, fixed=False, but=("a number",))),
 )
-INVERTIBLE = (F, table(F, rows=False, positive=True))
-method("surrogate.InverseSurrogate.transform", SURROGATE, X=INVERTIBLE)
-method("surrogate.InverseSurrogate.predict", SURROGATE, usual="return_std", X=INVERTIBLE)
-method(
-    "surrogate.InverseSurrogate.inverse_transform",
+methods(SURROGATE, "transform", X=INVERTIBLE)
+methods(SURROGATE, "predict", usual="return_std", X=INVERTIBLE)
+methods(SURROGATE, "inverse_transform", X=(THETA, table(THETA, rows=False, positive=True, but=("no rows",))))
+methods(
     SURROGATE,
-    X=(THETA, table(THETA, rows=False, positive=True, but=("no rows",))),
-)
-method(
-    "surrogate.InverseSurrogate.score",
-    SURROGATE,
+    "score",
     X=(F, table(F, rows=True, positive=True)),
     y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True)),
 )
@@ -754,18 +699,13 @@ use(
         vector(np.ones(len(T)), but=("zero inside",)) | bad(pd.Series(1.0, T.index.shift(1)), np.ones(3)),
     ),
 )
-method("surrogate.TemperatureMapper.predict", MAPPER, usual="return_std", X=(T, table(T, rows=False)))
-method(
-    "surrogate.TemperatureMapper.score",
-    MAPPER,
-    X=(T, table(T, rows=True)),
-    y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True)),
-)
+methods(MAPPER, "predict", usual="return_std", X=(T, table(T, rows=False)))
+methods(MAPPER, "score", X=(T, table(T, rows=True)), y=(CHAIN.parameters_, table(CHAIN.parameters_, rows=True)))
 use(
     "surrogate.paper_network",
     lambda **a: surrogate.paper_network(**a).hidden_layer_sizes,
     network=("truss", choice()),
-    dropout=(True, flag()),
+    usual="dropout",
 )
 
 
@@ -863,9 +803,9 @@ for name in detection.__all__:  # detectors that take what all detectors take
     cls = getattr(detection, name)
     if issubclass(cls, detection.DamageDetector) and not inspect.isabstract(cls) and not is_registered(cls):
         fitted(cls, (F, WATCHED), usual=" ".join(inspect.signature(cls).parameters), after=DAMAGE_INDEX)
-for name in ("damage_index", "decision_function", "predict", "score_samples"):
-    for owner in (DETECTOR, OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F)):
-        method(f"detection.{type(owner).__name__}.{name}", owner, X=(F, table(F, rows=False)))
+ASKED = "damage_index decision_function predict score_samples"
+for owner in (DETECTOR, OutlierDetector(IsolationForest(n_estimators=5, random_state=0)).fit(F)):
+    methods(owner, ASKED, X=(F, table(F, rows=False)))
 SIDE_BY_SIDE = table(
     BOTH,
     rows=False,
@@ -893,10 +833,8 @@ fitted(
     cv=(3, FOLDS),
     window_share=(0.5, number(0, -0.1, 2)),
 )
-for name in ("damage_index", "decision_function", "predict", "score_samples", "residuals"):
-    method(f"detection.CompensatedDetector.{name}", COMPENSATED, X=(BOTH, table(BOTH, rows=False)))
-method("detection.TemperatureCompensator.transform", COMPENSATOR, X=(BOTH, table(BOTH, rows=False)))
-method("detection.TemperatureCompensator.extrapolation_distance", COMPENSATOR, X=(BOTH, table(BOTH, rows=False)))
+methods(COMPENSATED, f"{ASKED} residuals", X=(BOTH, table(BOTH, rows=False)))
+methods(COMPENSATOR, "transform extrapolation_distance", X=(BOTH, table(BOTH, rows=False)))
 
 # metrics
 PREDICTED = F * 1.01
@@ -946,7 +884,7 @@ use(
     lambda **a: datasets.make_kw51(**a).n_modes,
     parameters=(["E_arc"], names(["E_arc"])),
     n_modes=(2, count()),
-    updated=(False, flag()),
+    usual="updated",
 )
 use(
     "datasets.make_truss_campaign",
@@ -957,26 +895,18 @@ use(
 GROUP = "girders"
 use(
     "datasets.make_kw51_campaign",
-    usual="noise random_state shapes",
+    usual="noise random_state shapes gaps retrofit",
     n_hours=(48, count()),
-    gaps=(False, flag()),
-    retrofit=(False, flag()),
     drift=({GROUP: 0.01}, by_key({GROUP: 0.01}, wrong=(1000,))),
     damage=({GROUP: 0.1}, by_key({GROUP: 0.1}, wrong=(20, 1.0))),
-    damage_from=(
-        "2018-10-02",
-        moments("half", "too late", "negative") | bad("2030-01-01", "2000-01-01", 5),
-    ),
+    damage_from=("2018-10-02", moments("half", "too late", "negative") | bad("2030-01-01", "2000-01-01", 5)),
 )
 use(
     "datasets.steel_modulus",
     temperature=(
         T,
         table(
-            T,
-            rows=False,
-            fixed=False,
-            but=("three axes", "a number", "no rows", "repeated columns", "repeated names"),
+            T, rows=False, fixed=False, but=("three axes", "a number", "no rows", "repeated columns", "repeated names")
         )
         | bad(T + 273.15),
     ),
@@ -990,8 +920,7 @@ use(
     name=("a", texts()),
     damage=({"top": 0.1}, by_key({"top": 0.1}, wrong=(20, 1.0, -15), but=("unknown",))),
     parameters=({"top": 1.02}, by_key({"top": 1.02}, wrong=(0, -1), but=("unknown",))),
-    stiffness=(np.eye(23), matrix(np.eye(23), ("a column too many", "a column too few"))),
-    mass=(np.eye(23), matrix(np.eye(23), ("a column too many", "a column too few"))),
+    **dict.fromkeys(("stiffness", "mass"), (np.eye(23), matrix(np.eye(23), ("a column too many", "a column too few")))),
     family=("top", texts()),
     severity=(0.1, number(20, 1.0, but=("NaN",))),
 )
@@ -1012,36 +941,30 @@ use(
     name=("a", texts()),
     draws=(DRAWS, table(DRAWS, nan=False, rows=False, fixed=False) | bad(DRAWS * 100)),
 )
-method("studies.Scenario.changes", studies.Scenario("a", {"top": 0.1}), usual="repeat", T=(T, {}))
-method(
-    "studies.ProgressiveDamage.changes",
+methods(studies.Scenario("a", {"top": 0.1}), "changes", usual="repeat", T=(T, {}))
+methods(
     studies.ProgressiveDamage("a", {"top": 0.1}, 2),
+    "changes",
     usual="repeat",
     T=(T, bad(None, 3, True, "T", pd.DataFrame)),
 )
-method("studies.UncertainDamage.changes", studies.UncertainDamage("a", DRAWS), usual="repeat", T=(T, {}))
+methods(studies.UncertainDamage("a", DRAWS), "changes", usual="repeat", T=(T, {}))
 use(
     "studies.sweep",
     lambda **a: [one.severity for one in studies.sweep(**a)],
     usual="model kind",
-    severities=(
-        [0.1, 0.2],
-        vector([0.1, 0.2], but=("negative inside",)) | bad([10, 20], ".1", [1.0], [0.1, 0.1], 0.1),
-    ),
+    severities=([0.1, 0.2], vector([0.1, 0.2], but=("negative inside",)) | bad([10, 20], ".1", [1.0], [0.1, 0.1], 0.1)),
     groups=(["top"], names(["top"]) | bad("top")),
 )
 ARGUMENTS = {"fem": (CHAIN, models() | bad(surrogate.DataInformedFEM(TRUSS)))}
 use(
     "studies.DetectabilityStudy",
-    lambda **a: studies.DetectabilityStudy(
-        **{k: v for k, v in a.items() if k not in ("T", "baseline", "reference", "confidence")}, uncertainty="noise"
-    ).run(a["T"], a["baseline"], reference=a["reference"], confidence=a["confidence"])["rate"],
+    lambda T, baseline, reference, confidence, **a: studies.DetectabilityStudy(uncertainty="noise", **a).run(
+        T, baseline, reference=reference, confidence=confidence
+    )["rate"],
     usual="noise n_jobs random_state confidence",
     **ARGUMENTS,
-    detectors=(
-        MahalanobisDetector(),
-        estimators() | bad({}, {"": MahalanobisDetector()}, {3: None}),
-    ),
+    detectors=(MahalanobisDetector(), estimators() | bad({}, {"": MahalanobisDetector()}, {3: None})),
     scenarios=(
         SCENARIOS,
         bad(None, "healthy", 3, True, [], [SCENARIOS[0]] * 2, ["a"], [studies.Scenario])
@@ -1059,22 +982,11 @@ use(
         | {f"inside: {c}": {"healthy": v} for c, v in table(LATER.frequencies, rows=False).items()},
     ),
 )
-method("studies.DetectabilityStudy.pod_curve", STUDY, usual="family source log")
-method("studies.DetectabilityStudy.is_undetected", STUDY, usual="family source")
-method(
-    "studies.DetectabilityStudy.minimum_detectable_damage",
-    STUDY,
-    level=(0.9, number(-0.1, 90)),
-    method=("grid", choice()),
-)
-method(
-    "studies.DetectabilityStudy.ranking",
-    STUDY,
-    usual="max_false_alarms source",
-    confidence=(0.9, number(0, 1, 90)),
-    by=("pod", choice()),
-)
-method("studies.DetectabilityStudy.detector_name", STUDY, detector=("MahalanobisDetector", texts("None")))
+methods(STUDY, "pod_curve", usual="family source log")
+methods(STUDY, "is_undetected", usual="family source")
+methods(STUDY, "minimum_detectable_damage", level=(0.9, number(-0.1, 90)), method=("grid", choice()))
+methods(STUDY, "ranking", usual="max_false_alarms source", confidence=(0.9, number(0, 1, 90)), by=("pod", choice()))
+methods(STUDY, "detector_name", detector=("MahalanobisDetector", texts("None")))
 COUNTED = vector([3.0, 10.0, 19.0], but=("zero inside",)) | bad([1, 2, 3, 4], [30, 10, 19])
 use(
     "studies.pod_curve",
@@ -1084,12 +996,8 @@ use(
     n_detected=([3, 10, 19], COUNTED),
     n_records=([20, 20, 20], vector([20.0, 20.0, 20.0], but=("zero inside",)) | bad([20] * 4)),
 )
-method(
-    "studies.PODCurve.predict",
-    CURVE,
-    severity=(0.2, vector(0.2, wrong=(20,), but=("zero inside", "empty", "three axes"))),
-)
-method("studies.PODCurve.severity_at", CURVE, usual="confidence", pod=(0.9, number(0, 1, 90, -0.1)))
+methods(CURVE, "predict", severity=(0.2, vector(0.2, wrong=(20,), but=("zero inside", "empty", "three axes"))))
+methods(CURVE, "severity_at", usual="confidence", pod=(0.9, number(0, 1, 90, -0.1)))
 use(
     "studies.identify_damage",
     lambda **a: studies.identify_damage(**a).severities,
@@ -1117,7 +1025,7 @@ use(
     lambda **a: studies.DamagePrior(**a),
     numbers=((0.5, 0.5), bad("x", (0.2,) * 5, (1.5, -0.5), (1.0,), (0.5, 0.4))),
     severity=(0.2, number(0, 2, -0.1)),
-    law=("uniform", choice()),
+    usual="law",
     something_else=(0.1, number(1.5, -0.1)),
     model_error=(0.03, number(1.5, -0.1)),
 )
@@ -1218,10 +1126,17 @@ fitted(preprocessing.SensorMeans, (T, {}), roles=(None, bad(3, "air", True)))
 
 LATE = F.set_axis(F.index + pd.Timedelta("1h"))
 DATED = F["f1"]
+FAILING = fem.CallableModel(lambda theta: 1 / 0, ["k"], 1)
+OF_ONE_MODE = MahalanobisDetector().fit(F.to_numpy()[:, :1])
+LITTLE_NOISE = {"bounds": 0.1, "frequency_std": 1e-4}
 ONE_MODE = fem.CallableModel(lambda theta: [7.5 * theta[0] ** 0.5], ["k"], 1)
 LAGS = LagFeatures(2).fit(HOURLY)
 OFFSETS = [stamp.tz_localize("UTC" if i % 2 else "Asia/Tokyo") for i, stamp in enumerate(HOURLY.index)]
 LINES = detection.TemperatureCompensator(Ridge(), targets=MODES)
+
+
+def of_covariance(covariance):
+    return MahalanobisDetector(covariance=covariance)
 
 
 def windowed(window, **options):
@@ -1254,6 +1169,10 @@ def truss_of(members=BARS, supports=SUPPORTS, nodes=NODES):
     return fem.Structure(nodes, members, supports)
 
 
+def assembled(parameters=("rafters",), **options):
+    return FRAME.assemble(list(parameters), **options)
+
+
 def affine(stiffness, mass=EYE):
     return AffineModel({("k",): stiffness}, mass, n_modes=1)
 
@@ -1264,6 +1183,10 @@ def updated(F=NOMINAL, *, model=TRUSS, shapes=None, dofs=None, frequency_std=Non
 
 def chain(model=TRUSS, **parts):
     return surrogate.DataInformedFEM(model, **(PARTS | {"random_state": 0} | parts))
+
+
+def of_seed(seed):
+    return fit_fleet({"a": Ridge()}, {"a": (T, F)}, random_state=seed)
 
 
 def means(half_lives, **options):
@@ -1288,6 +1211,7 @@ def roles(roles):
 
 LISTS = {name: list(values) for name, values in POLES.items()}
 NAMED = dict(zip(("frequencies", "shapes"), REFERENCE, strict=True))
+OF_SENSORS = NAMED | {"sensors": "abz"}
 
 
 def tracker(reference, **options):
@@ -1309,12 +1233,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("fem.Structure", "length zero", lambda: truss_of(BARS | {"b": Bar("left", "left", **STEEL)}), "'b'"),
     ("fem.Structure", "nothing free", lambda: truss_of(supports=dict.fromkeys(NODES, "xy")), "every node"),
     ("fem.Structure", "a beam in the plane", lambda: truss_of(BARS | {"b": SPACE_BEAM}), "three coordinates"),
-    (
-        "fem.Structure",
-        "damage to mass",
-        lambda: FRAME.assemble(["rafters"], groups={"d": ("density", "rafters")}),
-        "'d'",
-    ),
+    ("fem.Structure", "damage to mass", lambda: assembled(groups={"d": ("density", "rafters")}), "'d'"),
     ("fem.Structure", "neither matrix", lambda: FRAME.assemble({"p": ("E", "rafters", "damping")}), "stiffness"),
     ("fem.CallableModel", "text", lambda: fem.CallableModel(lambda t: "no", ["k"], 1).frequencies([[1]]), "expected"),
     ("fem.match_modes", "too many modes", lambda: fem.match_modes(TRUSS, np.ones((1, 50))), "50"),
@@ -1360,12 +1279,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("SensorMeans", "no role", lambda: roles(dict.fromkeys(T)), "at least"),
     ("SensorMeans", "a number", lambda: roles(dict.fromkeys(T, 3)), "'air'"),
     ("BlockedKFold", "block of 0", lambda: preprocessing.BlockedKFold(block=0).fold_of(T), "block is 0"),
-    (
-        "BlockedKFold",
-        "block, no stamps",
-        lambda: preprocessing.BlockedKFold(block="7D").fold_of(np.ones((9, 1))),
-        "'7D'",
-    ),
+    ("BlockedKFold", "block, no stamps", lambda: preprocessing.BlockedKFold(block="7D").fold_of([[1.0]] * 9), "'7D'"),
     ("ModeTracker", "rad/s", lambda: tracked(many=True, frequencies=np.tile([12.6, 13.8], (20, 1))), "rad/s"),
     ("ModeTracker", "no shapes", lambda: tracked(shapes=None), "'shapes'"),
     ("ModeTracker", "negative", lambda: tracked(frequencies=-POLES["frequencies"]), "record 0"),
@@ -1379,24 +1293,16 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("ModeTracker", "a shape of zeros", lambda: tracker((REFERENCE[0], 0 * REFERENCE[1])), "zero"),
     ("ModeTracker", "a reference in part", lambda: tracker({"frequencies": REFERENCE[0]}), "'shapes'"),
     ("ModeTracker", "too few sensors", lambda: tracker(NAMED | {"sensors": "ab"}), "2 sensors"),
-    (
-        "ModeTracker",
-        "unknown sensors",
-        lambda: tracker(NAMED | {"sensors": "abz"}).transform(POLES | {"sensors": "abc"}),
-        "'z'",
-    ),
+    ("ModeTracker", "unknown sensors", lambda: tracker(OF_SENSORS).transform(POLES | {"sensors": "abc"}), "'z'"),
     ("ModeTracker", "a duration, no stamps", lambda: tracker(REFERENCE, follow="5D").transform(POLES), "Datetime"),
+    ("monitoring.fit_fleet", "a flag as seed", lambda: of_seed(True), "random_state"),
+    ("monitoring.fit_fleet", "a negative seed", lambda: of_seed(-1), "random_state"),
     ("BiasAligner", "scaled by zero", lambda: BiasAligner(method="scale").fit([[1.0], [-1.0]]), "zero"),
     ("BiasAligner", "a mode of NaN", lambda: BiasAligner().fit(F.assign(f3=NAN)), "'f3'"),
     ("BiasAligner", "a model of more modes", lambda: BiasAligner(TRUSS).fit(F[["f1", "f2"]]), "6"),
     ("KNNGapImputer", "an empty column", lambda: KNNGapImputer().fit(F.assign(f2=NAN)), "'f2'"),
     ("MahalanobisDetector", "a column of NaN", lambda: MahalanobisDetector().fit(F.assign(f1=NAN)), "'f1'"),
-    (
-        "MahalanobisDetector",
-        "gaps",
-        lambda: MahalanobisDetector(covariance=EmpiricalCovariance()).fit(DIAGONAL),
-        "0 of",
-    ),
+    ("MahalanobisDetector", "gaps", lambda: of_covariance(EmpiricalCovariance()).fit(DIAGONAL), "0 of"),
     ("CompensatedDetector", "a time, no stamps", lambda: windowed("7D").fit(BOTH.reset_index(drop=True)), "'7D'"),
     ("CompensatedDetector", "unsorted", lambda: windowed("7D").fit(BOTH[::-1]), "order"),
     ("CompensatedDetector", "too few rows", lambda: windowed(7).fit(BOTH[:6]), "6"),
@@ -1457,24 +1363,14 @@ PERCENT = [  # shares in percent are refused with a hint
 ]
 WARNED_OF = [
     ("reduced model", "outside its box", lambda: REDUCED.frequencies(np.full((3, 4), 2.0)), "outside-bounds"),
-    (
-        "fem.CallableModel",
-        "it fails",
-        lambda: fem.CallableModel(lambda t: 1 / 0, ["k"], 1).frequencies([[1]]),
-        "ZeroDivision",
-    ),
+    ("fem.CallableModel", "it fails", lambda: FAILING.frequencies([[1]]), "ZeroDivision"),
     ("KNNGapImputer", "-999", lambda: KNNGapImputer().fit(changed(F, 3, 1, -999.0)), "-999"),
     ("BiasAligner", "-999", lambda: BiasAligner().fit(changed(F, 3, 1, -999.0)), "'f2'"),
     ("MahalanobisDetector", "1e6", lambda: MahalanobisDetector().fit(changed(F, 3, 1, 1e6)), "'f2'"),
     ("MahalanobisDetector", "few records", lambda: MahalanobisDetector().fit(F[:20]), "49"),
     ("MahalanobisDetector", "rows lost", lambda: DETECTOR.predict(changed(F, slice(7), slice(None), NAN)), "7 of 120"),
     ("MahalanobisDetector", "all lost", lambda: DETECTOR.predict(F * NAN), "120 of 120"),
-    (
-        "MahalanobisDetector",
-        "masked",
-        lambda: MahalanobisDetector().fit(F.to_numpy()[:, :1]).predict(masked(F)[:, :1]),
-        "1 of 120",
-    ),
+    ("MahalanobisDetector", "masked", lambda: OF_ONE_MODE.predict(masked(F)[:, :1]), "1 of 120"),
     ("CompensatedDetector", "few windows", lambda: windowed(2).fit(BOTH[:40]), "49"),
     ("TemperatureCompensator", "kelvin later", lambda: COMPENSATOR.transform((T + 273.15).join(F)), "kelvin"),
     ("TemperatureCompensator", "hot", lambda: COMPENSATOR.transform((T + 60).join(F)), "other-weather"),
@@ -1483,12 +1379,7 @@ WARNED_OF = [
     ("ModelUpdater", "one mode", lambda: updated([[7.4]], model=datasets.make_truss(1)), "4 parameters"),
     ("ModelUpdater", "modes swapped", lambda: updated(NOMINAL[:, [0, 1, 3, 2, 4, 5]]), "order"),
     ("ModelUpdater", "at the bounds", lambda: updated(NOMINAL * 1.1, bounds=0.1), "'bottom'"),
-    (
-        "ModelUpdater",
-        "little noise",
-        lambda: updated(NOMINAL * 1.04 + 1, bounds=0.1, frequency_std=1e-4),
-        "frequency_std",
-    ),
+    ("ModelUpdater", "little noise", lambda: updated(NOMINAL * 1.04 + 1, **LITTLE_NOISE), "frequency_std"),
     ("ModelUpdater", "complex shapes", lambda: updated(shapes=SHAPES * 1j, dofs=DOFS), "complex"),
     ("InverseSurrogate", "rad/s", lambda: SURROGATE.transform(F * 2 * np.pi), "outside-bounds"),
     ("DataInformedFEM", "1.5 times too high", lambda: chain().fit(T, F * 1.5), "differ"),
@@ -1555,7 +1446,7 @@ use(
     stamps=("ISO8601", texts() | bad("%d.%m.%Y")),
 )
 
-NOT_CALLED |= {
+registry.NOT_CALLED |= {
     "detection.DamageDetector": "abstract",
     "fem.Element": "a protocol",
     "fem.FEModel": "a protocol",
@@ -1573,7 +1464,7 @@ NOT_CALLED |= {
         f"plotting.{name}": "draws results of others; tables are tried in from_predictions" for name in plotting.__all__
     },
 }
-UNTRIED |= {
+registry.UNTRIED |= {
     "datasets.make_fleet": {"atypical", "kinds"},
     "datasets.make_truss_campaign": {"damage_from", "drift"},
     "detection.OutlierDetector": {"block"},
@@ -1588,74 +1479,54 @@ UNTRIED |= {
     "surrogate.DataInformedFEM": {"discrepancy", "memory"},
     "updating.ModelUpdater": {"reduce"},
 }
-LEGAL |= {
-    "window": {("a duration", "preprocessing.HampelFilter"): "a window may be a duration"},
-    "n_deviations": {("1e308", "preprocessing.HampelFilter"): "removes nothing"},
-    "sample_weight": {(cause, "*"): "a mask says which rows count" for cause in ("true", "booleans", "true inside")},
-    "reduce": {("true", "*"): "True takes the default tolerance"},
-    "shapes": {("all nan", f"fem.{kind}.nominal_mac"): "NaN stays NaN" for kind in ("AffineModel", "ReducedModel")},
-    "columns": {
-        ("too high", "fem.modal.LocalModes.derivatives"): "more modes are kept than are given",
-        ("repeated", "fem.modal.LocalModes.derivatives"): "a column may be asked for twice",
-    },
-    "dofs": {("empty", "fem.modal.LocalModes.derivatives"): "documented: saves time where no shapes are wanted"},
-    "phi_a": {("NaN inside", "fem.mac"): "NaN stays NaN"},
-    "phi_b": {("NaN inside", "fem.mac"): "NaN stays NaN"},
-    "weights": {("None", "preprocessing.KNNGapImputer"): "scikit-learn's word for uniform"},
-    "severities": {("empty", "studies.sweep"): "the healthy structure alone"},
-    "modes": {("empty", "studies.compare_extensions"): "no further modes are asked for"},
-    "baseline_factors": {("empty", "studies.compare_extensions"): "no longer baselines are asked for"},
-    "follow": {("1e308", "preprocessing.ModeTracker"): "follows the mean of all records"},
-    "tolerance": {("zero", "preprocessing.LagFeatures"): "only records at the very time"},
-    "F": {("NaN throughout", "updating.ModelUpdater.fit"): "shapes alone may be measured"},
-    "damage_index": {
-        ("infinite inside", "*"): "an infinite index is an alarm",
-        ("negative inside", "*"): "other detectors have indices of any sign",
-        ("empty", "*"): "the rate of no records is NaN",
-    },
-    "threshold": {
-        ("out of range: -1.0", f"metrics.{name}"): "other detectors have indices of any sign"
-        for name in ("probability_of_detection", "probability_of_false_alarm", "time_to_detection")
-    },
-    "reference": {("zero inside", "preprocessing.BiasAligner"): "the frequencies become shifts"},
-}
-
-CELSIUS = ("kelvin", "Fahrenheit", "tenths of a degree", "one sensor in kelvin", "-999", "9999", "a slipped point")
-
-
-def legal(argument, callables, causes, reason):
-    """Add bad values that are good for an argument of some callables."""
-    LEGAL.setdefault(argument, {}).update({(cause, name): reason for name in callables for cause in causes})
-
-
-LEVELS = ("levels of names", "tuples as names", "a number among names")
-CARRIED, EMPTY, VECTORS = (
-    "names are not matched",
-    "the answer is empty",
-    "a series is a vector, or a table of one column",
-)
-for argument, name, causes, reason in (
-    ("frequencies", "fem.add_noise", LEVELS, CARRIED),
-    ("frequencies", "fem.match_modes", LEVELS, CARRIED),
-    ("S", "updating.select_parameters", LEVELS, CARRIED),
-    ("temperature", "datasets.steel_modulus", LEVELS, CARRIED),
-    ("measured", "plotting.PredictionDisplay.from_predictions", LEVELS, CARRIED),
-    ("frequencies", "fem.add_noise", ["no columns"], EMPTY),
-    ("phi_a", "fem.mac", ["no columns"], EMPTY),
-    ("phi_b", "fem.mac", ["no columns"], EMPTY),
-    ("temperature", "datasets.steel_modulus", ["no columns"], EMPTY),
-    ("y", "surrogate.TemperatureMapper", ["a series"], VECTORS),
-    ("y", "surrogate.InverseSurrogate.fit", ["a series"], VECTORS),
-    ("measured", "plotting.PredictionDisplay.from_predictions", ["a series"], VECTORS),
-    ("temperature", "datasets.steel_modulus", ["a series"], VECTORS),
-    ("frequencies", "preprocessing.check_records", ["a series"], VECTORS),
-):
-    legal(argument, [name], causes, reason)
-UNITS = ("rad/s", "kHz", "periods")
-WEATHER = ["surrogate.DataInformedFEM.weather"]
-legal("X", ["surrogate.DataInformedFEM.extrapolation_distance"], CELSIUS, "the answer says how far outside")
-legal("X", WEATHER, CELSIUS, "fills gaps alone: predict warns of the weather")
-legal("X", WEATHER, ["stamps missing", "stamps equal", "stamps from numbers"], "there are no lags")
-READ_FOR_NAMES = [*UNITS, "9999", "a slipped point", "a mode twice"]
-legal("X", ["surrogate.InverseSurrogate"], READ_FOR_NAMES, "beside a model, only names are read")
-legal("frequencies", ["preprocessing.check_records"], UNITS, "without a model, any unit is possible")
+LEVELS = ["levels of names", "tuples as names", "a number among names"]
+CELSIUS = ["kelvin", "Fahrenheit", "tenths of a degree", "one sensor in kelvin", "-999", "9999", "a slipped point"]
+UNITS = ["rad/s", "kHz", "periods"]
+DERIVATIVES, DRAWN = "fem.modal.LocalModes.derivatives", "plotting.PredictionDisplay.from_predictions"
+WEATHER, COMPARED = "surrogate.DataInformedFEM.weather", "studies.compare_extensions"
+IN_METRICS = "metrics.probability_of_detection metrics.probability_of_false_alarm metrics.time_to_detection"
+A_SERIES = "a series is a vector, or a table of one column"
+for argument, callables, causes, reason in [  # bad values that are good for an argument of some callables
+    ("window", "preprocessing.HampelFilter", ["a duration"], "a window may be a duration"),
+    ("n_deviations", "preprocessing.HampelFilter", ["1e308"], "removes nothing"),
+    ("sample_weight", "*", ["true", "booleans", "true inside"], "a mask says which rows count"),
+    ("reduce", "*", ["true"], "True takes the default tolerance"),
+    ("shapes", "fem.AffineModel.nominal_mac fem.ReducedModel.nominal_mac", ["all nan"], "NaN stays NaN"),
+    ("columns", DERIVATIVES, ["too high"], "more modes are kept than are given"),
+    ("columns", DERIVATIVES, ["repeated"], "a column may be asked for twice"),
+    ("dofs", DERIVATIVES, ["empty"], "documented: saves time where no shapes are wanted"),
+    ("phi_a", "fem.mac", ["NaN inside"], "NaN stays NaN"),
+    ("phi_b", "fem.mac", ["NaN inside"], "NaN stays NaN"),
+    ("weights", "preprocessing.KNNGapImputer", ["None"], "scikit-learn's word for uniform"),
+    ("severities", "studies.sweep", ["empty"], "the healthy structure alone"),
+    ("modes", COMPARED, ["empty"], "no further modes are asked for"),
+    ("baseline_factors", COMPARED, ["empty"], "no longer baselines are asked for"),
+    ("follow", "preprocessing.ModeTracker", ["1e308"], "follows the mean of all records"),
+    ("tolerance", "preprocessing.LagFeatures", ["zero"], "only records at the very time"),
+    ("F", "updating.ModelUpdater.fit", ["NaN throughout"], "shapes alone may be measured"),
+    ("damage_index", "*", ["infinite inside"], "an infinite index is an alarm"),
+    ("damage_index", "*", ["negative inside"], "other detectors have indices of any sign"),
+    ("damage_index", "*", ["empty"], "the rate of no records is NaN"),
+    ("threshold", IN_METRICS, ["out of range: -1.0"], "other detectors have indices of any sign"),
+    ("reference", "preprocessing.BiasAligner", ["zero inside"], "the frequencies become shifts"),
+    ("frequencies", "fem.add_noise fem.match_modes", LEVELS, "names are not matched"),
+    ("S", "updating.select_parameters", LEVELS, "names are not matched"),
+    ("temperature", "datasets.steel_modulus", LEVELS, "names are not matched"),
+    ("measured", DRAWN, LEVELS, "names are not matched"),
+    ("frequencies", "fem.add_noise", ["no columns"], "the answer is empty"),
+    ("phi_a", "fem.mac", ["no columns"], "the answer is empty"),
+    ("phi_b", "fem.mac", ["no columns"], "the answer is empty"),
+    ("temperature", "datasets.steel_modulus", ["no columns"], "the answer is empty"),
+    ("y", "surrogate.TemperatureMapper surrogate.InverseSurrogate.fit", ["a series"], A_SERIES),
+    ("measured", DRAWN, ["a series"], A_SERIES),
+    ("temperature", "datasets.steel_modulus", ["a series"], A_SERIES),
+    ("frequencies", "preprocessing.check_records", ["a series"], A_SERIES),
+    ("X", "surrogate.DataInformedFEM.extrapolation_distance", CELSIUS, "the answer says how far outside"),
+    ("X", WEATHER, CELSIUS, "fills gaps alone: predict warns of the weather"),
+    ("X", WEATHER, ["stamps missing", "stamps equal", "stamps from numbers"], "there are no lags"),
+    ("X", "surrogate.InverseSurrogate", [*UNITS, "9999", "a slipped point", "a mode twice"], "only names are read"),
+    ("frequencies", "preprocessing.check_records", UNITS, "without a model, any unit is possible"),
+]:
+    registry.LEGAL.setdefault(argument, {}).update(
+        {(cause, name): reason for name in callables.split() for cause in causes}
+    )

@@ -9,20 +9,8 @@ from skthermo import monitoring, surrogate
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from tests.bad_input.examples import BOTH, CHAIN, MODES, F, T
-from tests.bad_input.registry import FOLDER, LEGAL, NOT_CALLED, method, use
-from tests.bad_input.values import (
-    NAN,
-    bad,
-    durations,
-    flag,
-    frequencies,
-    instead,
-    jobs,
-    names,
-    number,
-    table,
-    weather,
-)
+from tests.bad_input.registry import FOLDER, LEGAL, NOT_CALLED, methods, use
+from tests.bad_input.values import NAN, bad, durations, flag, frequencies, instead, jobs, names, number, table, weather
 
 DETECTOR = make_pipeline(TemperatureCompensator(Ridge(), targets=MODES), MahalanobisDetector())
 SERVICE = make_truss_campaign(2, samples_per_year=120, damage={"bottom": 0.3}, damage_from="2025-06-10", random_state=0)
@@ -52,7 +40,7 @@ def served(name, result=lambda monitor: monitor.evaluations_):
 use(
     "monitoring.Monitor",
     monitored,
-    usual="random_state",
+    usual="random_state sensors",
     detector=(DETECTOR, instead(DETECTOR.fit)),
     targets=(MODES, names(MODES, "None")),
     reference=(["T2"], names(["T2"], "None", "empty")),
@@ -62,7 +50,6 @@ use(
     persistence=((4, 6), number(0, -1, 1.5, (0, 3), (4, 3), (4.0, 6), (2, 3, 4), [3])),
     max_delay=("7D", durations("zero")),
     retention=("400D", durations()),
-    sensors=(True, flag()),
     units=("Hz", bad(3, True, ["Hz"], {"f1": 3}, {"no such name": "Hz"}, b"Hz", str)),
     lookback=("1D", durations("None")),
     X=(BOTH, frequencies(BOTH, in_hertz=False, fixed=False, rows=False, fitting=True)),
@@ -71,11 +58,11 @@ use(
     "monitoring.Monitor.update",
     lambda new, confirm: copy.deepcopy(MONITOR).update(new, confirm=confirm),
     new=(NEW[:40], frequencies(NEW[:40], in_hertz=False, rows=False, but=("no rows",))),
-    confirm=(False, flag()),
+    usual="confirm",
 )
-method("monitoring.Monitor.status", SERVED, now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
-method("monitoring.Monitor.transitions", SERVED, after=(1, number(-1, 1.5, 10**6)))
-method("monitoring.Monitor.years_watched", SERVED, since=("2025-06-10", MOMENT))
+methods(SERVED, "status", now=("2025-08-29", MOMENT), max_age=("3D", durations("None")))
+methods(SERVED, "transitions", after=(1, number(-1, 1.5, 10**6)))
+methods(SERVED, "years_watched", since=("2025-06-10", MOMENT))
 use(
     *served("acknowledge", lambda monitor: monitor.events_),
     event=(1, number(0, -1, 1.5, 1000)),
@@ -87,13 +74,13 @@ use(
     *served("refit", lambda monitor: monitor.threshold_),
     records=(NEW[:50], frequencies(NEW[:50], in_hertz=False, rows=False)),
     until=("2025-06-01", MOMENT),
-    force=(False, flag()),
+    usual="force",
 )
 use(*served("rebaseline"), since=("2025-06-10", {**MOMENT, "None": None}), until=("2025-08-20", MOMENT))
 PATHS = bad(
     "no such folder/monitor.joblib", "monitor.txt", "monitor", 3, None, True, b"monitor.joblib", ["a.joblib"], str
 )
-method("monitoring.Monitor.save", SERVED, path=(FOLDER / "saved.joblib", PATHS))
+methods(SERVED, "save", path=(FOLDER / "saved.joblib", PATHS))
 use(
     "monitoring.load_monitor",
     lambda path: monitoring.load_monitor(path).summary(),
@@ -110,21 +97,20 @@ use(
     freq=("1D", durations("half", "negative number")),
     significance=(0.01, number(0, 1, -0.1)),
 )
-method("monitoring.ParameterHistory.reaches", HISTORY, limit=(-0.1, number(0, -1, -1.5)))
-method("monitoring.ParameterHistory.remove_drift", HISTORY, F=(F, frequencies(F, rows=False)))
+methods(HISTORY, "reaches", limit=(-0.1, number(0, -1, -1.5)))
+methods(HISTORY, "remove_drift", F=(F, frequencies(F, rows=False)))
 NOT_CALLED |= {
     "monitoring.MonitorStatus": "made by a monitor's status",
     "monitoring.ParameterHistory": "made by track_parameters",
     "monitoring.Retraining": "made by a monitor's refit",
 }
 
-ESTIMATORS = dict.fromkeys("ab", LinearRegression())
-RECORDS = {"a": (T, F), "b": (T, F * 1.01)}
+ESTIMATORS, RECORDS = {"a": LinearRegression()}, {"a": (T, F)}
 
 
 def watch(chain):
     """A monitor of a bridge; whatever its chain is."""
-    return monitoring.Monitor(DETECTOR, sensors=False)
+    return monitoring.Monitor(DETECTOR, watch_per_year=12, sensors=False)
 
 
 def tables(given):
@@ -144,21 +130,15 @@ use(
     monitor=(watch, bad(3, True, "watch", [watch], MONITOR)),
     folder=(FOLDER / "another fleet", bad(3, True, ["a"], b"a", str)),
     n_jobs=(1, jobs()),
-    progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
+    progress=(False, flag("None")),
 )
 use(
     "monitoring.Fleet",
     lambda folder: tables(monitoring.Fleet(folder)),
     folder=(FOLDER / "fleet", bad("nowhere", 3, None, True, ["a"], b"a", str)),
 )
-method("monitoring.Fleet.status", WATCHED, now=("2025-05-01", MOMENT), max_age=("3D", durations("None")))
-method(
-    "monitoring.Fleet.update",
-    WATCHED,
-    records=({}, MAPPING),
-    n_jobs=(1, jobs()),
-    progress=(False, {cause: value for cause, value in flag().items() if cause != "None"}),
-)
+methods(WATCHED, "status", now=("2025-05-01", MOMENT), max_age=("3D", durations("None")))
+methods(WATCHED, "update", records=({}, MAPPING), n_jobs=(1, jobs()), progress=(False, flag("None")))
 use(
     "monitoring.Fleet.discoveries",
     lambda **a: WATCHED.discoveries(**a).summary(),
@@ -183,7 +163,7 @@ use(
     y=(FEW, table(FEW, rows=True, fixed=False, fitting=True, but=("a number", "constant"))),
 )
 MAPPER = surrogate.FleetMapper(OTHERS).fit(T, FEW)
-method("surrogate.FleetMapper.predict", MAPPER, X=(T, table(T, rows=False)), return_std=(False, flag()))
+methods(MAPPER, "predict", X=(T, table(T, rows=False)), return_std=(False, flag()))
 LEGAL |= {
     "lookback": {("zero", "monitoring.Monitor"): "the detector looks at single records"},
     "max_age": {("zero", f"monitoring.{one}.status"): "any age is too old" for one in ("Monitor", "Fleet")},

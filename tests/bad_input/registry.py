@@ -5,7 +5,6 @@
 
 import importlib
 import inspect
-import pkgutil
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import skthermo
 from tests.bad_input.values import choice, count, flag
+from tests.source import public
 
 FOLDER = Path(tempfile.mkdtemp())
 """Holds the files that examples read and write."""
@@ -71,9 +71,11 @@ def use(name, call=None, /, usual="", **arguments):
     EXAMPLES.append(Example(name, of, of if call is None else call, good, bad))
 
 
-def method(name, owner, **arguments):
-    """Register a method of a fixed object."""
-    use(name, getattr(owner, name.rpartition(".")[2]), **arguments)
+def methods(owner, names, **arguments):
+    """Register methods of a fixed object that take the same."""
+    kind = type(owner)
+    for name in names.split():
+        use(f"{kind.__module__.split('.')[1]}.{kind.__name__}.{name}", getattr(owner, name), **arguments)
 
 
 def fitted(cls, X, y=None, after=None, usual="", **arguments):
@@ -91,13 +93,9 @@ def fitted(cls, X, y=None, after=None, usual="", **arguments):
 
 def public_arguments():
     """Name and argument of every public function and constructor, but for those that are not tried."""
-    rooms = [module.name for module in pkgutil.iter_modules(skthermo.__path__, "skthermo.") if module.ispkg]
-    for room in map(importlib.import_module, rooms):
-        for name in getattr(room, "__all__", ()):
-            full = f"{room.__name__.split('.')[-1]}.{name}"
-            if full in NOT_CALLED:
-                continue
-            for argument, parameter in inspect.signature(getattr(room, name)).parameters.items():
-                keyed = parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
-                if keyed and argument not in UNTRIED.get(full, ()):
-                    yield full, argument
+    for room, name, thing in public():
+        full = f"{room}.{name}"
+        for argument, parameter in inspect.signature(thing).parameters.items() if full not in NOT_CALLED else ():
+            keyed = parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
+            if keyed and argument not in UNTRIED.get(full, ()):
+                yield full, argument

@@ -15,12 +15,7 @@ STAMP = pd.Timestamp("2020-01-01")
 
 def wrong_types(*but):
     """Values that are no number."""
-    values = {
-        "true": True,
-        "text": "often",
-        "text of a number": "1",
-        "bytes": b"1",
-        "a time": STAMP,
+    values = {"true": True, "text": "often", "text of a number": "1", "bytes": b"1", "a time": STAMP} | {
         "a duration": pd.Timedelta("1h"),
         "complex": 1j,
         "a class": float,
@@ -54,49 +49,26 @@ def choice(*but):
 
 
 def seed():
-    return {
-        "true": True,
-        "text": "7",
-        "negative": -1,
-        "half": 1.5,
-        "too large": 2**40,
-        "NaN": NAN,
-        "a class": np.random.RandomState,
-        "a generator": np.random.default_rng(0),
-        "several": [1, 2],
-        "bytes": b"1",
-    }
+    return (
+        {"true": True, "text": "7", "negative": -1, "half": 1.5, "too large": 2**40, "NaN": NAN}
+        | {"a class": np.random.RandomState, "a generator": np.random.default_rng(0), "several": [1, 2]}
+        | {"bytes": b"1"}
+    )
 
 
 def jobs():
-    return {
-        "zero": 0,
-        "true": True,
-        "text": "2",
-        "half": 1.5,
-        "NaN": NAN,
-        "a class": int,
-        "several": [1],
-        "1e308": HUGE,
+    return {"zero": 0, "true": True, "text": "2", "half": 1.5, "NaN": NAN, "a class": int, "several": [1]} | {
+        "1e308": HUGE
     }
 
 
 def names(good, *but):
     """Several names out of those that are known."""
-    values = {
-        "unknown": ["no such name"],
-        "one unknown": [*good, "no such name"],
-        "repeated": [*good, good[0]],
-        "empty": [],
-        "a number": 3,
-        "numbers": [0.5],
-        "true": True,
-        "bytes": [b"top"],
-        "text that is no name": "topbottom",
-        "None": None,
-        "NaN": [NAN],
-        "a class": str,
-    }
+    values = (
+        {"unknown": ["no such name"], "one unknown": [*good, "no such name"], "repeated": [*good, good[0]]}
+        | {"empty": [], "a number": 3, "numbers": [0.5], "true": True, "bytes": [b"top"]}
+        | {"text that is no name": "topbottom", "None": None, "NaN": [NAN], "a class": str}
+    )
     return {cause: value for cause, value in values.items() if cause not in but}
 
 
@@ -298,25 +270,11 @@ def matrix(good, but=()):
 
 def integers(most, *but):
     """Different integers below some number."""
-    values = {
-        "too high": [0, most],
-        "negative": [-1],
-        "repeated": [0, 0],
-        "floats": [0.0],
-        "booleans": [True, False],
-        "true inside": [2, True],
-        "texts": ["0"],
-        "a text": "01",
-        "bytes": [b"0"],
-        "times": [STAMP],
-        "empty": [],
-        "a number": 1,
-        "a table": [[0, 1]],
-        "NaN": [NAN],
-        "None": None,
-        "None inside": [None],
-        "a class": int,
-    }
+    values = (
+        {"too high": [0, most], "negative": [-1], "repeated": [0, 0], "floats": [0.0], "booleans": [True, False]}
+        | {"true inside": [2, True], "texts": ["0"], "a text": "01", "bytes": [b"0"], "times": [STAMP], "empty": []}
+        | {"a number": 1, "a table": [[0, 1]], "NaN": [NAN], "None": None, "None inside": [None], "a class": int}
+    )
     return {cause: value for cause, value in values.items() if cause not in but}
 
 
@@ -356,49 +314,23 @@ def moments(*but):
         "negative": -1,
         "true": True,
         "too late": 10**6,
-        "infinite": INF,
-        "several": [1, 2],
-        "a class": int,
-        "bytes": b"1",
-        "a duration": pd.Timedelta("1D"),
-    }
+    } | {"infinite": INF, "several": [1, 2], "a class": int, "bytes": b"1", "a duration": pd.Timedelta("1D")}
     return {cause: value for cause, value in values.items() if cause not in but}
 
 
 def durations(*but):
-    values = {
-        "text": "often",
-        "negative": "-1h",
-        "zero": "0h",
-        "NaT": pd.NaT,
-        "months": "1M",
-        "true": True,
-        "NaN": NAN,
-        "a class": pd.Timedelta,
-        "a time": STAMP,
-        "several": ["1h"],
-        "bytes": b"1h",
-        "negative number": -1,
-        "half": 1.5,
-        "1e308": HUGE,
-    }
+    values = (
+        {"text": "often", "negative": "-1h", "zero": "0h", "NaT": pd.NaT, "months": "1M", "true": True}
+        | {"NaN": NAN, "a class": pd.Timedelta, "a time": STAMP, "several": ["1h"], "bytes": b"1h"}
+        | {"negative number": -1, "half": 1.5, "1e308": HUGE}
+    )
     return {cause: value for cause, value in values.items() if cause not in but}
 
 
 def paths(*but):
-    values = {
-        "no file": "no_such_file",
-        "None": None,
-        "a number": 3,
-        "true": True,
-        "bytes": b"file",
-        "a device": "/dev/zero",
-        "an empty device": "/dev/null",
-        "a text file": __file__,
-        "several": ["a"],
-        "a class": Path,
-        "NaN": NAN,
-        "a folder": "/proc/self/fdinfo",
-        "empty": "",
-    }
+    values = (
+        {"no file": "no_such_file", "None": None, "a number": 3, "true": True, "bytes": b"file"}
+        | {"a device": "/dev/zero", "an empty device": "/dev/null", "a text file": __file__, "several": ["a"]}
+        | {"a class": Path, "NaN": NAN, "a folder": "/proc/self/fdinfo", "empty": ""}
+    )
     return {cause: value for cause, value in values.items() if cause not in but}

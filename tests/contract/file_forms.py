@@ -12,6 +12,7 @@ import pandas as pd
 import scipy.io
 
 from skthermo.datasets import load_kw51, load_z24, make_truss_campaign
+from skthermo.detection import MahalanobisDetector
 from skthermo.fem import load_affine, read_triplets
 from skthermo.monitoring import Monitor, load_monitor
 from skthermo.preprocessing import read_records
@@ -110,8 +111,8 @@ def campaigns():
 
     def monitor(folder):
         year = make_truss_campaign(samples_per_year=60, random_state=0)
-        records = year.temperatures.join(year.frequencies)
-        Monitor(targets=list(year.frequencies)).fit(records).save(folder / "monitor.joblib")
+        monitor = Monitor(MahalanobisDetector(), targets=list(year.frequencies), watch_per_year=12)
+        monitor.fit(year.frequencies).save(folder / "monitor.joblib")
         assert load_monitor(folder / "monitor.joblib").threshold_ > 0
 
     yield "load_z24", "csv", z24_csv

@@ -3,10 +3,12 @@
 ``PYTHONPATH=FOLDER OMP_NUM_THREADS=1 python tests/contract/run.py FILE [SCRIPT ...]`` writes the results of all
 scripts, or of those that are named, to a JSON file; others in the file stay.
 
-A script ends with ``RESULTS``, a dict of numbers, arrays, tables and texts. ``TOLERANCES`` gives, by name of the result
-or for all of them ("*"), ``rtol`` and ``atol`` of its numbers.
+A script is a function of a file in ``scripts``, whose name begins with that of the file. It gives a dict of numbers,
+arrays, tables and texts, and may add a dict that gives, by name of the result or for all of them ("*"), ``rtol`` and
+``atol`` of its numbers.
 """
 
+import functools
 import json
 import runpy
 import sys
@@ -18,21 +20,29 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-SCRIPTS = Path(__file__).with_name("scripts")
+sys.path.append(str(Path(__file__).parents[2]))  # after PYTHONPATH
 TOLERANCE = {"rtol": 1e-6, "atol": 1e-9}
+
+
+@functools.cache
+def scripts():
+    """All scripts by name."""
+    files = sorted(Path(__file__).with_name("scripts").glob("*.py"))
+    named = [(file.stem, runpy.run_path(str(file)).items()) for file in files]
+    return {name: one for room, names in named for name, one in names if name.startswith(f"{room}_")}
 
 
 def run(name):
     """Results of a script by name, as JSON has them, each with its tolerance."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        left = runpy.run_path(str(SCRIPTS / f"{name}.py"), run_name="__main__")
-    tolerances = left.get("TOLERANCES", {})
-    if unknown := set(tolerances) - {*left["RESULTS"], "*"}:
+        results = scripts()[name]()
+    results, tolerances = results if isinstance(results, tuple) else (results, {})
+    if unknown := set(tolerances) - {*results, "*"}:
         raise ValueError(f"{name}: there are tolerances of {unknown}, which are no results")
     return {
         result: {"value": simple(value), **TOLERANCE, **tolerances.get("*", {}), **tolerances.get(result, {})}
-        for result, value in left["RESULTS"].items()
+        for result, value in results.items()
     }
 
 
@@ -60,7 +70,7 @@ def simple(value):
 def main(file, *names):
     file = Path(file)
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-    for name in names or sorted(path.stem for path in SCRIPTS.glob("*.py")):
+    for name in names or sorted(scripts()):
         start = time.process_time()
         results = run(name)
         kept[name] = {"seconds": round(time.process_time() - start, 1), "results": results}

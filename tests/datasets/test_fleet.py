@@ -36,18 +36,18 @@ def test_a_bridge_is_the_same_in_a_larger_fleet_and_after_pickling(fleet):
 
 
 def test_seeds_give_other_bridges(fleet):
-    assert set(fleet) == set(make_fleet(6, random_state=1))
-    assert all(fleet[name].covariates != other.covariates for name, other in make_fleet(6, random_state=1).items())
+    others = make_fleet(6, random_state=1)
+    assert set(fleet) == set(others)
+    assert all(fleet[name].covariates != other.covariates for name, other in others.items())
     assert make_fleet(2, random_state=None)["bridge 000"] != make_fleet(2, random_state=None)["bridge 000"]
 
 
-@pytest.mark.parametrize("atypical", [0.0, 0.05, 0.3, 1.0])
+@pytest.mark.parametrize("atypical", [0.3, 1.0])
 def test_the_share_of_atypical_bridges_holds_in_every_kind(atypical):
     fleet = make_fleet(300, atypical=atypical, random_state=3)
     drawn = pd.DataFrame([(bridge.kind, bridge.is_atypical) for bridge in fleet.values()], columns=["kind", "atypical"])
     assert (drawn.groupby("kind")["atypical"].sum() - 100 * atypical).abs().max() <= 1
-    if atypical:
-        assert {bridge.atypical_law for bridge in fleet.values()} >= {"reversed", "doubled", "knee elsewhere"}
+    assert {bridge.atypical_law for bridge in fleet.values()} >= {"reversed", "doubled", "knee elsewhere"}
 
 
 @pytest.mark.one_case
@@ -64,6 +64,7 @@ def test_records_depend_on_their_date_alone(bridge):
     assert np.nanmax(np.abs(new_year.temperatures.to_numpy() - year.temperatures.iloc[:10].to_numpy())) > 1
 
 
+@pytest.mark.one_case
 def test_another_seed_of_records_is_another_history_of_the_same_bridge(bridge):
     first, same, other = (bridge.records(40, random_state=seed) for seed in (1, 1, 2))
     assert_frame_equal(first.frequencies, same.frequencies)
@@ -125,6 +126,7 @@ def test_gaps_and_outliers_have_their_shares(bridge, gaps):
     assert (off > 0.02).mean() == pytest.approx(0.01, abs=0.004)
 
 
+@pytest.mark.one_case
 def test_means_of_hours_are_those_of_days(bridge):
     daily, hourly = (bridge.records(20, samples_per_day=n, gaps=0, noise=0) for n in (1, 24))
     days = hourly.clean_frequencies.resample("D").mean()
@@ -134,6 +136,7 @@ def test_means_of_hours_are_those_of_days(bridge):
     assert 11 <= swing.idxmax() <= 18
 
 
+@pytest.mark.one_case
 def test_weather_has_the_climate_of_its_place(bridge):
     climate = replace(bridge.climate, latitude=50.0, mean=9.0, season=8.0, swing=3.0, scatter=3.0, memory_hours=72.0)
     weather = climate.weather(pd.Timestamp("2000-01-01"), pd.Timestamp("2039-12-31"), (1,))
@@ -163,9 +166,10 @@ def test_laws_are_lines_above_the_knee_and_level_off_in_frost(bridge):
 
 
 def test_coefficients_scatter_about_the_family():
-    bridges = make_fleet(400, atypical=0.0, random_state=0).values()
+    bridges = list(make_fleet(400, atypical=0.0, random_state=0).values())
     slopes = np.log([-bridge.laws["bearings"].slope for bridge in bridges if "bearings" in bridge.laws])
     assert len(slopes) > 200
+    assert not any(bridge.is_atypical for bridge in bridges)
     assert slopes.mean() == pytest.approx(np.log(3e-3), abs=0.06)
     assert slopes.std() == pytest.approx(0.3, rel=0.1)
 
@@ -183,7 +187,7 @@ def test_laws_of_atypical_bridges_are_not_those_of_the_family(bridge):
 
 
 def test_bridges_with_other_thermometers_have_the_same_inputs(fleet):
-    tables = [SensorMeans(b.roles).fit_transform(b.records(10).temperatures) for b in fleet.values()]
+    tables = [SensorMeans(b.roles).fit_transform(b.records(2).temperatures) for b in fleet.values()]
     assert len({tuple(b.roles) for b in fleet.values()}) > 2
     assert all(list(table) == ["air", "deck"] for table in tables)
 

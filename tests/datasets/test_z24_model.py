@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from skthermo.datasets import load_z24, make_z24
-from skthermo.datasets._z24 import (
-    Z24_CONSTANTS,
-    Z24_PARAMETERS,
-    z24_structure,
-)
+from skthermo.datasets._z24 import Z24_CONSTANTS, Z24_PARAMETERS, z24_structure
 from skthermo.updating import sensitivity
 
 TOOL = Path(__file__).parents[2] / "tools" / "fit_z24_constants.py"
@@ -34,8 +30,8 @@ FIT = load_tool()
 
 @pytest.fixture(scope="module")
 def box():
-    """Forty points of the box of +-30 %."""
-    return np.random.default_rng(0).uniform(0.7, 1.3, (40, 4))
+    """Twenty points of the box of +-30 %."""
+    return np.random.default_rng(0).uniform(0.7, 1.3, (20, 4))
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,10 @@ import shutil
 import subprocess
 
 import numpy as np
-import pandas as pd
 import pytest
 import scipy.linalg
 
-from skthermo.fem import Beam, ImportedStructure, Structure, add_noise, probe
-from skthermo.studies import identify_damage
-from skthermo.surrogate import DataInformedFEM
+from skthermo.fem import Beam, Structure
 from tests.drop_ins.recipes import run_recipe
 
 PAGE = "fe_programs.rst"
@@ -35,66 +32,6 @@ def test_pynite(tmp_path, monkeypatch):
         {"columns": ["ab", "cd"], "beam": ["bc"]},
     ).assemble(["columns", "beam"])
     np.testing.assert_allclose(ours.frequencies(THETA), theirs, rtol=1e-6)
-
-
-N_BEAMS = 12
-PLACES = {f"node {i}": (2.0 * i, 0.0, 0.0) for i in range(N_BEAMS + 1)}
-BEAMS = {f"beam {i + 1}": (f"node {i}", f"node {i + 1}") for i in range(N_BEAMS)}
-SUPPORTED = "node 0", "node 5", f"node {N_BEAMS}"
-
-
-def bridge_of_pynite(theta):
-    """A girder of two unequal spans in a plane, each beam with a modulus of its own."""
-    from Pynite import FEModel3D
-
-    bridge = FEModel3D()
-    bridge.add_section("box", A=0.12, Iy=1.6e-3, Iz=9e-4, J=2e-3)
-    for name, place in PLACES.items():
-        bridge.add_node(name, *place)
-    for (name, ends), multiplier in zip(BEAMS.items(), theta, strict=True):
-        bridge.add_material(name, E=30e9 * multiplier, G=12.5e9 * multiplier, nu=0.2, rho=2500.0)
-        bridge.add_member(name, *ends, name, "box")
-    for name in PLACES:
-        bridge.def_support(name, name == "node 0", name in SUPPORTED, True, True, True, False)
-    bridge.add_member_self_weight("FY", -1.0, "weight")
-    bridge.add_load_combo("mass", {"weight": 1.0})
-    return bridge
-
-
-def matrices_of_pynite(theta):
-    bridge = bridge_of_pynite(theta)
-    bridge.analyze_linear()
-    held = {("node 0", 0), *((name, 1) for name in SUPPORTED)}
-    free = [6 * bridge.nodes[name].ID + i for name in PLACES for i in (0, 1, 5) if (name, i) not in held]
-    K, M = bridge.Ke("mass").tocsc(), bridge.M("mass", gravity=1.0).tocsc()
-    return K[free][:, free], M[free][:, free]
-
-
-def frequencies_of_pynite(theta):
-    bridge = bridge_of_pynite(theta)
-    bridge.analyze_modal(num_modes=8, mass_combo_name="mass", gravity=1.0)
-    return np.sort(bridge.frequencies)
-
-
-def test_damage_in_members_of_another_program_is_located():
-    """The damaged frequencies are PyNite's own; the members' matrices were found by calling it once for each."""
-    pytest.importorskip("Pynite", reason="PyNiteFEA is not installed: the extra 'oracle' brings it")
-    each = probe(matrices_of_pynite, list(BEAMS), n_modes=8)
-    spans = {"first span": list(BEAMS)[:5], "second span": list(BEAMS)[5:]}
-    girder = ImportedStructure(each, PLACES, BEAMS, spans | {"girder": BEAMS})
-    model = girder.assemble(["girder"], groups=list(spans), n_modes=8)
-    random = np.random.default_rng(0)
-    days = pd.date_range("2024-01-01", periods=330, freq="D")
-    air = 10 - 10 * np.cos(2 * np.pi * np.arange(330) / 365) + random.normal(0, 3, 330)
-    T, theta = pd.DataFrame({"deck": air}, days), 1 - 0.004 * (air - 10)
-    healthy = add_noise(model.frequencies(theta[:300, np.newaxis]), 0.002, random_state=1)
-    fem = DataInformedFEM(model, random_state=0).fit(T[:300], healthy)
-    damage = np.where(np.isin(list(BEAMS), ["beam 8", "beam 9"]), 0.6, 1.0)
-    damaged = np.array([frequencies_of_pynite(damage * multiplier) for multiplier in theta[300:]])
-    F = add_noise(damaged, 0.002, random_state=2)
-    located = identify_damage(fem, T[300:], F, structure=girder, random_state=0)
-    assert set(located.likely_members()) == {"beam 8", "beam 9"}
-    assert located.table.loc[["beam 8", "beam 9"], "severity"].to_numpy() == pytest.approx(0.4, abs=0.05)
 
 
 def test_opensees():

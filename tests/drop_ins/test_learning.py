@@ -8,17 +8,16 @@ from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import Ridge
-from sklearn.model_selection import GridSearchCV, KFold, cross_val_score
+from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, StandardScaler
 
-from skthermo.datasets import make_truss, make_truss_campaign
-from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector
+from skthermo.datasets import make_truss_campaign
+from skthermo.detection import OutlierDetector
 from skthermo.metrics import mape
-from skthermo.studies import detection_task
-from skthermo.surrogate import DataInformedFEM, TemperatureMapper
+from skthermo.surrogate import TemperatureMapper
 from tests.drop_ins.recipes import run_recipe
 
 pytestmark = pytest.mark.filterwarnings("default")  # warnings of other packages are not tested
@@ -114,27 +113,3 @@ def test_optuna(folder):
     search = GridSearchCV(recipe["fem"], tried, cv=KFold(3), refit=False).fit(recipe["T"], recipe["F"])
     np.testing.assert_array_equal(search.cv_results_["mean_test_score"], values[:2])
     assert isinstance(recipe["fem"].mapper.regressor, Ridge)
-
-
-def test_optuna_tunes_a_detector_as_a_grid_search_does():
-    optuna = pytest.importorskip("optuna")
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-    fem = DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies)
-    damage = [{}, {"bottom": 0.1}]
-    task = detection_task(fem, later.temperatures, damage, n_repeats=2, random_state=0)
-    detector = CompensatedDetector(MahalanobisDetector(), Ridge(), targets=fem.mode_names_)
-    windows = [1, 3, 7]
-
-    def objective(trial):
-        tried = clone(detector).set_params(window=trial.suggest_categorical("window", windows))
-        return cross_val_score(tried, task.X, task.y, cv=task.cv, scoring=task.scoring).mean()
-
-    study = optuna.create_study(direction="maximize", sampler=optuna.samplers.GridSampler({"window": windows}, seed=0))
-    study.optimize(objective, n_trials=3)
-    search = GridSearchCV(detector, {"window": windows}, cv=task.cv, scoring=task.scoring, refit=False)
-    search.fit(task.X, task.y)
-    found = {trial.params["window"]: trial.value for trial in study.trials}
-    np.testing.assert_array_equal([found[window] for window in windows], search.cv_results_["mean_test_score"])
-    best = task.refit(clone(detector).set_params(**study.best_params))
-    assert best.window == search.best_params_["window"] == 7

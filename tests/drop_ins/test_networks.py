@@ -62,11 +62,10 @@ def test_skorch(with_skorch):
     assert_learns(*(clone(with_skorch[name]).set_params(**short) for name in ("table_1", "table_6")))
 
 
-def test_skorch_rates_of_dropout_are_the_papers(with_skorch, torch):
+def test_skorch_has_the_layers_of_the_paper(with_skorch, torch):
     for name, rates in {"table_1": [0.05], "table_6": [0.0, 0.2, 0.2]}.items():
         layers = list(clone(with_skorch[name]).initialize().module_)
         assert [layer.p for layer in layers if isinstance(layer, torch.nn.Dropout)] == rates
-    assert [type(layer).__name__ for layer in layers[:4]] == ["Dropout", "Linear", "ReLU", "Dropout"]
     assert [layer.out_features for layer in layers if isinstance(layer, torch.nn.Linear)] == [256, 128, 64, 32, 1]
 
 

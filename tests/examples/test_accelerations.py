@@ -43,7 +43,7 @@ def test_modes_are_those_of_the_truth_and_one_more(year, modes):
     np.testing.assert_allclose(shapes.T @ mass @ shapes, np.eye(7), atol=1e-9)
 
 
-@pytest.mark.parametrize("frequency", [0.3, 7.5, 95.0, 127.0])
+@pytest.mark.parametrize("frequency", [0.3, 95.0])
 @pytest.mark.parametrize("damping", [0.001, 0.01, 0.2])
 def test_the_filter_is_the_mode_with_forces_held(frequency, damping):
     numerator, denominator = simulation.acceleration_filter(frequency, damping)

@@ -71,6 +71,7 @@ def test_the_small_network_is_the_default_of_the_inverse(campaign):
 
 def test_trees_stay_at_their_last_value_and_lines_go_on(campaign):
     T, found = campaign.train[0], EXAMPLE.regressors("truss")
+    found["random forest"].set_params(n_estimators=10)
     changes = {
         name: EXAMPLE.beyond(EXAMPLE.fitted_chain(campaign, found[name], seed=0).predict, T, -1)
         for name in ("random forest", "piecewise-linear")

@@ -1,5 +1,7 @@
 """A space frame for tests, as fine as wanted."""
 
+import functools
+
 import numpy as np
 
 from skthermo.fem import Beam, PointMass, Spring, Structure
@@ -7,8 +9,8 @@ from skthermo.fem import Beam, PointMass, Spring, Structure
 SECTION = {"E": 30e9, "G": 12e9, "A": 0.6, "I_yy": 0.05, "I_zz": 0.02, "J": 0.03, "density": 2500.0}
 
 
-def portal(n_elements=8, **options):
-    """A space frame of four columns, four beams and a soft foot: sparse at 8 elements a member."""
+def portal(n_elements=7, **options):
+    """A space frame of four columns, four beams and a soft foot: sparse at 7 elements a member."""
     corners = {"sw": (0.0, 0.0), "se": (6.0, 0.0), "ne": (6.0, 4.0), "nw": (0.0, 4.0)}
     nodes, members = {}, {}
 
@@ -35,6 +37,14 @@ def portal(n_elements=8, **options):
 
 
 FRAME = portal()
+
+
+@functools.cache
+def frame(*, track=False, is_reduced=False):
+    """The sparse frame, as it is or reduced; no test changes it."""
+    if is_reduced:
+        return frame(track=track).reduced(0.3, random_state=0)
+    return portal(track=True) if track else FRAME
 
 
 def local_shapes(model, row, dofs=None):

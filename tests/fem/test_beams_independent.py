@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from skthermo.fem import Beam, Spring, Structure
+from tests.fem.test_beams import SECTION
 
 pynite = pytest.importorskip("Pynite", reason="PyNiteFEA is not installed: the extra 'oracle' brings it")
 
-SECTION = {"E": 210e9, "G": 81e9, "A": 0.02, "I_yy": 4e-5, "I_zz": 1e-5, "J": 3e-5, "density": 7850.0}
 NODES = {"a": (0, 0, 0), "b": (0.5, 4, 0.3), "c": (5, 4.5, 1), "d": (5.5, 0, 1.5)}
 MEMBERS = {"left": ("a", "b"), "beam": ("b", "c"), "right": ("c", "d")}
 

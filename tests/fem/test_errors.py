@@ -7,16 +7,7 @@ import pytest
 import scipy.sparse
 
 from skthermo.datasets import make_truss, make_truss_campaign, make_z24
-from skthermo.fem import (
-    AffineModel,
-    Bar,
-    CallableModel,
-    Spring,
-    Structure,
-    evaluate,
-    linearise,
-    sample,
-)
+from skthermo.fem import AffineModel, Bar, CallableModel, Spring, Structure, evaluate, linearise, sample
 
 STEEL = {"E": 210e9, "A": 0.01, "density": 7850.0}
 NODES = {"a": (0, 0), "b": (3, 0), "c": (3, 2)}
@@ -131,7 +122,7 @@ def test_frequencies_of_another_shape_are_not_repeated(solve, shape):
 
 
 @pytest.mark.parametrize("vectorized", [False, True])
-@pytest.mark.parametrize("shape", [(2,), (4, 1), (3, 1), (), (1,), (4, 3, 1)])
+@pytest.mark.parametrize("shape", [(2,), (4, 1), (), (4, 3, 1)])
 def test_callable_models_of_another_shape_are_refused(vectorized, shape):
     model = CallableModel(lambda theta: np.ones(shape), ["E"], 3, vectorized=vectorized)
     expected = (4, 3) if vectorized else (3,)
@@ -143,14 +134,12 @@ def test_callable_models_of_another_shape_are_refused(vectorized, shape):
 def test_numpy_integers_are_integers():
     model = make_z24(np.int8(40))
     assert type(model.n_modes) is int
-    assert model.n_modes == 40
-    assert "40 modes" in repr(make_z24(np.int64(40)))
+    assert "40 modes" in repr(model)
     assert CallableModel(np.sqrt, "k", np.uint8(1)).n_modes == 1
     drawn = sample(make_truss(np.int8(6)), 0.2, np.int8(64), n_jobs=np.int8(1), method="sobol", random_state=np.int8(0))
     expected = sample(make_truss(), 0.2, 64, method="sobol", random_state=0)
     np.testing.assert_array_equal(drawn.frequencies, expected.frequencies)
-    campaign = make_truss_campaign(np.int8(2), samples_per_year=np.int16(365), samples_per_day=np.int8(1))
-    assert len(campaign.temperatures) == 730
+    assert len(make_truss_campaign(np.int8(2), samples_per_year=np.int16(30), samples_per_day=np.int8(1)).theta) == 60
 
 
 def test_dense_and_sparse_matrices_and_plain_keys_are_one_model():
@@ -198,12 +187,12 @@ class OwnBar:
     ],
 )
 def test_matrices_of_an_element_of_ones_own_are_checked(attribute, value, message):
-    def structure():
-        return Structure({"left": (0, 0), "apex": (1, 1)}, {"own": OwnBar()}, {"left": "xy"}, {"all": ["own"]})
+    def assembled(element):
+        structure = Structure({"left": (0, 0), "apex": (1, 1)}, {"own": element}, {"left": "xy"}, {"all": ["own"]})
+        return structure.assemble({"E": ("E", "all")}, n_modes=1)
 
-    model = structure().assemble({"E": ("E", "all")}, n_modes=1)
+    wrong, model = OwnBar(), assembled(OwnBar())
     np.testing.assert_allclose(model.frequencies([[4.0]]), 2 * model.frequencies([[1.0]]))
-    wrong = OwnBar()
     setattr(wrong, attribute, value)
     with pytest.raises(ValueError, match=message):
-        Structure({"left": (0, 0), "apex": (1, 1)}, {"own": wrong}, {"left": "xy"}, {"all": ["own"]}).assemble(["all"])
+        assembled(wrong)

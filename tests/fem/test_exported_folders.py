@@ -1,12 +1,14 @@
 """Folders of whole exports, one as built and one with each group's modulus multiplied, read in one call."""
 
 import contextlib
+import re
 
 import numpy as np
 import pytest
 import scipy.sparse
 
 from skthermo.fem import AffineModel, load_affine
+from skthermo.fem.external import read_named_matrices
 from tests.fem.exported_files import (
     DOFS,
     TERMS,
@@ -30,73 +32,61 @@ def whole(group=None, factor=2.0):
 EXPECTED = AffineModel([((name,), term) for name, term in TERMS.items()] + [((), REST)], M, n_modes=4)
 
 
-def abaqus(folder, job, K, M):
-    (folder / f"{job}_STIF2.mtx").write_text(matrix_input_text(K, DOFS, half="both"))
-    (folder / f"{job}_MASS2.mtx").write_text(matrix_input_text(M, DOFS, half="both"))
-    (folder / f"{job}_LOAD2.mtx").write_text("*CLOAD\n3,1, 1.0e3\n")
-    (folder / f"{job}.inp").write_text("*HEADING\n*NODE\n1, 0., 0.\n")
+MAPPING = "    Matrix Eqn          Node    DOF\n" + "".join(
+    f"{i:14d}{node:14d}    U{'XYZ'[direction - 1]}\n" for i, (node, direction) in enumerate(DOFS, start=1)
+)
+LABELS = "".join(f"{node}.{direction}\n" for node, direction in DOFS)
+FROM_ANSYS, HEADING = {"n": 1, "digits": 15, "letter": "D"}, "Row Column Value\n"
+PROGRAMS = {
+    "abaqus": lambda K, M: {
+        "_STIF2.mtx": matrix_input_text(K, DOFS, half="both"),
+        "_MASS2.mtx": matrix_input_text(M, DOFS, half="both"),
+        "_LOAD2.mtx": "*CLOAD\n3,1, 1.0e3\n",
+        ".inp": "*HEADING\n*NODE\n1, 0., 0.\n",
+    },
+    "ansys": lambda K, M: {
+        ".stif": harwell_boeing_text(K, sides=True, **FROM_ANSYS),
+        ".mass": harwell_boeing_text(M, **FROM_ANSYS),
+        ".mapping": MAPPING,
+    },
+    "nastran": lambda K, M: {".pch": dmig_text(K, DOFS, name="KAAX") + dmig_text(M, DOFS, name="MAAX")},
+    "output4": lambda K, M: {".op4": op4_text(K, name="KAA") + op4_text(M, name="MAA")},
+    "calculix": lambda K, M: {
+        ".sti": coordinates_text(K, half="upper"),
+        ".mas": coordinates_text(M, half="upper"),
+        ".dof": LABELS,
+    },
+    "sap2000": lambda K, M: {".TXK": HEADING + coordinates_text(K), ".TXM": HEADING + coordinates_text(M)},
+}
+"""What programs write of a job, by the ends of the files' names."""
 
 
-def ansys(folder, job, K, M):
-    (folder / f"{job}.stif").write_text(harwell_boeing_text(K, n=1, digits=15, letter="D", sides=True))
-    (folder / f"{job}.mass").write_text(harwell_boeing_text(M, n=1, digits=15, letter="D"))
-    lines = (f"{i:14d}{node:14d}    U{'XYZ'[d - 1]}\n" for i, (node, d) in enumerate(DOFS, start=1))
-    (folder / f"{job}.mapping").write_text("    Matrix Eqn          Node    DOF\n" + "".join(lines))
+def write_job(program, folder, job, K, M):
+    for suffix, text in PROGRAMS[program](K, M).items():
+        (folder / f"{job}{suffix}").write_text(text)
 
 
-def nastran(folder, job, K, M):
-    text = dmig_text(K, DOFS, name="KAAX", width=16) + dmig_text(M, DOFS, name="MAAX", width=16)
-    (folder / f"{job}.pch").write_text(text)
-
-
-def output4(folder, job, K, M):
-    (folder / f"{job}.op4").write_text(op4_text(K, name="KAA") + op4_text(M, name="MAA"))
-
-
-def calculix(folder, job, K, M):
-    (folder / f"{job}.sti").write_text(coordinates_text(K, half="upper"))
-    (folder / f"{job}.mas").write_text(coordinates_text(M, half="upper"))
-    (folder / f"{job}.dof").write_text("".join(f"{node}.{direction}\n" for node, direction in DOFS))
-
-
-def sap2000(folder, job, K, M):
-    (folder / f"{job}.TXK").write_text("Row Column Value\n" + coordinates_text(K))
-    (folder / f"{job}.TXM").write_text("Row Column Value\n" + coordinates_text(M))
-
-
-def numpy_arrays(folder, job, K, M):
-    np.savez(folder / f"{job}.npz", K=K, M=M)
-
-
-PROGRAMS = [abaqus, ansys, nastran, output4, calculix, sap2000, numpy_arrays]
-
-
-def write(program, folder, factor=2.0, **changes):
+def write(program, folder, factor=2.0):
     for job in ("nominal", *TERMS):
-        program(folder, job, whole(job, factor), changes.get(job, M))
+        write_job(program, folder, job, whole(job, factor), M)
     return folder
 
 
-@pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.parametrize("factor", [2.0, 0.5])
-def test_a_folder_of_jobs_is_a_model(tmp_path, program, factor):
+@pytest.mark.parametrize(("program", "factor"), zip(PROGRAMS, [2.0, 0.5] * 3, strict=True))
+def test_a_folder_of_jobs_is_a_model_and_another_mass_names_the_job(tmp_path, program, factor):
     model = load_affine(write(program, tmp_path, factor), factor=factor, n_modes=4)
     assert set(model.parameter_names) == set(TERMS)
-    assert_same(model, EXPECTED, 1e-6 if program is nastran else 1e-11)
-    labels = tuple((node, f"U{'XYZ'[d - 1]}") for node, d in DOFS) if program is ansys else tuple(DOFS)
-    assert model.dofs == (() if program in (output4, sap2000, numpy_arrays) else labels)
-
-
-@pytest.mark.parametrize("program", PROGRAMS)
-def test_another_mass_names_the_job(tmp_path, program):
-    write(program, tmp_path, E_10=2 * M)
+    assert_same(model, EXPECTED, 1e-6 if program == "nastran" else 1e-11)
+    labels = tuple((node, f"U{'XYZ'[d - 1]}") for node, d in DOFS) if program == "ansys" else tuple(DOFS)
+    assert model.dofs == (() if program in ("output4", "sap2000") else labels)
+    write_job(program, tmp_path, "E_10", whole("E_10", factor), 2 * M)
     with pytest.raises(ValueError, match="mass of 'E_10' differs from that of 'nominal'"):
-        load_affine(tmp_path, factor=2.0, n_modes=4)
-    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4, mass="nominal (mass)"), EXPECTED, 1e-6)
+        load_affine(tmp_path, factor=factor, n_modes=4)
+    assert_same(load_affine(tmp_path, factor=factor, n_modes=4, mass="nominal (mass)"), EXPECTED, 1e-6)
 
 
 def test_a_wrong_factor_and_a_missing_nominal_job_are_errors_that_name_folder_and_group(tmp_path):
-    write(abaqus, tmp_path, 3.0)
+    write("abaqus", tmp_path, 3.0)
     with pytest.raises(ValueError, match=r"test_a_wrong.*'E_2'.*factor was 2"):
         load_affine(tmp_path, factor=2.0, n_modes=4)
     for file in tmp_path.glob("nominal*"):
@@ -107,24 +97,28 @@ def test_a_wrong_factor_and_a_missing_nominal_job_are_errors_that_name_folder_an
 
 
 def test_only_some_groups_may_be_named_and_their_parameters(tmp_path):
-    write(nastran, tmp_path)
+    write("nastran", tmp_path)
     model = load_affine(tmp_path, factor=2.0, n_modes=4, stiffness={"E_2": "E", "k_base": "k"})
     rest = REST + TERMS["E_10"]
     assert_same(model, AffineModel({("E",): TERMS["E_2"], ("k",): TERMS["k_base"], (): rest}, M, n_modes=4), 1e-6)
 
 
-def test_one_file_of_whole_matrices(tmp_path):
-    matrices = {"K0": whole()} | {name: whole(name, 5.0) for name in TERMS}
-    np.savez(tmp_path / "bridge.npz", M=M, **matrices)
-    assert_same(load_affine(tmp_path / "bridge.npz", factor=5.0, n_modes=4), EXPECTED)
-    scipy.sparse.save_npz(tmp_path / "other.npz", scipy.sparse.csc_array(M))
+def test_files_of_numpy_hold_a_job_or_all_matrices(tmp_path):
+    for job in ("nominal", *TERMS):
+        np.savez(tmp_path / f"{job}.npz", K=whole(job), M=M)
+    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED)
+    (tmp_path / "all").mkdir()
+    file = tmp_path / "all" / "bridge.npz"
+    np.savez(file, M=M, K0=whole(), **{name: whole(name, 5.0) for name in TERMS})
+    assert_same(load_affine(file, factor=5.0, n_modes=4), EXPECTED)
+    scipy.sparse.save_npz(file.with_name("other.npz"), scipy.sparse.csc_array(M))
     with pytest.raises(ValueError, match=r"bridge\.npz holds .*; expected one stiffness K"):
-        load_affine(tmp_path, factor=5.0, n_modes=4)
+        load_affine(file.parent, factor=5.0, n_modes=4)
 
 
 def test_labels_that_occur_more_than_once_are_left_out(tmp_path):
     """CalculiX writes such labels for beams: rows that share one are still different rows."""
-    write(calculix, tmp_path)
+    write("calculix", tmp_path)
     for job in ("nominal", *TERMS):
         (tmp_path / f"{job}.dof").write_text("1.1\n1.2\n1.1\n2.1\n2.2\n2.3\n")
     model = load_affine(tmp_path, factor=2.0, n_modes=4)
@@ -134,33 +128,24 @@ def test_labels_that_occur_more_than_once_are_left_out(tmp_path):
 
 def test_names_may_stand_anywhere_in_their_field(tmp_path):
     """pyNastran writes names of matrices at the right end of large fields."""
-    write(nastran, tmp_path)
+    write("nastran", tmp_path)
     for file in tmp_path.iterdir():
-        lines = file.read_text().splitlines()
-        moved = [line[:8] + line[8:24].strip().rjust(16) + line[24:] if line[:5] == "DMIG*" else line for line in lines]
-        file.write_text("\n".join(moved) + "\n")
+        moved = re.sub(r"(?m)^(DMIG\*   )(.{16})", lambda m: m[1] + m[2].strip().rjust(16), file.read_text())
+        assert moved != file.read_text()
+        file.write_text(moved)
     assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED, 1e-8)  # nine digits
 
 
-def ansys_binary(number):
-    return np.array([100, -(2**31), number, *[0] * 98, 100], dtype="<i4").tobytes()
-
-
 @pytest.mark.parametrize(
-    ("content", "program"),
-    [
-        (ansys_binary(4), "ANSYS"),
-        (ansys_binary(2), "ANSYS"),
-        (np.array([4, 3, 4, 12], dtype="<i4").tobytes(), "Nastran"),
-    ],
+    ("integers", "program"), [([100, -(2**31), 4, *[0] * 98, 100], "ANSYS"), ([4, 3, 4, 12], "Nastran")]
 )
-def test_binary_files_of_programs_are_named(tmp_path, content, program):
+def test_binary_files_of_programs_are_named(tmp_path, integers, program):
     file = tmp_path / "nominal.bin"
-    file.write_bytes(content)
+    file.write_bytes(np.array(integers, dtype="<i4").tobytes())
     for path in (file, tmp_path):
         with pytest.raises(ValueError, match=f"nominal.bin is an? .* file of {program}; expected another file"):
             load_affine(path)
-    write(abaqus, tmp_path)
+    write("abaqus", tmp_path)
     assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED)  # beside texts, they are ignored
 
 
@@ -203,11 +188,14 @@ LAYOUTS = ["dense", "strings", "big"]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("order", ["<", ">"])
-@pytest.mark.parametrize(("kind", "word", "tolerance"), [(1, 4, 1e-6), (2, 4, 1e-12), (1, 8, 1e-12), (2, 8, 1e-12)])
+@pytest.mark.parametrize(
+    ("order", "kind", "word", "tolerance"),
+    [("<", 1, 4, 1e-6), (">", 2, 4, 1e-12), (">", 1, 8, 1e-12), ("<", 2, 8, 1e-12)],
+)
 def test_binary_output4(tmp_path, layout, order, kind, word, tolerance):
-    write(lambda *job: binary_op4(*job, order=order, kind=kind, layout=layout, word=word), tmp_path)
-    assert_same(load_affine(tmp_path, factor=2.0, n_modes=4), EXPECTED, tolerance)
+    binary_op4(tmp_path, "nominal", whole(), M, order=order, kind=kind, layout=layout, word=word)
+    model = load_affine(tmp_path / "nominal.op4", n_modes=4, mass="MLL")
+    assert_same(model, AffineModel({("KLL",): whole()}, M, n_modes=4), tolerance)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -216,15 +204,12 @@ def test_damaged_binary_output4_is_read_or_refused(tmp_path, layout):
     binary_op4(tmp_path, "nominal", whole(), M, layout=layout)
     file, random = tmp_path / "nominal.op4", np.random.default_rng(0)
     sound = file.read_bytes()
-    for length in random.integers(1, len(sound), 40):
-        file.write_bytes(sound[:length])
+    other_row = np.array([0 if layout == "dense" else 1], "<i4").tobytes()
+    for refused in (*(sound[:n] for n in random.integers(1, len(sound), 12)), sound[:40] + other_row + sound[44:]):
+        file.write_bytes(refused)
         with pytest.raises(ValueError, match=r"nominal\.op4"):
             load_affine(file, n_modes=4)
-    for place in random.integers(0, len(sound), 200):
+    for place in random.integers(0, len(sound), 60):
         file.write_bytes(sound[:place] + bytes([random.integers(256)]) + sound[place + 1 :])
         with contextlib.suppress(ValueError):
-            load_affine(file, n_modes=4)
-    other_row = 0 if layout == "dense" else 1
-    file.write_bytes(sound[:40] + np.array([other_row], "<i4").tobytes() + sound[44:])
-    with pytest.raises(ValueError, match=r"nominal\.op4"):
-        load_affine(file, n_modes=4)
+            read_named_matrices(file, lambda name: True)

@@ -9,7 +9,7 @@ import scipy.io
 
 from skthermo.datasets import make_truss
 from skthermo.fem import AffineModel, mac
-from tests.fem.frames import local_shapes, portal
+from tests.fem.frames import frame, local_shapes, portal
 
 ROW = np.array([0.9, 1.15, 1.05, 0.85])
 
@@ -31,10 +31,10 @@ def chain_with_few_masses():
     return AffineModel(terms, np.diag(np.arange(12) % 3 == 1).astype(float), n_modes=2)
 
 
-def central_differences(model, row, shapes, step):
+def central_differences(model, row, shapes, step, directions=None):
     """Of shapes, each with the sign of those given."""
     differences = []
-    for unit in np.eye(len(row)):
+    for unit in np.eye(len(row)) if directions is None else directions:
         ends = [model.modes([row + way * step * unit])[1][0] for way in (1, -1)]
         raised, lowered = (end * np.sign((end * shapes).sum(axis=0)) for end in ends)
         differences.append((raised - lowered) / (2 * step))
@@ -43,17 +43,20 @@ def central_differences(model, row, shapes, step):
 
 MODELS = {
     "truss": make_truss,
-    "truss, all but two modes": lambda: make_truss(n_modes=21),
     "chain with massless degrees of freedom": chain_with_few_masses,
+    "truss, all but two modes": lambda: make_truss(n_modes=21),
     "dense frame": lambda: portal(3, track=True),
-    "sparse frame": portal,
-    "sparse tracked frame": lambda: portal(track=True),
-    "reduced frame": lambda: portal(track=True).reduced(0.3, random_state=0),
+    "sparse frame": frame,
+    "sparse tracked frame": lambda: frame(track=True),
+    "reduced frame": lambda: frame(track=True, is_reduced=True),
 }
 
 
-@pytest.mark.one_case
-@pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
+SMALL = [pytest.param(MODELS[name], id=name) for name in list(MODELS)[:2]]
+LARGER = [pytest.param(MODELS[name], id=name, marks=pytest.mark.nightly) for name in list(MODELS)[2:]]
+
+
+@pytest.mark.parametrize("make", SMALL + LARGER)
 def test_shape_derivatives_equal_central_differences(make):
     model = make()
     shapes, derivatives = local_shapes(model, ROW)
@@ -64,13 +67,12 @@ def test_shape_derivatives_equal_central_differences(make):
     np.testing.assert_allclose(np.abs(local_shapes(model, ROW, some)[1]), np.abs(derivatives[some]), rtol=1e-9)
 
 
+@pytest.mark.nightly
 def test_shape_derivatives_of_a_real_model_with_massless_degrees_of_freedom():
     model, random = building_frame(), np.random.default_rng(0)
     row, direction = random.uniform(0.8, 1.2, 14), random.standard_normal(14)
     shapes, derivatives = local_shapes(model, row)
-    ends = [model.modes([row + way * 1e-4 * direction])[1][0] for way in (1, -1)]
-    raised, lowered = (end * np.sign((end * shapes).sum(axis=0)) for end in ends)
-    expected = (raised - lowered) / 2e-4
+    expected = central_differences(model, row, shapes, 1e-4, [direction])[:, :, 0]
     scale = np.abs(expected).max(axis=0)
     np.testing.assert_allclose(derivatives @ direction / scale, expected / scale, atol=1e-4)
 
@@ -78,7 +80,7 @@ def test_shape_derivatives_of_a_real_model_with_massless_degrees_of_freedom():
 @pytest.mark.parametrize("track", [False, True])
 def test_shapes_of_the_jacobian_are_the_models_columns(track):
     row = np.array([0.3, 3.0, 0.4, 0.2])
-    for model in (portal(3, track=track), portal(track=track)):
+    for model in (portal(3, track=track), frame(track=track)):
         shapes = model.linearised_modes(row, range(model.n_dof))[2][0]
         np.testing.assert_allclose(np.diagonal(mac(shapes, model.modes([row])[1][0])), 1)
 

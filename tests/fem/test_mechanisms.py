@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from skthermo.fem import AffineModel, Beam, Structure
+from tests.fem.test_beams import SECTION
 
-MESHES = [((1.0, 0.0, 0.0), 500), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
+MESHES = [((1.0, 0.0, 0.0), 250), pytest.param((1.0, 2.0, 3.0), 2000, marks=pytest.mark.nightly)]
 
 
 def cantilever(n_beams, supports, *, direction=(1.0, 2.0, 3.0)):
     """A line of beams, 10 m long."""
-    section = {"E": 210e9, "G": 81e9, "A": 0.02, "I_yy": 4e-5, "I_zz": 1e-5, "J": 3e-5, "density": 7850.0}
     along = np.array(direction) / np.linalg.norm(direction)
     nodes = {i: tuple(along * 10 * i / n_beams) for i in range(n_beams + 1)}
-    beams = {f"beam {i}": Beam(i, i + 1, **section) for i in range(n_beams)}
+    beams = {f"beam {i}": Beam(i, i + 1, **SECTION) for i in range(n_beams)}
     return Structure(nodes, beams, supports, {"all": list(beams)}).assemble(["all"], n_modes=2)
 
 
@@ -26,7 +26,7 @@ def test_a_fine_mesh_is_no_mechanism(direction, n_beams):
 
 @pytest.mark.parametrize(("direction", "finest"), MESHES)
 def test_a_mechanism_is_one_in_every_mesh(direction, finest):
-    for n_beams in (5, 100):
+    for n_beams in (5, 50):
         for ends in ({}, {0: "xyz"}, {0: "xyz", n_beams: "xyz"}):
             with pytest.raises(ValueError, match="the structure is a mechanism"):
                 cantilever(n_beams, ends, direction=direction)

@@ -13,16 +13,9 @@ QUADRILATERAL = np.array([[0.0, 0.0, 0.0], [2.0, 0.3, 0.0], [1.7, 1.9, 0.0], [-0
 AREA = 2.855  # by the shoelace formula
 
 
-def membrane(**options):
-    return Membrane((0, 1, 2, 3), **(PLATE | options))
-
-
-def stiffness(coordinates, **options):
-    return membrane(**options).stiffness(coordinates)["E", "t"]
-
-
-def mass(coordinates, **options):
-    return membrane(**options).mass(coordinates)["density", "t"]
+def matrix_of(kind, coordinates, **options):
+    matrices = getattr(Membrane((0, 1, 2, 3), **(PLATE | options)), kind)(coordinates)
+    return matrices["E" if kind == "stiffness" else "density", "t"]
 
 
 def in_plane(strain):
@@ -39,7 +32,7 @@ def test_constant_strain_has_its_exact_energy_however_the_plate_is_turned(strain
     energy = PLATE["t"] * AREA * np.array(strain) @ hooke @ strain
     turn = Rotation.random(random_state=seed)
     displacements = turn.apply(in_plane(strain).reshape(4, 3)).ravel()
-    computed = displacements @ stiffness(turn.apply(QUADRILATERAL) + [3, -7, 2]) @ displacements
+    computed = displacements @ matrix_of("stiffness", turn.apply(QUADRILATERAL) + [3, -7, 2]) @ displacements
     np.testing.assert_allclose(computed, energy, rtol=1e-8, atol=1e-8)
 
 
@@ -52,7 +45,7 @@ def test_patch_of_distorted_membranes_stretches_evenly():
     total = np.zeros((16, 16))
     for corners in patch:
         dofs = np.array([[2 * c, 2 * c + 1] for c in corners]).ravel()
-        total[np.ix_(dofs, dofs)] += stiffness(points[list(corners)])
+        total[np.ix_(dofs, dofs)] += matrix_of("stiffness", points[list(corners)])
     expected = (points @ [[1e-3, 3e-4], [2e-4, -5e-4]]).ravel()
     held, free = np.arange(8), np.arange(8, 16)
     found = np.linalg.solve(total[np.ix_(free, free)], -total[np.ix_(free, held)] @ expected[held])
@@ -64,30 +57,27 @@ def test_rigid_motion_strains_nothing_and_carries_the_mass(seed):
     rng = np.random.default_rng(seed)
     points = Rotation.random(random_state=seed).apply(QUADRILATERAL) + rng.normal(size=3)
     turning = np.stack([np.cross(axis, points).ravel() for axis in np.eye(3)], axis=1)
-    shifting = np.tile(np.eye(3), (4, 1))
-    matrix = stiffness(points)
+    shifting, matrix = np.tile(np.eye(3), (4, 1)), matrix_of("stiffness", points)
     np.testing.assert_allclose(matrix @ np.hstack([shifting, turning]), 0, atol=1e-9 * np.abs(matrix).max())
     total = PLATE["density"] * PLATE["t"] * AREA
-    consistent, lumped = mass(points), mass(points, lumped=True)
+    consistent, lumped = (matrix_of("mass", points, lumped=lumped) for lumped in (False, True))
     np.testing.assert_allclose(shifting.T @ consistent @ shifting, total * np.eye(3), atol=1e-9 * total)
     np.testing.assert_allclose(lumped, np.diag(consistent.sum(axis=1)), atol=1e-9 * total)
     np.testing.assert_allclose(shifting.T @ consistent @ turning, shifting.T @ lumped @ turning, atol=1e-8 * total)
 
 
 def test_nothing_resists_motion_out_of_the_plane():
-    matrix = stiffness(QUADRILATERAL).reshape(4, 3, 4, 3)
-    assert not matrix[:, 2].any()
-    assert np.linalg.matrix_rank(stiffness(QUADRILATERAL)) == 8 - 3
+    matrix = matrix_of("stiffness", QUADRILATERAL)
+    assert not matrix.reshape(4, 3, 4, 3)[:, 2].any()
+    assert np.linalg.matrix_rank(matrix) == 8 - 3
 
 
-def sheet(n, m, length, depth, dimension=2, **options):
-    """n x m membranes, clamped along the left edge."""
-    nodes = {
-        (i, j): (length * i / n, depth * (j / m - 0.5), 0.0)[:dimension] for i in range(n + 1) for j in range(m + 1)
-    }
+def sheet(n, m, length, depth, held=lambda i, j: "" if i else "xy", springs=(), **options):
+    """n x m membranes, clamped along the left edge if nothing else is said."""
+    nodes = {(i, j): (length * i / n, depth * (j / m - 0.5)) for i in range(n + 1) for j in range(m + 1)}
     corners = {(i, j): ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)) for i in range(n) for j in range(m)}
     members = {name: Membrane(around, **(PLATE | options)) for name, around in corners.items()}
-    return Structure(nodes, members, {(0, j): "xyz"[:dimension] for j in range(m + 1)}, {"sheet": list(members)})
+    return Structure(nodes, members | dict(springs), {node: held(*node) for node in nodes}, {"sheet": list(members)})
 
 
 def test_slender_sheet_is_a_bernoulli_cantilever():
@@ -95,50 +85,34 @@ def test_slender_sheet_is_a_bernoulli_cantilever():
     length, depth = 8.0, 0.4
     inertia, area = PLATE["t"] * depth**3 / 12, PLATE["t"] * depth
     exact = 1.8751040687**2 / (2 * np.pi * length**2) * np.sqrt(PLATE["E"] * inertia / (PLATE["density"] * area))
-    coarse, fine = (
-        sheet(n, m, length, depth).assemble(["sheet"], n_modes=1).frequencies([[1.0]])[0, 0] / exact - 1
-        for n, m in ((20, 1), (40, 2))
-    )
+    sheets = [sheet(n, m, length, depth).assemble(["sheet"], n_modes=1) for n, m in ((20, 1), (40, 2))]
+    coarse, fine = (model.frequencies([[1.0]])[0, 0] / exact - 1 for model in sheets)
     assert 0 < fine < coarse
     np.testing.assert_allclose(fine + (fine - coarse) / 3, 0, atol=0.01)
 
 
 def test_without_lateral_contraction_a_strip_is_a_row_of_bars():
-    strip = sheet(6, 1, 6.0, 0.8, nu=0.0, lumped=True)
-    held = {(i, j): "y" if i else "xy" for i in range(7) for j in range(2)}
-    strip = Structure(strip.nodes, strip.members, held, strip.groups)
-    bar = {"E": PLATE["E"], "A": 0.8 * PLATE["t"], "density": PLATE["density"], "lumped": True}
-    rod = Structure(
-        {i: (float(i), 0.0) for i in range(7)},
-        {i: Bar(i, i + 1, **bar) for i in range(6)},
-        {i: "y" if i else "xy" for i in range(7)},
-        {"rod": range(6)},
-    )
-    np.testing.assert_allclose(
-        strip.assemble(["sheet"], n_modes=1).frequencies([[1.0]]),
-        rod.assemble(["rod"], n_modes=1).frequencies([[1.0]]),
-        rtol=1e-9,
-    )
+    strip = sheet(6, 1, 6.0, 0.8, held=lambda i, j: "y" if i else "xy", nu=0.0, lumped=True)
+    bars = {i: Bar(i, i + 1, E=PLATE["E"], A=0.8 * PLATE["t"], density=PLATE["density"], lumped=True) for i in range(6)}
+    nodes = {i: (float(i), 0.0) for i in range(7)}
+    rod = Structure(nodes, bars, {i: "y" if i else "xy" for i in nodes}, {"sheet": range(6)})
+    found, expected = (one.assemble(["sheet"], n_modes=1).frequencies([[1.0]]) for one in (strip, rod))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_every_property_may_be_a_parameter():
-    flat = sheet(4, 2, 2.0, 1.0)
     springs = {("spring", i, j): Spring((i, j), "x", 1e9) for i in range(1, 5) for j in range(3)}
-    structure = Structure(flat.nodes, flat.members | springs, {(0, j): "xy" for j in range(3)}, flat.groups)
     parameters = {"E": ("E", "sheet"), "t": ("t", "sheet"), "t_K": ("t", "sheet", "stiffness")}
     parameters |= {"rho": ("density", "sheet"), "t_M": ("t", "sheet", "mass")}
-    model = structure.assemble(parameters, n_modes=3)
+    model = sheet(4, 2, 2.0, 1.0, springs=springs).assemble(parameters, n_modes=3)
     for theta, twin in (
         ([1.3, 1, 1, 1, 1], {"E": 1.3 * PLATE["E"]}),
         ([1, 0.7, 1, 1, 1], {"t": 0.7 * PLATE["t"]}),
         ([1, 1, 1.2, 1, 1], {"E": 1.2 * PLATE["E"]}),
         ([1, 1, 1, 0.8, 1.1], {"density": 0.8 * 1.1 * PLATE["density"]}),
     ):
-        members = sheet(4, 2, 2.0, 1.0, **twin).members | springs
-        expected = Structure(structure.nodes, members, {(0, j): "xy" for j in range(3)}, flat.groups)
-        np.testing.assert_allclose(
-            model.frequencies([theta]), expected.assemble(["sheet"], n_modes=3).frequencies([[1.0]]), rtol=1e-9
-        )
+        expected = sheet(4, 2, 2.0, 1.0, springs=springs, **twin).assemble(["sheet"], n_modes=3).frequencies([[1.0]])
+        np.testing.assert_allclose(model.frequencies([theta]), expected, rtol=1e-9)
 
 
 WARPED = QUADRILATERAL + [[0, 0, 0], [0, 0, 0], [0, 0, 0.1], [0, 0, 0]]

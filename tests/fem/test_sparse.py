@@ -9,7 +9,7 @@ import scipy.sparse.linalg
 
 from skthermo.fem import AffineModel, Beam, Structure
 from skthermo.fem.modal import ShiftInvertSolver
-from tests.fem.frames import FRAME, SECTION, portal
+from tests.fem.frames import FRAME, SECTION, frame
 
 THETA = np.random.default_rng(0).uniform(0.6, 1.5, (6, 4))
 
@@ -24,13 +24,12 @@ def dense_frequencies(model, theta):
     return np.array(found)
 
 
-def test_the_frame_is_solved_sparsely():
+def test_sparse_frequencies_agree_with_a_dense_solver_alone_and_among_others():
     assert FRAME.n_dof > 200
     assert isinstance(FRAME._core.solver, ShiftInvertSolver)
-
-
-def test_sparse_frequencies_agree_with_a_dense_solver():
-    np.testing.assert_allclose(FRAME.frequencies(THETA), dense_frequencies(FRAME, THETA), rtol=1e-9)
+    found = FRAME.frequencies(THETA[:3])
+    np.testing.assert_allclose(found, dense_frequencies(FRAME, THETA[:3]), rtol=1e-9)
+    np.testing.assert_array_equal(found, np.concatenate([FRAME.frequencies([row]) for row in THETA[:3]]))
 
 
 def test_sparse_shapes_have_unit_modal_mass_and_solve_the_eigenproblem():
@@ -45,30 +44,25 @@ def test_sparse_shapes_have_unit_modal_mass_and_solve_the_eigenproblem():
 @pytest.mark.one_case
 @pytest.mark.parametrize("track", [False, True])
 def test_sparse_jacobian_equals_central_differences(track):
-    model, step = portal(track=track), 1e-4
+    model, theta, step = frame(track=track), THETA[:2], 1e-4
     differences = [
-        (model.frequencies(THETA + step * unit) - model.frequencies(THETA - step * unit)) / (2 * step)
+        (model.frequencies(theta + step * unit) - model.frequencies(theta - step * unit)) / (2 * step)
         for unit in np.eye(4)
     ]
-    np.testing.assert_allclose(model.jacobian(THETA), np.stack(differences, axis=2), atol=1e-5)
+    np.testing.assert_allclose(model.jacobian(theta), np.stack(differences, axis=2), atol=1e-5)
 
 
 def chain(n_dof):
     return scipy.sparse.diags_array([np.full(n_dof, 2.0), *-np.ones((2, n_dof - 1))], offsets=[0, 1, -1]).tocsc()
 
 
-@pytest.mark.parametrize(("copies", "n_dof"), [(2, 100), (3, 100), (6, 100), (5, 200)])
+@pytest.mark.parametrize(("copies", "n_dof"), [(3, 100), (5, 200)])
 def test_repeated_eigenvalues_are_all_found(copies, n_dof):
     """Equal chains side by side; that of one has frequencies sin(j pi / (2 n + 2)) / pi."""
     stiffness = scipy.sparse.block_diag([chain(n_dof)] * copies).tocsc()
     model = AffineModel({("k",): stiffness}, scipy.sparse.eye_array(n_dof * copies), n_modes=2 * copies)
     expected = np.repeat(np.sin(np.array([1, 2]) * np.pi / (2 * n_dof + 2)) / np.pi, copies)
     np.testing.assert_allclose(model.frequencies([[1.0]])[0], expected, rtol=1e-10)
-
-
-def test_the_same_theta_gives_the_same_bits_alone_and_among_others():
-    alone = np.concatenate([FRAME.frequencies([row]) for row in THETA])
-    np.testing.assert_array_equal(FRAME.frequencies(THETA), alone)
 
 
 def test_sparse_massless_degrees_of_freedom_have_no_modes():
@@ -86,44 +80,30 @@ def test_a_large_mechanism_is_named():
         AffineModel({("k",): loose}, scipy.sparse.eye_array(400))
     nodes = {i: (0.5 * i, 0, 0) for i in range(61)}
     beams = {i: Beam(i, i + 1, **SECTION) for i in range(60)}
-    hinged = Structure(nodes, beams, {0: "xyz", 60: "yz"}, {"all": list(beams)})
     with pytest.raises(ValueError, match=r"node \d+ along rx, .* can move"):
-        hinged.assemble(["all"])
+        Structure(nodes, beams, {0: "xyz", 60: "yz"}, {"all": list(beams)}).assemble(["all"])
 
 
 def test_large_indefinite_matrices_are_refused():
-    with pytest.raises(ValueError, match="mechanism"):
-        AffineModel({("k",): chain(300) - 0.1 * scipy.sparse.eye_array(300)}, scipy.sparse.eye_array(300))
-    with pytest.raises(ValueError, match="mass has a negative eigenvalue"):
-        AffineModel({("k",): chain(300)}, chain(300) - 0.1 * scipy.sparse.eye_array(300))
-    for mass in (
-        scipy.sparse.diags_array(1.0 - 2.0 * (np.arange(300) == 7)),
-        np.diag(1.0 - 2.0 * (np.arange(300) == 7)),
-    ):
-        with pytest.raises(ValueError, match="negative at degree of freedom 7;"):
-            AffineModel({("k",): chain(300)}, mass)
+    ones, skew = scipy.sparse.eye_array(300), chain(300).tolil()
     hidden = scipy.sparse.diags_array(np.arange(300) < 9, dtype=float).tolil()
     hidden[200, 201] = hidden[201, 200] = 0.1
-    with pytest.raises(ValueError, match="mass has a negative eigenvalue"):
-        AffineModel({("k",): chain(300)}, hidden, n_modes=2)
-    skew = chain(300).tolil()
     skew[3, 7] = 0.5
-    with pytest.raises(ValueError, match=r"not symmetric: entries \((3, 7|7, 3)\) and"):
-        AffineModel({("k",): skew}, scipy.sparse.eye_array(300))
-
-
-def test_a_large_sample_without_modes_is_nan_and_the_others_stay():
-    force = -0.001 * scipy.sparse.eye_array(300)
-    model = AffineModel({("k",): chain(300) + 0.001 * scipy.sparse.eye_array(300), ("force",): force}, np.eye(300))
-    with pytest.warns(UserWarning, match="no-solution"):
-        frequencies = model.frequencies([[1.0, 1.0], [1.0, 1.5]])
-    assert np.isfinite(frequencies[0]).all()
-    assert np.isnan(frequencies[1]).all()
+    negative = 1.0 - 2.0 * (np.arange(300) == 7)
+    for stiffness, mass, message in (
+        (chain(300) - 0.1 * ones, ones, "mechanism"),
+        (chain(300), chain(300) - 0.1 * ones, "mass has a negative eigenvalue"),
+        (chain(300), scipy.sparse.diags_array(negative), "negative at degree of freedom 7;"),
+        (chain(300), np.diag(negative), "negative at degree of freedom 7;"),
+        (chain(300), hidden, "mass has a negative eigenvalue"),
+        (skew, ones, r"not symmetric: entries \((3, 7|7, 3)\) and"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            AffineModel({"k": stiffness}, mass, n_modes=2)
 
 
 @pytest.mark.one_case
-@pytest.mark.parametrize("n_masses", [3, 6, 12, 19, 30, 41, 80])
-@pytest.mark.parametrize("track", [False, True])
+@pytest.mark.parametrize(("n_masses", "track"), [(3, False), (12, True), (41, False), (80, True)])
 def test_few_masses_on_many_degrees_of_freedom(n_masses, track):
     """Storey masses of a building: a Krylov space is no larger than there are masses."""
     masses = np.zeros(320)
@@ -152,6 +132,5 @@ def test_all_modes_of_a_large_model_are_found():
     model = AffineModel({("k",): chain(201)}, scipy.sparse.eye_array(201), n_modes=201)
     expected = np.sin(np.arange(1, 202) * np.pi / 404) / np.pi
     np.testing.assert_allclose(model.frequencies([[1.0]])[0], expected, rtol=1e-9)
-    assert np.isfinite(
-        AffineModel({("k",): chain(240)}, np.eye(240), n_modes=59, track=True).frequencies([[1.2]])
-    ).all()
+    many = AffineModel({("k",): chain(240)}, np.eye(240), n_modes=59, track=True)
+    assert np.isfinite(many.frequencies([[1.2]])).all()

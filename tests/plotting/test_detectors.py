@@ -205,11 +205,7 @@ def made_study():
             rows.append(row | {"measure": "POD" if number else "PFA", "rate": (decisions[key] < 0).mean()})
     indices = {key: pd.Series(np.zeros(20)) for key in decisions}
     return SimpleNamespace(
-        scenarios=scenarios,
-        scenarios_=scenarios,
-        results_=pd.DataFrame(rows),
-        decisions_=decisions,
-        indices_=indices,
+        scenarios=scenarios, scenarios_=scenarios, results_=pd.DataFrame(rows), decisions_=decisions, indices_=indices
     )
 
 

@@ -8,13 +8,7 @@ import pandas as pd
 import pytest
 
 from skthermo.fem import Bar, Structure
-from skthermo.plotting import (
-    DamageIndexDisplay,
-    DetectorsDisplay,
-    PODCurveDisplay,
-    PredictionDisplay,
-    StructureDisplay,
-)
+from skthermo.plotting import DamageIndexDisplay, DetectorsDisplay, PODCurveDisplay, PredictionDisplay, StructureDisplay
 from skthermo.studies import pod_curve
 
 HOSTILE = "$E_{x$ & 50% <b>"

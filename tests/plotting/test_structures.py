@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
-from skthermo.datasets import kw51_structure, make_kw51
+from skthermo.datasets import kw51_structure
 from skthermo.fem import AffineModel, Bar, Beam, CallableModel, ImportedStructure, PointMass, Spring, Structure
 from skthermo.plotting import StructureDisplay
 
@@ -49,7 +49,7 @@ def test_a_group_colours_its_members_and_a_member_its_own_line():
         np.testing.assert_array_equal(StructureDisplay.from_structure(structure, values).values, [1, 1, 2, 2, 3])
 
 
-@pytest.mark.parametrize("directions", [("x", "y"), (1, 2), ("UX", "UY"), ()])
+@pytest.mark.parametrize("directions", [(1, 2), ("UX", "UY"), ()])
 def test_members_from_another_program_are_drawn_as_our_own(directions):
     own = king_post()
     alone = Structure(own.nodes, own.members, own.supports, {name: [name] for name in own.members})
@@ -106,7 +106,7 @@ def test_a_plane_frame_in_space_is_drawn_in_its_plane_with_its_two_supports(plan
     assert (sliding.get_xydata().tolist(), sliding.get_markerfacecolor()) == ([[4.0, 0.0]], "white")
 
 
-@pytest.mark.parametrize("view", [None, (0, 0), (90, -90), (35, 10)])
+@pytest.mark.parametrize("view", [None, (90, -90)])
 def test_what_has_no_plane_is_drawn_as_matplotlib_sees_space(view):
     """Distances are those of an orthographic projection by mplot3d, but for one scale."""
     structure = frame_in("xz", c="rx rz")
@@ -157,23 +157,10 @@ def test_springs_of_a_group_are_points_in_its_colour_and_in_the_legend():
 
 
 def test_surfaces_without_a_value_are_left_out():
-    display = StructureDisplay.from_structure(kw51_structure(), {"arch": 1.0, "plate": 2.0})
+    structure = kw51_structure()
+    display = StructureDisplay.from_structure(structure, {"arch": 1.0, "plate": 2.0})
     assert set(display.members_) == {"lines", "surfaces"}
-    assert len(display.members_["surfaces"].get_paths()) == len(kw51_structure().groups["plate"])
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"roof": 1.0}, r"values names 'roof'; expected members, or groups among \['all'"),
-        ([1.0, 2.0], r"values has shape \(2,\); expected \(5,\)"),
-        (["a"] * 5, "values is .*expected numbers"),
-        ({"all": 1.0, "post": 2.0}, "several groups with different values"),
-    ],
-)
-def test_wrong_values_are_named(values, message):
-    with pytest.raises(ValueError, match=message):
-        StructureDisplay.from_structure(king_post(), values)
+    assert len(display.members_["surfaces"].get_paths()) == len(structure.groups["plate"])
 
 
 def test_a_mode_is_drawn_at_its_shape_and_the_largest_displacement_is_the_amplitude():
@@ -199,29 +186,33 @@ def test_a_mode_is_drawn_at_its_shape_and_the_largest_displacement_is_the_amplit
         np.testing.assert_allclose(places["l", "f"][0], [0, 0], atol=1e-12)
 
 
-@pytest.mark.nightly
 def test_modes_in_space_by_groups():
-    structure = kw51_structure()
-    options = {"model": make_kw51(), "modes": [0, 1, 2], "groups": ["girders", "arch"]}
-    display = StructureDisplay.from_structure(structure, **options)
-    assert len(display.axes_) == 3
+    structure = tripod()
+    model = structure.assemble(["legs"], n_modes=2)
+    display = StructureDisplay.from_structure(structure, model=model, modes=[0, 1], groups=["legs"])
     display.figure_.canvas.draw()  # which projects the lines
-    n_members = len(structure.groups["girders"] | structure.groups["arch"])
-    assert len(display.members_[0].get_segments()) == n_members
-    assert display.axes_[0].get_title() == "$f_{1}$ = 0.477 Hz"
+    assert [len(display.members_[number].get_segments()) for number in (0, 1)] == [3, 3]
+    assert display.axes_[0].get_title() == f"$f_{{1}}$ = {model.frequencies([[1.0]])[0, 0]:.2f} Hz"
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        ({"values": {"roof": 1.0}}, r"values names 'roof'; expected members, or groups among \['all'"),
+        ({"values": [1.0, 2.0]}, r"values has shape \(2,\); expected \(5,\)"),
+        ({"values": ["a"] * 5}, "values is .*expected numbers"),
+        ({"values": {"all": 1.0, "post": 2.0}}, "several groups with different values"),
         ({"modes": [7]}, "modes is .7.; expected numbers from 0 to 1"),
-        ({"groups": ["roof"]}, "unknown group 'roof'"),
-        ({"model": CallableModel(lambda theta: theta, ["E"], 1)}, "has no method 'modes'"),
-        ({"model": tripod().assemble(["legs"], n_modes=1)}, "3 degrees of freedom; expected the structure's 5"),
+        ({"modes": [0], "groups": ["roof"]}, "unknown group 'roof'"),
+        ({"modes": [0], "model": CallableModel(lambda theta: theta, ["E"], 1)}, "has no method 'modes'"),
+        (
+            {"modes": [0], "model": tripod().assemble(["legs"], n_modes=1)},
+            "3 degrees of freedom; expected",
+        ),
     ],
 )
-def test_wrong_modes_are_named(options, message):
+def test_what_does_not_fit_is_named(options, message):
     structure = king_post()
-    given = {"model": structure.assemble(["ties"], n_modes=2), **options}
+    given = {"model": structure.assemble(["ties"], n_modes=2)} if "modes" in options else {}
     with pytest.raises(ValueError, match=message):
-        StructureDisplay.from_structure(structure, **given)
+        StructureDisplay.from_structure(structure, **given | options)

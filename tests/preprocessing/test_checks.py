@@ -14,9 +14,9 @@ YEAR = make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
 
 
-def hourly(seed=0, n_days=120):
+def hourly(n_days=60):
     """A slow temperature by the hour, as smooth as soil."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     hours = np.arange(24 * n_days)
     return 10 + 3 * np.sin(2 * np.pi * hours / 24) + 0.05 * np.cumsum(random.standard_normal(len(hours)))
 
@@ -77,20 +77,17 @@ class TestStuck:
         found = one(check_records(T.to_numpy(), stuck))
         assert tuple(found[["what", "column", "n_rows", "from", "to"]]) == ("stuck", "f5", 25, 100, 129)
 
-    @pytest.mark.parametrize("digits", [None, 1, 0])
+    @pytest.mark.parametrize("digits", [None, 0])
     def test_rounding_of_slow_temperatures_is_not_stuck(self, digits):
         column = hourly() if digits is None else hourly().round(digits)
         assert stuck_runs(column) == []
         column[500:1000] = column[500]
-        runs = stuck_runs(column)
-        assert len(runs) == 1
-        assert runs[0][0] <= 500
-        assert runs[0][-1] >= 999
+        ((first, last),) = stuck_runs(column)
+        assert first <= 500
+        assert last >= 999
 
-    def test_values_that_are_repeated_until_the_next_is_logged_are_not_stuck(self):
+    def test_values_that_are_repeated_and_those_at_which_a_sensor_rests_again_and_again_are_not_stuck(self):
         assert stuck_runs(np.repeat(hourly(), 6)) == []
-
-    def test_a_value_at_which_a_sensor_rests_again_and_again_is_not_stuck(self):
         sun = np.maximum(np.sin(2 * np.pi * np.arange(24 * 100) / 24), 0.0) * np.random.default_rng(0).random(2400)
         assert stuck_runs(sun) == []
 
@@ -105,17 +102,14 @@ class TestStuck:
         assert found.temperatures.isna().to_numpy().sum() == found.frequencies.isna().to_numpy().sum() == 40
         assert check_records(warm, stiff).table["what"].tolist() == ["stuck", "stuck"]
 
-    def test_lags_begin_with_copies_and_are_not_set_aside(self):
-        assert set_aside(LagFeatures([0, 24]).fit_transform(T), F)[0].table.empty
-
     @pytest.mark.parametrize("kind", [pd.DataFrame, np.asarray])
-    def test_lags_of_a_sensor_are_no_sensors(self, kind):
+    def test_lags_of_a_sensor_are_no_sensors_and_not_named_again(self, kind):
         lagged = LagFeatures([0, 24]).fit_transform(T)
         assert check_records(kind(lagged), kind(F)).table.empty
-        stuck = T.copy()
-        stuck.loc["2025-12", "T1"] = 20.0
-        found = check_records(LagFeatures([0, 2]).fit_transform(stuck), F).table
-        assert found["column"].tolist() == ["T1_lag0", "T1_lag2"]
+        wrong = T.copy()
+        wrong.loc["2025-12", "T1"], wrong.iloc[[4, 9], 1] = 20.0, -999.0
+        found = check_records(LagFeatures([0, 2]).fit_transform(wrong), F).table
+        assert sorted(found["column"]) == ["T1_lag0", "T1_lag2", "T2_lag0"]
 
 
 class TestTime:
@@ -128,7 +122,7 @@ class TestTime:
         array = one(check_records(T.to_numpy(), F.shift(shift).to_numpy()))
         assert array["detail"] == found["detail"].replace(" (about 60 days)", "")
 
-    @pytest.mark.parametrize("shift", [60, -60, 160, -160])
+    @pytest.mark.parametrize("shift", [60, -160])
     def test_a_shift_of_days_is_found_in_three_hourly_records_that_season_and_day_rule(self, shift):
         random = np.random.default_rng(0)
         hours, index = 3 * np.arange(2920), pd.date_range("2025-01-01", periods=2920, freq="3h")
@@ -148,7 +142,7 @@ class TestTime:
     @pytest.mark.parametrize("lag", [2, 12])
     def test_inertia_is_no_shift(self, lag):
         random = np.random.default_rng(0)
-        air = hourly() + 2 * random.standard_normal(24 * 120)  # as rough as weather that no mean of the past replaces
+        air = hourly() + 2 * random.standard_normal(24 * 60)  # as rough as weather that no mean of the past replaces
         frequency = np.roll(4 - 0.02 * air, lag) + 0.01 * random.standard_normal(len(air))
         index = pd.date_range("2025-01-01", periods=len(air), freq="h")
         tables = pd.DataFrame({"air": air}, index)[lag:], pd.DataFrame({"f": frequency}, index)[lag:]
@@ -164,10 +158,8 @@ class TestTime:
         assert check_records(lagged, noisy).table.empty
         assert one(check_records(lagged, noisy.shift(-10)))["what"] == "different-rows"
 
-    @pytest.mark.parametrize("seed", range(3))
-    def test_shuffled_temperatures_explain_nothing(self, seed):
-        shuffled = T.sample(frac=1, random_state=seed).set_axis(T.index)
-        found = one(check_records(shuffled, F))
+    def test_shuffled_temperatures_explain_nothing(self):
+        found = one(check_records(T.sample(frac=1, random_state=0).set_axis(T.index), F))
         assert (found["what"], found["n_rows"]) == ("different-rows", 365)
 
     def test_a_retrofit_is_not_taken_for_temperatures_of_other_days(self):
@@ -178,7 +170,7 @@ class TestTime:
 
 
 class TestExchangedModes:
-    @pytest.mark.parametrize("share", [0.5, 0.1, 0.02])
+    @pytest.mark.parametrize("share", [0.5, 0.02])
     def test_rows_are_found(self, share):
         rows = np.random.default_rng(0).random(len(F)) < share
         found = one(check_records(T, exchanged(rows)))
@@ -201,10 +193,9 @@ class TestExchangedModes:
 
 
 class TestOutliers:
-    @pytest.mark.parametrize("share", [0.01, 0.003])
-    def test_values_of_other_poles_are_counted_by_mode(self, share):
+    def test_values_of_other_poles_are_counted_by_mode(self):
         random = np.random.default_rng(1)
-        wrong = random.random(F.shape) < share
+        wrong = random.random(F.shape) < 0.01
         table = check_records(T, F.where(~wrong, F * random.choice([0.8, 1.25], F.shape))).table
         assert set(table["what"]) == {"doubtful-values"}
         assert dict(zip(table["column"], table["n_rows"], strict=True)) == {
@@ -218,17 +209,16 @@ class TestOutliers:
         assert (found["what"], found["column"], found["from"]) == ("doubtful-values", "f2", F.index[3])
 
     def test_a_change_that_lasts_is_none(self):
-        changed = F.copy()
-        changed.iloc[300:, 0] *= 0.8
+        changed = F.assign(f1=F["f1"].where(np.arange(len(F)) < 300, 0.8 * F["f1"]))
         assert "doubtful-values" not in set(check_records(T, changed).table["what"])
 
 
-def test_findings_do_not_depend_on_the_order_of_rows():
+def test_findings_do_not_depend_on_the_order_of_rows_and_columns():
     stuck = T.copy()
     stuck.loc["2025-12", "T2"] = 20.0
     order = np.random.default_rng(0).permutation(len(T))
     expected = check_records(stuck, F).table
-    found = check_records(stuck.iloc[order], F.iloc[order]).table
+    found = check_records(stuck.iloc[order][["T3", "T1", "T2"]], F.iloc[order]).table
     assert found["what"].tolist() == ["wrong-stamps", "stuck"]
     pd.testing.assert_frame_equal(found[1:].reset_index(drop=True), expected)
 
@@ -273,15 +263,11 @@ def other_inputs(T):
     return T.assign(**others)
 
 
-def test_inputs_that_are_no_temperatures_are_no_findings():
+def test_inputs_that_are_no_temperatures_are_no_findings_and_temperatures_among_them_are_looked_at():
     inputs = other_inputs(T)
     found = check_records(inputs, F)
     assert found.table.empty
     pd.testing.assert_frame_equal(found.temperatures, inputs)
-
-
-def test_temperatures_among_other_inputs_are_still_looked_at():
-    inputs = other_inputs(T)
     inputs["T1"] += 273.15
     inputs.loc[inputs.index[7], "T2"] = 400.0
     assert set(check_records(inputs, F).table["column"]) == {"T1", "T2"}

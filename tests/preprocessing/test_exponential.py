@@ -22,7 +22,7 @@ def naive_mean(column, stamp, half_life):
     return (used * weights).sum() / weights.sum() if len(used) else np.nan
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(
     st.lists(st.integers(0, 300), min_size=2, max_size=25, unique=True),
     st.integers(1, 40),
@@ -43,15 +43,6 @@ def test_current_values_come_first_and_names_tell_the_means():
     out = means.transform(T)
     assert list(out) == ["air", "deck", "deck_mean6h", "deck_mean2D"] == list(means.get_feature_names_out())
     pd.testing.assert_frame_equal(out[["air", "deck"]], T)
-
-
-def test_a_lagging_body_is_the_mean_of_its_past():
-    """A body that takes up heat in proportion to the difference has the exponentially weighted mean."""
-    hours = pd.date_range("2025-01-01", periods=24 * 200, freq="h")
-    air = pd.DataFrame({"air": 10 * np.sin(np.arange(len(hours)) / 500)}, hours)
-    body = air["air"].ewm(halflife=pd.Timedelta("7D"), times=hours).mean()
-    mean = ExponentialMeans(half_lives=["7D"]).fit_transform(air)["air_mean7D"]
-    assert np.abs(mean - body)[24 * 50 :].max() < 0.4 < np.abs(air["air"] - body)[24 * 50 :].max()
 
 
 @pytest.mark.parametrize("rows", [slice(399, 400), slice(300, 400), slice(120, 140)])
@@ -85,8 +76,7 @@ def test_gaps_leave_no_row_out_and_short_ones_no_mean():
     assert not means["deck_mean2h"].isna().any()
     late = gappy.drop(gappy.index[50:60])
     np.testing.assert_allclose(
-        ExponentialMeans(half_lives=["3D"]).fit_transform(late)["air_mean3D"],
-        means["air_mean3D"].drop(T.index[50:60]),
+        ExponentialMeans(half_lives=["3D"]).fit_transform(late)["air_mean3D"], means["air_mean3D"].drop(T.index[50:60])
     )
 
 

@@ -27,7 +27,7 @@ def study():
         HOSTILE: MahalanobisDetector(contamination=0.02, threshold="quantile"),
     }
     study = DetectabilityStudy(
-        fem, detectors, sweep(fem, (0.1, 0.2), [HOSTILE]), n_repeats=5, random_state=0, uncertainty="noise"
+        fem, detectors, sweep(fem, (0.1, 0.2), [HOSTILE]), n_repeats=2, random_state=0, uncertainty="noise"
     )
     study.run(T)
     return study

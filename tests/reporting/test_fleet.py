@@ -9,7 +9,7 @@ import pytest
 
 from skthermo.reporting import owner_report
 from tests.reporting.monitors import FakeFleet, FakeMonitor, event_row
-from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain, sections_in
+from tests.reporting.pages import HOSTILE, QUOTED, Page, fitted_chain, page_text, sections_in
 
 LOST = {"standard_error": 0.01, "per_year": -0.03, "per_year_error": 0.005, "significant": True, "p_value": 0.001}
 ENDED = event_row("2025-03-02", "2025-03-20")
@@ -72,7 +72,9 @@ NOW = pd.Timestamp("2025-06-29 05:00")
 @pytest.fixture(scope="module")
 def file(fleet, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "all of #1.html"
-    assert owner_report(fleet, path, title=QUOTED, now=NOW) == path
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "matplotlib.pyplot", None)
+        assert owner_report(fleet, path, title=QUOTED, now=NOW) == path
     return path
 
 
@@ -126,30 +128,28 @@ def test_the_page_is_sound_and_says_what_failed(page, file, fleet):
     assert QUOTED in fitted.text
 
 
-def test_bridges_on_watch_come_after_alarms_and_before_healthy_ones(tmp_path):
+def text_of(fleet, now=NOW):
+    return Page(page_text(fleet, now=now)).text
+
+
+def test_bridges_on_watch_come_after_alarms_and_before_healthy_ones():
     raised = FakeMonitor(events=[event_row("2025-06-25", None, kind="watch")], watch_per_year=12)
-    fleet = FakeFleet(
-        {"well": FakeMonitor(), "raised": raised, "alarmed": FakeMonitor(events=[event_row("2025-06-20", None)])}
-    )
-    page = Page(owner_report(fleet, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8"))
+    bridges = {"well": FakeMonitor(), "raised": raised}
+    alarmed = FakeMonitor(events=[event_row("2025-06-20", None)])
+    page = Page(page_text(FakeFleet(bridges | {"alarmed": alarmed}), now=NOW))
     assert page.link_texts[-3:] == ["alarmed", "raised", "well"]
     assert "1 in alarm; 1 to be watched, with a raised damage index but no alarm; 1 healthy." in page.text
-    del fleet.monitors["alarmed"]
-    fleet.table = fleet.table.drop(index="alarmed")
-    page = Page(owner_report(fleet, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8"))
-    assert "No alarm, but 1 of 2 bridges is to be watched" in page.text
+    assert "No alarm, but 1 of 2 bridges is to be watched" in text_of(FakeFleet(bridges))
 
 
-def test_a_fleet_in_which_nothing_is_wrong(tmp_path):
+def test_a_fleet_in_which_nothing_is_wrong():
     well = FakeFleet({0: FakeMonitor(), 1: FakeMonitor()})
-    text = Page(owner_report(well, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
+    text = text_of(well)
     assert "No alarm: all 2 bridges are healthy" in text
     assert "None of the 2 evaluated bridges is in alarm" in text
     events = FakeFleet({0: FakeMonitor(), 1: FakeMonitor(events=[ENDED])}, significant={(1, 1)})
-    past = Page(owner_report(events, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8")).text
-    assert "No alarm now, but 1 of 2 bridges had one that nobody has explained" in past
-    late = Page(owner_report(well, tmp_path / "a.html", now="2025-09-01").read_text(encoding="utf-8")).text
-    assert "No alarm, but nothing is known of 2 of 2 bridges" in late
+    assert "No alarm now, but 1 of 2 bridges had one that nobody has explained" in text_of(events)
+    assert "No alarm, but nothing is known of 2 of 2 bridges" in text_of(well, "2025-09-01")
 
 
 def test_arguments_for_a_single_structure_are_refused(fleet, tmp_path):
@@ -172,12 +172,14 @@ def test_pages_of_two_hundred_bridges_are_small_and_soon_written(tmp_path):
 
 
 def test_without_matplotlib_each_drawing_is_a_sentence_and_a_table(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
     monitor = FakeMonitor(events=[event_row("2025-06-20", None)], drift=drift_of(-0.02))
-    page = Page(owner_report(monitor, tmp_path / "a.html", now=NOW).read_text(encoding="utf-8"))
+    drawn, page = (Page(page_text(monitor, is_drawn=is_drawn, now=NOW)) for is_drawn in (True, False))
+    assert len(drawn.drawings()) == len(page.tables()) == 3
     assert not page.all("img")
-    assert len(page.tables()) >= 2
-    assert "The last year, by day" in page.text
+    assert all(image["alt"].replace("\n", " ") in page.text for image in drawn.all("img"))
+    for name, table in drawn.tables().items():
+        pd.testing.assert_frame_equal(page.tables()[name], table)
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
     fleet = FakeFleet({"one": monitor})
     owner_report(fleet, tmp_path / "all.html", now=NOW)
     (table,) = Page((tmp_path / "all_pages" / "one.html").read_text(encoding="utf-8")).tables().values()

@@ -10,7 +10,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo.datasets import kw51_structure
+from skthermo.datasets import truss_structure
 from skthermo.preprocessing import LagFeatures
 from skthermo.reporting import owner_report
 from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, UncertainDamage, sweep
@@ -34,9 +34,7 @@ from tests.studies.identified import identified
 plt = pytest.importorskip("matplotlib.pyplot")
 plt.switch_backend("Agg")
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*few-records"),
-]
+pytestmark = [pytest.mark.filterwarnings("ignore:.*few-records")]
 STYLE = files("skthermo.reporting").joinpath("page.css").read_text(encoding="utf-8")
 SOMETIMES = "choice"  # the section on several detectors
 ALWAYS = [name for name in sections_in("study.html.j2") if name != SOMETIMES]
@@ -51,7 +49,7 @@ def chain():
 def study(chain):
     fem, T, _ = chain
     scenarios = [
-        *sweep(fem, (0.05, 0.1, 0.2)),
+        *sweep(fem, (0.05, 0.1, 0.2), [HOSTILE]),
         ProgressiveDamage(f"growing {HOSTILE}", {HOSTILE: 0.2}, onset=40, end=80),
         UncertainDamage("uncertain", pd.DataFrame({QUOTED: [0.1, 0.2]})),
         Scenario("retrofit", mass=[1.0, 0.0, 0.0]),
@@ -74,7 +72,7 @@ def found():
 @pytest.fixture(scope="module")
 def file(study, found, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "bridge.html"
-    assert owner_report(study, path, identified=found, title=HOSTILE, structure=kw51_structure()) == path
+    assert owner_report(study, path, identified=found, title=HOSTILE, structure=truss_structure()) == path
     return path
 
 
@@ -85,12 +83,6 @@ def page(file):
 
 def identified_in(*args, **options):
     return section_of(page_text(FakeMonitor(), identified=identified(*args, **options)), "identified")
-
-
-@pytest.fixture
-def blank_drawings(monkeypatch):
-    """Drawings are made but not written, for laws of the text around them."""
-    monkeypatch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
 
 
 def test_it_is_one_sound_page_without_network(page):
@@ -150,21 +142,18 @@ def test_groups_that_are_not_seen_have_no_amount():
     page = identified_in(EXPLANATIONS, groups=[HOSTILE, QUOTED, "piers"], unobservable=["piers"])
     assert "piers" in page.heads
     assert page.cells.count("unobservable") == 1
-    page = identified_in(EXPLANATIONS)
-    assert "The measured modes show and distinguish all groups." in page.text
+    assert "The measured modes show and distinguish all groups." in identified_in(EXPLANATIONS).text
 
 
-@pytest.mark.usefixtures("blank_drawings")
-def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(study, tmp_path):
+def test_what_damage_does_not_explain_heads_the_page_and_is_among_the_warnings(study):
     nothing = identified({"something else": (0.93, {}), "no damage": (0.07, {})}, groups=[HOSTILE, QUOTED])
-    page = Page(owner_report(study, tmp_path / "a.html", identified=nothing).read_text(encoding="utf-8"))
+    page = Page(page_text(study, identified=nothing))
     headline = page.text[page.text.index("The structure as it is now") : page.text.index("False alarms")]
     assert "Most probable: something else, probability 93\xa0%." in headline
     assert "Identified damage: the causes that were sought do not" in page.text[page.text.rindex("Warnings") :]
 
 
 @pytest.mark.filterwarnings("ignore:.*different-rows")  # north_lag3 stands alone
-@pytest.mark.usefixtures("blank_drawings")
 def test_lags_are_no_sensors():
     fem, T, F = fitted_chain()
     lagged = pd.concat([LagFeatures([0, 6]).fit_transform(T), (0.9 * T).rename(columns={SENSOR: "deck"})], axis=1)
@@ -180,14 +169,13 @@ def test_lags_are_no_sensors():
     ]
 
 
-@pytest.mark.usefixtures("blank_drawings")
-def test_arrays_one_severity_reference_and_no_healthy_scenario(tmp_path):
+def test_arrays_one_severity_reference_and_no_healthy_scenario():
     fem, T, _ = fitted_chain(index=False)
     scenarios = [Scenario("one", {HOSTILE: 0.2})]
     truth = fem.simulate(T, damage={HOSTILE: 0.2}, noise=0.005, random_state=5)
     study = run_study(fem, T, scenarios, reference={"one": truth})
     study.thresholds_ = dict.fromkeys(study.thresholds_)  # as of some detectors
-    page = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8"))
+    page = Page(page_text(study))
     assert "how often alarms are false is not known" in page.text
     assert "one severity was tested" in page.text
     assert "In 1\xa0scenario, the simulations were compared with reference records" in page.text
@@ -200,19 +188,18 @@ def test_studies_without_a_family_that_has_a_smallest_damage(chain):
     assert "No damage was tested." in text
     assert "there is no smallest damage to report" in text
     study = run_study(*chain[:2], [Scenario(f"part {severity}", {HOSTILE: severity}) for severity in (-0.1, 0.2)])
-    assert "were tested together" in section_of(page_text(study), "answer").text
-    assert "were tested together" in section_of(page_text(study), "found").text
+    text = page_text(study)
+    assert all("were tested together" in section_of(text, part).text for part in ("answer", "found"))
 
 
 @pytest.mark.filterwarnings("ignore:.*many-false-alarms")
-@pytest.mark.usefixtures("blank_drawings")
-def test_warnings_of_the_simulations_are_in_it(chain, tmp_path):
+def test_warnings_of_the_simulations_are_in_it(chain):
     fem, T, _ = chain
     with pytest.warns(UserWarning, match="(outside-bounds|other-weather)") as caught:
         study = run_study(fem, T + 60, [Scenario("healthy")])
     texts = [str(warning.message) for warning in caught]
     assert study.warnings_ == [text for text in texts if "few-records" not in text]
-    text = Page(owner_report(study, tmp_path / "a.html").read_text(encoding="utf-8")).text
+    text = Page(page_text(study)).text
     assert all(warning in text for warning in study.warnings_)
     assert "There was no warning" not in text
 
@@ -243,15 +230,16 @@ def test_control_characters_in_names_are_seen_and_harm_nothing():
     whole.encode("utf-8")
 
 
-def test_records_that_cannot_be_evaluated_are_counted_and_not_called_healthy(chain, study, tmp_path):
-    assert "The alarm system evaluated every simulated record." in section_of(page_text(study), "answer").text
+def test_records_that_cannot_be_evaluated_are_counted_and_not_called_healthy(page, study):
+    assert "The alarm system evaluated every simulated record." in page.text
     partly = copy.copy(study)
     partly.indices_ = {key: index.where(np.arange(len(index)) >= 30) for key, index in study.indices_.items()}
-    text = section_of(page_text(partly), "answer").text
+    page = page_text(partly)
+    text = section_of(page, "answer").text
     n_states = len(study.results_)
     assert f"could not evaluate {30 * n_states:,} of {120 * n_states:,}\xa0records of the first simulation" in text
     assert "They count neither as healthy nor as alarms" in text
-    assert section_of(page_text(partly), "found").text.count("(25\xa0% not evaluated)") == n_states
+    assert section_of(page, "found").text.count("(25\xa0% not evaluated)") == n_states
 
 
 @pytest.mark.parametrize("number", [0, 1], ids=["light", "dark"])

@@ -18,8 +18,8 @@ GERMAN = Path(__file__).parent / "german"
 
 
 @pytest.fixture(autouse=True)
-def blank_drawings(monkeypatch):
-    monkeypatch.setattr("skthermo.reporting._page._svg", lambda figure: b"<svg/>")
+def no_drawings(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
 
 
 @pytest.fixture
@@ -41,10 +41,7 @@ def write(tmp_path):
 def monitor():
     drift = {"change": [-0.02], "standard_error": 0.01, "per_year": -0.01, "per_year_error": 0.01, "p_value": 0.2}
     faults = {"column": ["T1"], "kind": "stuck", "since": pd.Timestamp("2025-03-01"), "detail": QUOTED}
-    events = [
-        event_row("2025-03-03", "2025-03-09", note=HOSTILE),
-        event_row("2025-06-10", None, modes=QUOTED),
-    ]
+    events = [event_row("2025-03-03", "2025-03-09", note=HOSTILE), event_row("2025-06-10", None, modes=QUOTED)]
     return FakeMonitor(
         events=events,
         drift=pd.DataFrame(drift, ["deck"]).assign(significant=False),

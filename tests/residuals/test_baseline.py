@@ -8,10 +8,8 @@ from hypothesis import strategies as st
 from skthermo.residuals.baseline import compared, order_statistic
 from tests.residuals.series import autoregressive, residuals
 
-# Order statistics and correlation times
 
-
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=60), st.floats(0.05, 0.95))
 def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, confidence):
     scores = np.array(scores)
@@ -21,7 +19,7 @@ def test_order_statistic_is_the_smallest_score_that_enough_scores_reach(scores, 
 
 @pytest.mark.parametrize("share_missing", [0.0, 0.3])
 def test_correlation_time_of_an_autoregressive_series(share_missing):
-    series = autoregressive(20_000, 0.8)[:, 0]
+    series = autoregressive(16_000, 0.8)[:, 0]
     series[np.random.default_rng(1).random(len(series)) < share_missing] = np.nan
     weather = np.random.default_rng(2).uniform(size=len(series))
     found = residuals(weather, series).correlation_time
@@ -35,30 +33,19 @@ def test_correlation_time_of_series_without_memory_is_one():
     assert residuals(weather, np.ones(5000)).correlation_time == 1
 
 
-# Spread
-
-
-def test_spread_of_few_records_is_their_root_mean_square():
-    rng = np.random.default_rng(0)
-    weather, values = np.linspace(0, 20, 60), rng.normal(size=(60, 2))
-    values[::3, 1] = np.nan
-    spread = residuals(weather, values).spread(np.array([[0.0], [13.0], [30.0], [-10.0]]))
-    rms = np.sqrt(np.nanmean(values**2, axis=0))
-    np.testing.assert_allclose(spread, np.outer([1, 1, 1.5, 1.5], rms))
+def test_spread_of_few_records_is_their_root_mean_square_and_that_of_a_missing_mode_infinite():
+    values = np.random.default_rng(0).normal(size=(60, 3))
+    values[::3, 1] = values[:, 2] = np.nan
+    spread = residuals(np.linspace(0, 20, 60), values).spread(np.array([[0.0], [13.0], [30.0], [-10.0]]))
+    rms = np.sqrt(np.nanmean(values[:, :2] ** 2, axis=0))
+    np.testing.assert_allclose(spread, np.outer([1, 1, 1.5, 1.5], [*rms, np.inf]))
 
 
 def test_spread_follows_the_weather():
     weather = np.random.default_rng(0).uniform(-10, 30, 1500)
-    scale = np.where(weather < 0, 0.02, 0.005)
-    spread = residuals(weather, scale * np.random.default_rng(1).standard_normal(1500)).spread(
-        np.array([[-6.0], [20.0]])
-    )
+    values = np.where(weather < 0, 0.02, 0.005) * np.random.default_rng(1).standard_normal(1500)
+    spread = residuals(weather, values).spread(np.array([[-6.0], [20.0]]))
     np.testing.assert_allclose(spread[:, 0], [0.02, 0.005], rtol=0.25)
-
-
-def test_spread_of_a_mode_that_is_always_missing_is_infinite():
-    values = np.column_stack([np.ones(50), np.full(50, np.nan)])
-    np.testing.assert_array_equal(residuals(np.arange(50.0), values).spread(np.array([[3.0]])), [[1, np.inf]])
 
 
 def test_quantiles_measure_each_period_by_the_others():
@@ -71,27 +58,12 @@ def test_quantiles_measure_each_period_by_the_others():
     np.testing.assert_allclose(found.quantiles(0.95), 2.0)
 
 
-# Realistic noise
-
-
 def drawn_records(found, weather, seed=0):
     """Which record the noise of each row begins with; its gaps are those of that record."""
     taken = found._taken(found._similar(weather), np.random.RandomState(seed))
     values = found.draw(weather, np.random.RandomState(seed))
     np.testing.assert_array_equal(np.isnan(values), np.isnan(found.values[taken]))
     return taken
-
-
-def test_noise_is_whole_records_gaps_included():
-    rng = np.random.default_rng(0)
-    values = rng.normal(size=(400, 3))
-    values[:, 1:][rng.random((400, 2)) < 0.3] = np.nan
-    found = residuals(rng.uniform(-10, 30, (400, 2)), values)
-    weather = rng.uniform(-10, 30, (500, 2))
-    taken = drawn_records(found, weather)
-    np.testing.assert_array_equal(taken, drawn_records(found, weather))
-    assert (taken != drawn_records(found, weather, seed=1)).mean() > 0.5
-    assert len(set(taken)) > 150
 
 
 def test_noise_comes_from_similar_weather():
@@ -127,8 +99,7 @@ def test_means_of_a_week_scatter_as_those_of_the_records_whatever_the_weather_do
 
 
 def test_runs_of_noise_are_scaled_to_the_weather_of_the_rows():
-    rng = np.random.default_rng(0)
-    weather, later = rng.uniform(-10, 30, (3000, 1)), rng.uniform(-10, 30, (3000, 1))
+    weather, later = np.random.default_rng(0).uniform(-10, 30, (2, 3000, 1))
     deviation = 1 + (weather < 0)  # twice as large in frost, whatever the record before
     found = residuals(weather, deviation * autoregressive(3000, 0.5))
     drawn = found.draw(later, np.random.RandomState(0))
@@ -165,9 +136,7 @@ def test_standard_deviations_of_normal_residuals_are_known_to_a_root_of_their_nu
     assert np.isnan(found.outliers).mean() > 0.98
 
 
-# Many records
-
-
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 60))
 def test_of_many_records_the_most_complete_one_of_each_part_counts_for_all_modes(seed, n_records, most):
     random = np.random.default_rng(seed)
@@ -200,7 +169,7 @@ def test_few_of_many_records_tell_as_much(monkeypatch):
 @pytest.mark.parametrize("numbers", [1, 700])
 def test_results_do_not_depend_on_how_many_rows_are_held_in_memory(monkeypatch, numbers):
     rng = np.random.default_rng(0)
-    weather, wanted = rng.uniform(-10, 30, (300, 2)), rng.uniform(-10, 30, (50, 2))
+    weather, wanted = rng.uniform(-10, 30, (300, 2)), rng.uniform(-10, 30, (20, 2))
     values = np.where(rng.random((300, 3)) < 0.2, np.nan, rng.standard_normal((300, 3)))
     found = residuals(weather, values)
 

@@ -28,7 +28,7 @@ def directions_of(random, n_dimensions, n_directions, kind):
 def test_lengths_are_those_of_non_negative_least_squares(seed, n_dimensions, n_directions, kind):
     random = np.random.RandomState(seed)
     several = np.stack([directions_of(random, n_dimensions, n_directions, kind) for _ in range(3)])
-    rows, which = random.standard_normal((30, n_dimensions)), random.randint(3, size=30)
+    rows, which = random.standard_normal((10, n_dimensions)), random.randint(3, size=10)
     along = np.einsum("ij,ijk->ik", rows, several[which])
     amounts, lengths = project_on_cones(several.swapaxes(1, 2) @ several, along, which)
     assert (amounts >= 0).all()

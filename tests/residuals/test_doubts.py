@@ -1,14 +1,16 @@
-"""What the weather and the sensors of records leave in doubt, and searches of similar records, by brute force."""
+"""What the weather and the sensors of records leave in doubt, searches of similar records, residuals in new weather."""
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.distance import cdist
-from scipy.stats import multivariate_normal
+from sklearn.linear_model import LinearRegression
 
+from skthermo.detection import CompensatedDetector, TemperatureCompensator
 from skthermo.residuals.gaussian import Gaussian, check_invertible
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import (
+    Extrapolation,
     NearestPlaces,
     TrainingRange,
     implausible,
@@ -18,7 +20,7 @@ from skthermo.residuals.weather import (
     unpredicted_findings,
     unseen_weather,
 )
-from tests.gappy_rows import COVARIANCE, MEAN, records, with_gaps
+from tests.gappy_rows import records
 
 RANDOM = np.random.default_rng(0)
 PLACES, WANTED = RANDOM.normal(size=(60, 2)), RANDOM.normal(size=(25, 2))
@@ -109,30 +111,16 @@ def test_errors_of_filled_values_move_predictions_by_their_deviation():
     filled = pd.DataFrame(filled, columns=T.columns)
     slopes = np.array([[0.5, -2.0, 1.0]])
     found = sensors.variances_of_fills(gappy, filled, lambda X: np.asarray(X) @ slopes.T, lambda moved: moved)
-    (covariance,) = [sensors.gaussian.covariance]
+    covariance = sensors.gaussian.covariance
     single = np.flatnonzero(gappy["girder"].isna() & gappy["air"].notna())
     np.testing.assert_allclose(found[single, 0], (2.0 * deviations[single, 1]) ** 2)
-    known, lost = [2], [0, 1]
-    rest = (
-        covariance[np.ix_(lost, lost)]
-        - np.outer(covariance[lost, known[0]], covariance[lost, known[0]]) / (covariance[2, 2])
-    )
-    assert found[0, 0] == pytest.approx(slopes[0, lost] @ rest @ slopes[0, lost])
+    rest = covariance[:2, :2] - np.outer(covariance[:2, 2], covariance[:2, 2]) / covariance[2, 2]
+    assert found[0, 0] == pytest.approx(slopes[0, :2] @ rest @ slopes[0, :2])
     assert not found[gappy.notna().all(axis=1)].any()
     assert not sensors.variances_of_fills(T[:5], T[:5], lambda X: np.asarray(X), lambda moved: moved).any()
     (finding,) = filled_findings(deviations, T.columns, "Errors grow")
     assert (finding.kind, "'cable'" in str(finding)) == ("faulty-sensor", False)
     assert filled_findings(0 * deviations, T.columns, "") == []
-
-
-def test_densities_of_gappy_rows_are_those_of_the_modes_that_are_there():
-    rows, normal = with_gaps(records(50)), Gaussian(MEAN, COVARIANCE)
-    expected = np.zeros(50)
-    for place, row in enumerate(rows):
-        there = ~np.isnan(row)
-        if there.any():
-            expected[place] = multivariate_normal.logpdf(row[there], MEAN[there], COVARIANCE[np.ix_(there, there)])
-    np.testing.assert_allclose(normal.log_densities(rows), expected, atol=1e-9)
 
 
 def test_the_distribution_without_some_rows_is_that_of_the_others():
@@ -156,3 +144,56 @@ def test_modes_that_leave_no_inverse_are_named(change, named):
     with pytest.raises(ValueError, match="singular") as error:
         check_invertible(normal, len(rows), has_gaps=False, names=list("abc"))
     assert named in str(error.value)
+
+
+WEATHER = np.linspace(-10.0, 30.0, 500)[:, np.newaxis]
+
+
+def learned(residuals_of):
+    return Extrapolation.learned(TrainingRange.spanned(WEATHER, slice(None)), WEATHER, residuals_of)
+
+
+@pytest.mark.parametrize("growth", [0.0, 4.0, 400.0])
+def test_the_growth_of_residuals_at_each_end_is_learned(growth):
+    def residuals_of(others, fifth):
+        beyond = np.minimum(
+            np.abs(WEATHER[fifth] - WEATHER[others].min()), np.abs(WEATHER[fifth] - WEATHER[others].max())
+        )
+        share = beyond / np.ptp(WEATHER[others])
+        is_cold = WEATHER[fifth].mean() < 10
+        return np.sqrt(1 + (growth if is_cold else 0.0) * np.log1p(share**2)) * np.ones((len(fifth), 3))
+
+    weight = 0.1  # of the usual growth
+    cold, warm = learned(residuals_of).growth
+    own = (np.log1p((0.2 / 0.8 * np.linspace(0, 1, 100)) ** 2) ** 2).sum()
+    assert cold == pytest.approx((own * growth + weight * 9) / (own + weight), rel=0.05)
+    assert warm == pytest.approx(weight * 9 / (own + weight), rel=0.05)
+
+
+def test_variances_grow_with_the_distance_and_are_one_inside():
+    found = learned(lambda others, fifth: np.ones((len(fifth), 1)))
+    variances = found.variances(np.array([[np.nan], [-10.0], [10.0], [30.0], [50.0], [70.0], [-30.0]]))
+    assert variances[:4] == pytest.approx(1)
+    assert variances[4] == pytest.approx(1 + found.growth[1] * np.log(1.25))
+    assert variances[5] > variances[4] > 1
+    assert variances[6] == pytest.approx(1 + found.growth[0] * np.log(1.25))
+
+
+def bent(temperature, random):
+    """A frequency that stiffens in frost, where a straight line of warm records goes on."""
+    return 10 - 0.01 * temperature + 0.1 * np.maximum(-temperature, 0) + random.normal(0, 0.01, len(temperature))
+
+
+@pytest.mark.filterwarnings("ignore:temperatures are outside")
+def test_residuals_of_new_weather_count_less_and_still_grow_with_damage():
+    random = np.random.default_rng(0)
+    T, colder = random.uniform(-5, 30, 400), random.uniform(-15, -5, 400)
+    year, frost = (pd.DataFrame({"air": one, "f": bent(one, random)}) for one in (T, colder))
+    detector = CompensatedDetector(regressor=LinearRegression(), targets=["f"], regimes=None).fit(year)
+    residuals = TemperatureCompensator(LinearRegression(), targets=["f"]).fit(year).transform(frost)["f"]
+    straight = LinearRegression().fit(year[["air"]], year["f"]).predict(frost[["air"]])
+    plain = np.log(frost["f"] / straight)
+    assert (np.abs(residuals) < np.abs(plain)).all()
+    assert (np.sign(residuals) == np.sign(plain)).all()
+    index = [detector.damage_index(frost.assign(f=frost["f"] * (1 - loss))) for loss in (0.1, 0.2, 0.3)]
+    assert (np.diff(index, axis=0) > 0).all()

@@ -3,14 +3,14 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.signal import lfilter
 from sklearn.linear_model import LinearRegression
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.exceptions import RecordsWarning
 from skthermo.residuals.sensors import SensorRegression
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
+from tests.residuals.series import autoregressive
+from tests.surrogate.chains import YEAR, F, T, fitted
 
 
 def records(n_rows, seed=0):
@@ -19,7 +19,7 @@ def records(n_rows, seed=0):
     return np.column_stack([air, 0.8 * air + rng.normal(2, 1, n_rows), 0.5 * air + rng.normal(0, 2, n_rows)])
 
 
-def test_a_gap_is_filled_as_by_a_linear_regression_on_the_other_sensors():
+def test_gaps_are_filled_and_departures_measured_by_a_linear_regression_on_the_other_sensors():
     T, new = records(500), records(50, seed=1)
     wanted = LinearRegression().fit(T[:, [0, 2]], T[:, 1])
     new[:, 1] = np.nan
@@ -28,6 +28,11 @@ def test_a_gap_is_filled_as_by_a_linear_regression_on_the_other_sensors():
     assert deviations[:, 1] == pytest.approx(np.std(T[:, 1] - wanted.predict(T[:, [0, 2]])))
     assert (filled[:, [0, 2]] == new[:, [0, 2]]).all()
     assert (deviations[:, [0, 2]] == 0).all()
+    new = records(50, seed=2)
+    departures = SensorRegression.fitted(T).departures(new)
+    assert departures[:, 1] == pytest.approx(new[:, 1] - wanted.predict(new[:, [0, 2]]), abs=1e-6)
+    new[:, [0, 2]] = np.nan
+    assert np.isnan(SensorRegression.fitted(T).departures(new)).all()
 
 
 def test_what_no_sensor_tells_stays_missing():
@@ -40,30 +45,11 @@ def test_what_no_sensor_tells_stays_missing():
     assert np.isnan(filled[1]).tolist() == [False, False, False, True]
 
 
-def test_gaps_while_learning_do_not_matter():
-    T = records(3000)
-    gappy = np.where(np.random.default_rng(2).uniform(size=T.shape) < 0.2, np.nan, T)
-    new = records(20, seed=3)
-    new[:, 2] = np.nan
-    full, half = (SensorRegression.fitted(table).fill(new)[0][:, 2] for table in (T, gappy))
-    assert half == pytest.approx(full, abs=0.5)
-
-
 def dependent_records(n_rows, seed):
     """Records whose departures are autoregressive, as those of sun and shade are, beside a season."""
-    rng = np.random.default_rng(seed)
     season = 10 - 10 * np.cos(2 * np.pi * np.arange(n_rows) / n_rows)
-    departures = lfilter([1], [1, -0.9], rng.normal(0, 0.5, (n_rows, 3)), axis=0)
+    departures = 0.5 / np.sqrt(1 - 0.9**2) * autoregressive(n_rows, 0.9, seed, 3)
     return pd.DataFrame(season[:, np.newaxis] * [1.0, 0.8, 1.2] + departures, columns=["air", "girder", "cable"])
-
-
-def test_departures_are_those_from_a_linear_regression_on_the_other_sensors():
-    T, new = records(500), records(50, seed=1)
-    wanted = LinearRegression().fit(T[:, [0, 2]], T[:, 1])
-    departures = SensorRegression.fitted(T).departures(new)
-    assert departures[:, 1] == pytest.approx(new[:, 1] - wanted.predict(new[:, [0, 2]]), abs=1e-6)
-    new[:, [0, 2]] = np.nan
-    assert np.isnan(SensorRegression.fitted(T).departures(new)).all()
 
 
 @pytest.mark.parametrize("n_rows", [40, 400, 3000])
@@ -78,19 +64,15 @@ def departing(sensors, T):
     return [str(one).split("'")[1] for one in sensors.doubts(T) if one.kind == "faulty-sensor"]
 
 
-def test_a_sensor_that_drifts_is_named():
+def test_sensors_that_drift_or_are_stuck_are_named():
     sensors, new = SensorRegression.fitted(dependent_records(3000, 0)), dependent_records(3000, 1)
+    stuck = new.assign(air=new["air"].where(new.index < 1500, new.loc[1500, "air"]))
+    assert departing(sensors, stuck) == ["air"]
     new["girder"] += np.linspace(0, 6, len(new))
     assert departing(sensors, new) == ["girder"]
     assert departing(sensors, new[:300]) == []
     backwards = new.set_axis(pd.date_range("2024", periods=len(new), freq="h"))[::-1]
     assert departing(sensors, backwards) == ["girder"]
-
-
-def test_a_sensor_that_is_stuck_is_named():
-    sensors, new = SensorRegression.fitted(dependent_records(3000, 0)), dependent_records(3000, 1)
-    new.loc[1500:, "air"] = new.loc[1500, "air"]
-    assert departing(sensors, new) == ["air"]
 
 
 def test_weather_that_training_does_not_know_says_nothing_of_sensors():
@@ -104,22 +86,11 @@ def test_weather_that_training_does_not_know_says_nothing_of_sensors():
     assert not SensorRegression.fitted(new[["air"]]).doubts(new[["air"]] + 40)
 
 
-LINEAR_CHAIN = DataInformedFEM(
-    make_truss(),
-    inverse=PosteriorInverse(make_truss()),
-    mapper=TemperatureMapper(LinearRegression()),
-    random_state=0,
-)
-
-
 def test_compensator_and_chain_warn_of_a_sensor_that_departs():
-    year, later = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-    records, new = (one.temperatures.join(one.frequencies) for one in (year, later))
-    compensator = TemperatureCompensator(LinearRegression(), targets=list(year.frequencies)).fit(records)
-    chain = LINEAR_CHAIN.fit(year.temperatures, year.frequencies)
-    name = records.columns[0]
+    records, new = (one.temperatures.join(one.frequencies) for one in (YEAR, make_truss_campaign(random_state=1)))
+    compensator = TemperatureCompensator(LinearRegression(), targets=list(F)).fit(records)
     new.iloc[200:, 0] += 15
-    for evaluate in (lambda: compensator.transform(new), lambda: chain.predict(new[year.temperatures.columns])):
-        with pytest.warns(RecordsWarning, match=f"'{name}'") as caught:
+    for evaluate in (lambda: compensator.transform(new), lambda: fitted().predict(new[list(T)])):
+        with pytest.warns(RecordsWarning, match=f"'{records.columns[0]}'") as caught:
             evaluate()
         assert sum(warning.message.kind == "faulty-sensor" for warning in caught) == 1

@@ -18,7 +18,7 @@ T, F = YEAR.temperatures, YEAR.frequencies
 
 
 def inverse(**options):
-    return PosteriorInverse(TRUSS, **({"noise": 0.01} | options))
+    return PosteriorInverse(**({"model": TRUSS, "noise": 0.01, "prior": 0.05} | options))
 
 
 def trained(**options):

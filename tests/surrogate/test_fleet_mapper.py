@@ -31,7 +31,7 @@ def records(seed, days=365, start=0, *, law=None, noise=0.002):
     return pd.DataFrame(T, index, ["T1", "T2"]), pd.DataFrame(noisy, index, modes), pd.DataFrame(clean, index, modes)
 
 
-MAPPERS = {f"bridge {seed}": TemperatureMapper().fit(*records(seed)[:2]) for seed in range(12)}
+MAPPERS = {f"bridge {seed}": TemperatureMapper().fit(*records(seed)[:2]) for seed in range(8)}
 
 
 def error(mapper, seed, **options):
@@ -60,7 +60,7 @@ def test_many_records_decide():
 
 def test_a_bridge_unlike_the_others_loses_little():
     ratios = []
-    for seed in range(80, 86):
+    for seed in range(80, 84):
         T, F, _ = records(seed, 60, law=UNLIKE)
         alone = error(TemperatureMapper().fit(T, F), seed, law=UNLIKE)
         ratios.append(error(FleetMapper(MAPPERS).fit(T, F), seed, law=UNLIKE) / alone)
@@ -87,11 +87,9 @@ def test_standard_deviations_grow_with_the_distance_from_the_records():
 
 def test_units_names_and_order_of_bridges_change_nothing():
     T, F, _ = records(50, 40)
-    expected, deviations = FleetMapper(MAPPERS).fit(T, F).predict(T, return_std=True)
-    rpm, of_rpm = FleetMapper(MAPPERS).fit(T, 60 * F).predict(T, return_std=True)
-    assert_allclose(rpm, 60 * expected)
-    assert_allclose(of_rpm, 60 * deviations)
-    assert_allclose(FleetMapper(list(MAPPERS.values())[::-1]).fit(T, F).predict(T), expected)
+    expected = FleetMapper(MAPPERS).fit(T, F).predict(T, return_std=True)
+    assert_allclose(FleetMapper(MAPPERS).fit(T, 60 * F).predict(T, return_std=True), 60 * np.array(expected))
+    assert_allclose(FleetMapper(list(MAPPERS.values())[::-1]).fit(T, F).predict(T), expected[0])
 
 
 def test_outputs_are_matched_by_name():
@@ -154,7 +152,6 @@ def test_responses_of_any_sign_are_learned_in_any_unit():
         ([Ridge()], lambda T, F: (T, F), "expected fitted TemperatureMappers"),
         ([TemperatureMapper()], lambda T, F: (T, F), "not fitted"),
         (MAPPERS, lambda T, F: (T[["T1"]], F), "X has 1 inputs, and a mapper 2"),
-        (MAPPERS, lambda T, F: (T.set_axis(["a", "b"], axis=1), F), "feature names"),
         (MAPPERS, lambda T, F: (T, F.rename(columns={"f2": "f3"})), "no mapper has the outputs"),
         (MAPPERS, lambda T, F: (T, np.hstack([F, F])), "y has 4 outputs without names"),
         (MAPPERS, lambda T, F: (T, F.assign(f2=np.nan)), "expected 2 or more"),

@@ -41,9 +41,7 @@ def spoiled(F, seed=0):
     return F.mask(random.random(F.shape) < 0.1).mask(random.random(F.shape) < 0.003, F * 1.2)
 
 
-@pytest.mark.parametrize(
-    ("half_life", "days", "most"), [("1D", 365, 0.5), ("7D", 365, 0.5), ("28D", 365, 0.8), ("28D", 730, 0.5)]
-)
+@pytest.mark.parametrize(("half_life", "days", "most"), [("1D", 365, 0.5), ("28D", 365, 0.8), ("28D", 730, 0.5)])
 def test_means_lower_the_error_of_a_later_season(half_life, days, most):
     T, F, clean = bridge(0, days + 120, half_life)
     then, later = slice(None, 4 * days), slice(4 * days, None)
@@ -55,8 +53,7 @@ def test_means_lower_the_error_of_a_later_season(half_life, days, most):
 
 
 @pytest.mark.parametrize("days", [180, 365, 730])
-@pytest.mark.parametrize("change", [{}, {"step": -0.02}, {"trend": -0.02}])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("seed", "change"), enumerate([{}, {"step": -0.02}, {"trend": -0.02}]))
 @pytest.mark.filterwarnings("ignore:.*set-aside")
 def test_a_step_or_a_drift_is_no_memory(seed, days, change):
     T, F, _ = bridge(seed, days, **change)

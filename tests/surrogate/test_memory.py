@@ -54,38 +54,41 @@ def assert_same(one, other):
         np.testing.assert_array_equal(values, other[name], name)
 
 
-class TestOnce:
-    @pytest.mark.nightly
-    def test_a_search_over_the_mapper_inverts_each_set_of_training_records_once(self, tmp_path):
-        grid = {"mapper__regressor": [Ridge(penalty) for penalty in (0.1, 10.0)]}
-        folds = KFold(2, shuffle=True, random_state=0)
-        searches = [
-            GridSearchCV(chain(memory), grid, cv=folds).fit(T, F) for memory in (None, str(tmp_path), str(tmp_path))
-        ]
-        for search in searches[1:]:
-            np.testing.assert_array_equal(*(one.cv_results_["mean_test_score"] for one in (searches[0], search)))
-            np.testing.assert_array_equal(searches[0].predict(T), search.predict(T))
-        numbers = {kind: kept(tmp_path, kind) for kind in KINDS}
-        assert numbers == {"taught": 3, "inverted": 3}
-        assert len(list(tmp_path.rglob("output.pkl"))) == sum(numbers.values())
-
-    def test_nothing_is_computed_again(self, tmp_path, monkeypatch):
-        first = found(str(tmp_path), F)
-        by_regressor = trained(memory=str(tmp_path)).fit(F).transform(F)
-        for owner, method in ((Ridge, "fit"), (type(TRUSS), "linearised"), (type(TRUSS), "frequencies")):
-            monkeypatch.setattr(owner, method, refuse)
-        assert_same(first, found(str(tmp_path), F))
-        np.testing.assert_array_equal(trained(memory=str(tmp_path)).fit(F).transform(F), by_regressor)
-
-    def test_pipelines_that_transform_what_they_were_fitted_to_do_so_once(self, tmp_path):
-        pipeline = make_pipeline(BiasAligner(TRUSS), inverse(memory=str(tmp_path)))
-        first, second = (pipeline.fit(F).transform(F) for _ in range(2))
-        np.testing.assert_array_equal(first, second)
-        assert kept(tmp_path, "inverted") == 1
+@pytest.mark.nightly
+def test_a_search_over_the_mapper_inverts_each_set_of_training_records_once(tmp_path):
+    grid = {"mapper__regressor": [Ridge(penalty) for penalty in (0.1, 10.0)]}
+    folds, memory = KFold(2, shuffle=True, random_state=0), str(tmp_path)
+    searches = [GridSearchCV(chain(one), grid, cv=folds).fit(T, F) for one in (None, memory, memory)]
+    for search in searches[1:]:
+        np.testing.assert_array_equal(*(one.cv_results_["mean_test_score"] for one in (searches[0], search)))
+        np.testing.assert_array_equal(searches[0].predict(T), search.predict(T))
+    assert {kind: kept(tmp_path, kind) for kind in KINDS} == {"taught": 3, "inverted": 3}
+    assert len(list(tmp_path.rglob("output.pkl"))) == 6
 
 
 def refuse(*arguments, **options):
     raise AssertionError("it is computed again")
+
+
+def test_nothing_is_computed_again_unless_its_file_is_damaged(tmp_path, monkeypatch):
+    memory = str(tmp_path)
+    first, by_regressor = found(memory, F), trained(memory=memory).fit(F).transform(F)
+    with monkeypatch.context() as computed:
+        for owner, method in ((Ridge, "fit"), (type(TRUSS), "linearised"), (type(TRUSS), "frequencies")):
+            computed.setattr(owner, method, refuse)
+        assert_same(first, found(memory, F))
+        np.testing.assert_array_equal(trained(memory=memory).fit(F).transform(F), by_regressor)
+    for file in tmp_path.rglob("output.pkl"):
+        file.write_bytes(file.read_bytes()[:20])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # joblib's, which says so
+        assert_same(first, found(memory, F))
+
+
+def test_pipelines_that_transform_what_they_were_fitted_to_do_so_once(tmp_path):
+    pipeline = make_pipeline(BiasAligner(TRUSS), inverse(memory=str(tmp_path)))
+    np.testing.assert_array_equal(*(pipeline.fit(F).transform(F) for _ in range(2)))
+    assert kept(tmp_path, "inverted") == 1
 
 
 OTHERS = {
@@ -113,67 +116,36 @@ def filled(tmp_path_factory):
     return folder
 
 
-class TestNothingStale:
-    @pytest.mark.nightly
-    @pytest.mark.parametrize("what", OTHERS)
-    def test_what_changes_gives_a_new_inversion(self, filled, what):
-        options = dict(OTHERS[what])
-        records = options.pop("records", F)
-        if options.pop("shapes", False):
-            frequencies, shapes = evaluate_modes(TRUSS, THETA, options["dofs"])
-            at_sensors = np.hstack([frequencies, shapes.swapaxes(1, 2).reshape(len(THETA), -1)])
-            records = at_sensors * np.random.default_rng(1).normal(1, 0.005, at_sensors.shape)
-        before = kept(filled, "inverted")
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            known, again, fresh = (found(memory, records, **options) for memory in (str(filled), str(filled), None))
-        assert_same(known, fresh)
-        assert_same(again, fresh)
-        assert kept(filled, "inverted") == before + 1
-
-    def test_damaged_files_are_made_anew(self, tmp_path):
-        first = found(str(tmp_path), F)
-        for file in tmp_path.rglob("output.pkl"):
-            file.write_bytes(file.read_bytes()[:20])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # joblib's, which says so
-            assert_same(first, found(str(tmp_path), F))
+@pytest.mark.nightly
+@pytest.mark.parametrize("what", OTHERS)
+def test_what_changes_gives_a_new_inversion(filled, what):
+    options = dict(OTHERS[what])
+    records = options.pop("records", F)
+    if options.pop("shapes", False):
+        frequencies, shapes = evaluate_modes(TRUSS, THETA, options["dofs"])
+        at_sensors = np.hstack([frequencies, shapes.swapaxes(1, 2).reshape(len(THETA), -1)])
+        records = at_sensors * np.random.default_rng(1).normal(1, 0.005, at_sensors.shape)
+    before = kept(filled, "inverted")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        known, again, fresh = (found(memory, records, **options) for memory in (str(filled), str(filled), None))
+    assert_same(known, fresh)
+    assert_same(again, fresh)
+    assert kept(filled, "inverted") == before + 1
 
 
-class TestFindings:
-    """What is found of records comes again with what a memory reads."""
-
-    def kinds(self, make, *arguments):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            make(*arguments)
-        return [one.message.kind for one in caught if isinstance(one.message, SkthermoWarning)]
-
-    def test_of_inverses(self, tmp_path):
-        make = lambda memory: inverse(memory=memory).fit(F[:5]).transform(F[:5])  # noqa: E731
-        first, again, fresh = (self.kinds(make, memory) for memory in (str(tmp_path), str(tmp_path), None))
-        assert first == again == fresh == ["few-records"]
-
-    @pytest.mark.nightly
-    def test_of_chains(self, tmp_path):
-        gaps = F.where(np.random.default_rng(0).uniform(size=F.shape) < 0.4)
-        first, again, fresh = (
-            self.kinds(
-                lambda memory: chain(memory, inverse=inverse(model=None, noise=0.0005, prior=0.3)).fit(T, gaps), memory
-            )
-            for memory in (str(tmp_path), str(tmp_path), None)
-        )
-        assert first == again == fresh
-        assert "few-records" in first
+def test_what_is_found_of_records_comes_again_with_what_a_memory_reads(tmp_path):
+    for memory in (str(tmp_path), str(tmp_path), None):
+        with pytest.warns(SkthermoWarning) as caught:
+            inverse(memory=memory).fit(F[:5]).transform(F[:5])
+        assert [one.message.kind for one in caught] == ["few-records"]
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
 def test_without_a_seed_what_is_kept_is_always_the_same(tmp_path):
+    network = trained(random_state=None, regressor=MLPRegressor(hidden_layer_sizes=(8,), max_iter=20))
     first, second, elsewhere = (
-        trained(memory=str(tmp_path / folder), random_state=None, regressor=MLPRegressor(hidden_layer_sizes=(8,)))
-        .fit(F)
-        .transform(F)
-        for folder in ("here", "here", "there")
+        network.set_params(memory=str(tmp_path / folder)).fit(F).transform(F) for folder in ("here", "here", "there")
     )
     np.testing.assert_array_equal(first, second)
     np.testing.assert_array_equal(first, elsewhere)

@@ -13,20 +13,19 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 
-from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.metrics.errors import complete_r2
 from skthermo.preprocessing import HingeFeatures, LagFeatures
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate, TemperatureMapper
+from tests.surrogate.chains import TRUSS, YEAR
 
-TRUSS, YEAR = make_truss(), make_truss_campaign(random_state=0)
 T, F = YEAR.temperatures.iloc[:360:3], YEAR.frequencies.iloc[:360:3]
 WEIGHTS = np.random.default_rng(0).uniform(0.1, 2, len(T))
 PLAIN = InverseSurrogate(TRUSS, Ridge(), bounds=0.2, noise=0.01, n_samples=100, random_state=0)
 ROUTING = pytest.mark.parametrize("routing", [False, True], ids=["off", "on"])
 
 
-def chain(mapper=None, inverse=PLAIN):
-    return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
+def chain(mapper=None, **options):
+    return DataInformedFEM(TRUSS, inverse=PLAIN, mapper=mapper or TemperatureMapper(LinearRegression()), **options)
 
 
 @pytest.mark.nightly
@@ -75,14 +74,12 @@ def test_a_record_of_weight_0_counts_as_left_out():
 def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
     with config_context(enable_metadata_routing=routing):
         series = pd.Series(WEIGHTS, T.index).sample(frac=1, random_state=0)
-        by_name = chain().fit(T, F, sample_weight=series)
-        by_position = chain().fit(T, F, sample_weight=WEIGHTS)
+        by_name, by_position = (chain().fit(T, F, sample_weight=weights) for weights in (series, WEIGHTS))
     np.testing.assert_array_equal(by_name.predict(T), by_position.predict(T))
     assert by_name.score(T, F, sample_weight=series) == complete_r2(F, by_name.predict(T), WEIGHTS)
     assert by_name.score(T, F, sample_weight=series) != by_name.score(T, F)
 
 
-@ROUTING
 @pytest.mark.parametrize(
     ("weights", "mapper", "message"),
     [
@@ -94,19 +91,17 @@ def test_weights_of_a_series_go_by_the_index_of_the_records(routing):
         (WEIGHTS, make_pipeline(LagFeatures(2), KNeighborsRegressor()), r"(?s)fit of Pipeline.* takes no weights"),
     ],
 )
-def test_wrong_weights_are_named(weights, mapper, message, routing):
-    with config_context(enable_metadata_routing=routing), pytest.raises(ValueError, match=message):
-        chain(mapper).fit(T, F, sample_weight=weights)
-
-
-def test_a_mapper_alone_names_a_regressor_that_takes_no_weights():
-    with pytest.raises(ValueError, match=r"fit of KNeighborsRegressor\(\) takes no weights"):
-        TemperatureMapper(KNeighborsRegressor()).fit(T, np.ones((120, 4)), sample_weight=WEIGHTS)
+def test_wrong_weights_are_named(weights, mapper, message):
+    for routing in (False, True):
+        with config_context(enable_metadata_routing=routing), pytest.raises(ValueError, match=message):
+            chain(mapper).fit(T, F, sample_weight=weights)
 
 
 def test_with_routing_the_steps_that_request_weights_get_them():
     theta = np.exp(-0.004 * T.to_numpy())
     lines = make_pipeline(HingeFeatures(2), RidgeCV())
+    with pytest.raises(ValueError, match=r"fit of KNeighborsRegressor\(\) takes no weights"):
+        TemperatureMapper(KNeighborsRegressor()).fit(T, theta, sample_weight=WEIGHTS)
     with config_context(enable_metadata_routing=True):
         asked = clone(lines)
         for _, step in asked.steps:
@@ -129,22 +124,10 @@ def test_with_routing_the_steps_that_request_weights_get_them():
     np.testing.assert_array_equal(last.regressor_[0].knots_, HingeFeatures(2).fit(inputs).knots_)
 
 
-@pytest.mark.nightly
-def test_routing_changes_no_result():
-    gaps = F.mask(np.random.default_rng(0).random(F.shape) < 0.1)
-    fem = DataInformedFEM(TRUSS, random_state=0)
-    off = clone(fem).fit(T[::3], gaps[::3])
-    with config_context(enable_metadata_routing=True):
-        on = clone(fem).fit(T[::3], gaps[::3])
-        np.testing.assert_array_equal(on.predict(T, return_std=True), off.predict(T, return_std=True))
-
-
-@pytest.mark.parametrize("scale", [0.01, 100.0])
-def test_the_scale_of_weights_does_not_count(scale):
-    year = make_truss_campaign(samples_per_year=120, random_state=0)
-    fits = [
-        DataInformedFEM(make_truss(), random_state=0).fit(year.temperatures, year.frequencies, sample_weight=weights)
-        for weights in (None, np.full(120, scale))
-    ]
-    one, other = (fit.predict(year.temperatures) for fit in fits)
-    np.testing.assert_allclose(one, other, rtol=1e-9)
+@pytest.mark.parametrize("mapper", [None, TemperatureMapper()])
+def test_neither_the_scale_of_weights_nor_routing_changes_a_result(mapper):
+    expected = chain(mapper, random_state=0).fit(T, F).predict(T)
+    for scale in (0.01, 100.0):
+        with config_context(enable_metadata_routing=scale > 1):
+            found = chain(mapper, random_state=0).fit(T, F, sample_weight=np.full(len(T), scale)).predict(T)
+        np.testing.assert_allclose(found, expected, rtol=1e-9)

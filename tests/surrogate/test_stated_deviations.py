@@ -15,16 +15,10 @@ from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMap
 from tests.bayesian import MEAN as FLEET_MEAN
 from tests.bayesian import NOISE, WIDTH, BayesianLogs, Logs, basis, weather
 
-pytestmark = [
-    pytest.mark.filterwarnings(f"ignore:.*{message}")
-    for message in (
-        "outside-(prior|training-weather)",
-        "other-weather",
-        "few-records",
-        "uncalibrated-model",
-        "few-(independent|baseline)-records",
-    )
-]
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*(outside-prior|outside-training-weather|other-weather|few-records|uncalibrated-model)",
+    "ignore:.*few-(independent|baseline)-records",
+)
 
 MODEL = AffineModel(
     {("deck",): [[300.0, -100.0], [-100.0, 100.0]], ("pier",): [[200.0, 0.0], [0.0, 0.0]]}, np.eye(2), n_modes=2
@@ -47,11 +41,11 @@ def chain(mapper=None, **options):
 
 
 @functools.cache
-def fitted(**options):
+def fitted():
     T, F = bridge(0, 395)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return chain(**options).fit(T[:30], F[:30]), T, F
+        return chain().fit(T[:30], F[:30]), T, F
 
 
 def stated(fem, T):
@@ -76,11 +70,11 @@ def test_deviations_are_those_of_the_mappers_posterior_behind_the_model(options)
     np.testing.assert_allclose(stated(fem, few), expected, rtol=0.1)
 
 
-@pytest.mark.parametrize("days", [60, pytest.param(365, marks=pytest.mark.nightly)])
-@pytest.mark.parametrize("wrap", [TemperatureMapper, lambda one: make_pipeline(LagFeatures(1), TemperatureMapper(one))])
-def test_a_mapper_whose_regressor_states_deviations_widens_those_of_the_chain(days, wrap):
-    T, F = bridge(0, 395)
-    silent, stating = (chain(wrap(one)).fit(T[:days], F[:days]) for one in (Ridge(1e-3), BayesianRidge()))
+@pytest.mark.one_case
+@pytest.mark.parametrize("wrap", [lambda one: make_pipeline(LagFeatures(1), TemperatureMapper(one)), TemperatureMapper])
+def test_a_mapper_whose_regressor_states_deviations_widens_those_of_the_chain(wrap):
+    T, F = bridge(0, 120)
+    silent, stating = (chain(wrap(one)).fit(T[:60], F[:60]) for one in (Ridge(1e-3), BayesianRidge()))
     assert (stated(silent, T) == 0).all()
     assert (np.nan_to_num(stated(stating, T), nan=1.0) > 0).all()
     widths = []
@@ -91,16 +85,15 @@ def test_a_mapper_whose_regressor_states_deviations_widens_those_of_the_chain(da
 
 
 def test_a_mapper_that_is_certain_changes_nothing():
-    T, F = bridge(0, 395)
-    silent = chain(Logs(MEAN, WIDTH, 2 * NOISE)).fit(T[:60], F[:60])
-    certain = chain(BayesianLogs(MEAN, WIDTH, 2 * NOISE, share=0.0)).fit(T[:60], F[:60])
+    T, F = bridge(0, 60)
+    silent = chain(Logs(MEAN, WIDTH, 2 * NOISE)).fit(T[:40], F[:40])
+    certain = chain(BayesianLogs(MEAN, WIDTH, 2 * NOISE, share=0.0)).fit(T[:40], F[:40])
     assert not stated(certain, T).any()
-    for ours, theirs in zip(certain.predict(T, return_std=True), silent.predict(T, return_std=True), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-    for ours, theirs in zip(certain.predict_interval(T), silent.predict_interval(T), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-    noisy = [one.simulate(T, noise="fitted", random_state=0) for one in (certain, silent)]
-    np.testing.assert_array_equal(*noisy)
+    ours, theirs = (
+        [*one.predict(T, return_std=True), *one.predict_interval(T), one.simulate(T, noise="fitted", random_state=0)]
+        for one in (certain, silent)
+    )
+    np.testing.assert_array_equal(ours, theirs)
 
 
 def test_deviations_are_the_scatter_and_the_uncertainty_in_quadrature():

@@ -42,10 +42,9 @@ def test_a_false_match_of_swapped_modes_is_refused():
 
 
 def test_shapes_that_the_model_does_not_have_are_named():
+    model, shapes = oscillators(True), [[1, 0, 1], [0, 1, 1], [0, 0, 0.3]]
     with pytest.warns(UserWarning, match=r"\['f3'\] .*doubtful-shapes"):
-        ModelUpdater(oscillators(True)).fit(
-            oscillators(True).frequencies([np.ones(3)]), shapes=[[1, 0, 1], [0, 1, 1], [0, 0, 0.3]], dofs=[0, 1, 2]
-        )
+        ModelUpdater(model).fit(model.frequencies([np.ones(3)]), shapes=shapes, dofs=[0, 1, 2])
 
 
 def test_measured_modes_in_another_order_are_found_by_their_shapes():
@@ -132,11 +131,11 @@ class OnlyModes(CallableModel):
         return oscillators(False).modes(theta)
 
 
-@pytest.mark.parametrize(
-    "model",
-    [ThirdPartyModel(oscillators(False)), OnlyModes(oscillators(False).frequencies, list("abc"), 3, vectorized=True)],
-    ids=["local modes", "modes"],
-)
+SORTED = oscillators(False)
+ONLY_MODES = OnlyModes(SORTED.frequencies, list("abc"), 3, vectorized=True)
+
+
+@pytest.mark.parametrize("model", [ThirdPartyModel(SORTED), ONLY_MODES], ids=["local modes", "modes"])
 def test_swapped_modes_of_a_third_partys_sorted_model_are_named(model):
     bounds = [[1, 1.6], [0.5, 1.05], [0.5, 1.5]]
     with pytest.warns(UserWarning, match=r"\['f1', 'f2'\] .*mode-order"):

@@ -49,22 +49,6 @@ def test_a_model_without_frequencies_has_no_sensitivities():
         sensitivity(CallableModel(lambda row: row[:1] * np.nan, ["k"], 1))
 
 
-def series_of_springs():
-    """Two of the four springs act in parallel, so that nothing tells them apart; the mass hides in all."""
-    unit = np.diag([1.0, 0.0])
-    stiffness = {("a",): 2 * unit, ("twin",): unit, ("b",): np.array([[1.0, -1.0], [-1.0, 1.0]])}
-    return AffineModel(stiffness, {("m",): np.eye(2)}, n_modes=2)
-
-
-def test_parameters_that_act_alike_are_collinear_and_have_no_deviation():
-    known = identifiability(series_of_springs(), noise=0.001)
-    assert known.collinear == [["a", "twin"]]
-    assert np.isinf(known.deviations).all()  # the mass makes four unknowns of two frequencies
-    assert known.condition_number == np.inf
-    assert len(known.recommended) == 2
-    assert not {"a", "twin"} <= set(known.recommended)
-
-
 @pytest.mark.parametrize("n_modes", [1, 2, 3])
 def test_shapes_tell_more_parameters_apart_than_there_are_modes(n_modes):
     model = make_truss(n_modes=n_modes)
@@ -78,20 +62,20 @@ def test_shapes_tell_more_parameters_apart_than_there_are_modes(n_modes):
 
 
 def test_what_only_some_parameters_share_leaves_the_others_known():
-    model = AffineModel(
-        {("a",): np.diag([1.0, 0, 0]), ("twin",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 3.0, 5.0])},
-        np.eye(3),
-        n_modes=3,
-    )
+    terms = {("a",): np.diag([1.0, 0, 0]), ("twin",): np.diag([1.0, 0, 0]), ("b",): np.diag([0, 3.0, 5.0])}
+    model = AffineModel(terms, np.eye(3), n_modes=3)
     known = identifiability(model, noise=0.001)
     assert np.isinf(known.deviations[["a", "twin"]]).all()
-    assert known.rank == 2
+    assert known.collinear == [["a", "twin"]]
+    assert known.condition_number == np.inf
+    assert known.rank == len(known.recommended) == 2
+    assert "b" in known.recommended
     assert "At most 2 of the 3 parameters are identifiable together." in known.summary()
     assert known.deviations["b"] == pytest.approx(2 * 0.001 / np.sqrt(2))
     assert identifiability(model, noise=0.0).deviations.tolist() == [np.inf, np.inf, 0.0]
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_bound_is_the_inverse_up_to_rounding_and_infinite_beyond(seed):
     """Of four parameters, two act almost alike: a difference of 1e-4 is information, one of 1e-9 is rounding."""
     random = np.random.default_rng(seed)

@@ -800,8 +800,8 @@ class AffineModel:
 
         Examples
         --------
-        >>> from skthermo.datasets import make_kw51, make_truss
-        >>> make_truss().reduction_pays(100_000), make_kw51().reduction_pays(1000)
+        >>> from skthermo.datasets import make_truss, make_z24
+        >>> make_truss().reduction_pays(100_000), make_z24().reduction_pays(1000)
         (False, True)
         """
         n_parameters = len(self.parameter_names)
