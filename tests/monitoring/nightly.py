@@ -18,7 +18,6 @@ def joined(campaign):
     return campaign.temperatures.join(campaign.frequencies)
 
 
-@cache
 def truss_records():
     return joined(make_truss_campaign(3, damage={"bottom": 0.3}, damage_from="2027-02-01", random_state=0))
 
