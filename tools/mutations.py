@@ -258,7 +258,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("studies/detectability/_rates.py", "studies/test_pod_curve.py"): [
         ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
     ],
-    ("metrics/_detectability.py", "metrics/test_time_to_detection.py"): [
+    ("metrics/_detectability.py", "metrics/test_metrics.py"): [
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
     ],
     ("plotting/_over_time.py", "plotting/test_limits.py"): [

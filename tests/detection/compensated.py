@@ -6,12 +6,10 @@ from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss_campaign
 from skthermo.detection import TemperatureCompensator
 from skthermo.preprocessing import LagFeatures
-from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
 
-TRUSS = make_truss()
 YEAR = make_truss_campaign(2, samples_per_year=100, random_state=0)
 T, F = YEAR.temperatures, YEAR.frequencies
 X = T.join(F)
@@ -22,11 +20,6 @@ POSITIONS = [X.columns.get_loc(mode) for mode in MODES]
 def compensator(estimator=None, **options):
     estimator = KNeighborsRegressor(3) if estimator is None else estimator
     return TemperatureCompensator(estimator, **({"targets": MODES} | options))
-
-
-def chain(mapper=None):
-    inverse = PosteriorInverse(TRUSS, noise=0.01)
-    return DataInformedFEM(TRUSS, inverse=inverse, mapper=mapper or TemperatureMapper(LinearRegression()))
 
 
 def with_gaps(columns, rows):

@@ -6,7 +6,6 @@ import pytest
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.ensemble import RandomForestRegressor
 from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import KFold
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
@@ -15,23 +14,20 @@ from sklearn.preprocessing import StandardScaler
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector
 from skthermo.preprocessing import BlockedKFold
+from skthermo.surrogate import TemperatureMapper
 from tests.detection.compensated import (
-    LAGGED,
     MODES,
     POSITIONS,
     F,
     T,
     X,
     compensator,
-    hourly,
     with_gaps,
 )
 
 # The chain's linear inverse scatters with the noise, and folds of few records predict weather not seen.
 pytestmark = [
-    pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather)"),
-    pytest.mark.filterwarnings("ignore:.*other-weather"),
-    pytest.mark.filterwarnings("ignore:.*few-records"),
+    pytest.mark.filterwarnings("ignore:.*(outside-bounds|other-weather|few-records)"),
 ]
 
 
@@ -40,14 +36,6 @@ def alarm_rate(detector, records):
 
 
 # What residuals are
-
-
-def test_a_perfect_estimator_leaves_nothing():
-    slopes = [[0.001, 0.002], [0.003, -0.001], [0.0, 0.005]]
-    linear = T.join(pd.DataFrame(T.to_numpy() @ slopes + 4, T.index, ["f1", "f2"]))
-    perfect = compensator(LinearRegression(), targets=["f1", "f2"])
-    for residuals in (perfect.fit_transform(linear), perfect.transform(linear)):
-        np.testing.assert_allclose(residuals, 0, atol=1e-12)
 
 
 def test_transform_is_the_logarithm_of_measured_over_predicted_by_the_fitted_clone():
@@ -66,6 +54,20 @@ def test_responses_that_may_be_zero_have_residuals_in_their_own_unit():
     assert fitted.relative_.tolist() == [False] + [True] * 5
     expected = KNeighborsRegressor(3).fit(T, strain[MODES]).predict(T)
     np.testing.assert_allclose(fitted.transform(strain)["f1"], strain["f1"] - expected[:, 0], atol=1e-12)
+
+
+def test_damping_ratios_are_compensated_beside_frequencies():
+    """They fall by 14 % with every ten degrees and scatter by 15 %."""
+    random, names = np.random.default_rng(0), [f"xi{mode}" for mode in range(1, 4)]
+    ratios = np.exp(-0.15 * T[["T2"]].to_numpy() / 10 + 0.15 * random.standard_normal((len(X), 3))) * 0.008
+    damping = pd.DataFrame(ratios, X.index, names)
+    damping.iloc[::5, 0], damping.iloc[3, 2] = np.nan, -0.001  # modes are lost, and ratios just below zero happen
+    residuals = compensator(TemperatureMapper(LinearRegression()), targets=MODES + names).fit_transform(X.join(damping))
+    assert list(residuals) == MODES + names
+    assert (damping.corrwith(T["T2"]) < -0.4).all()
+    assert (residuals[names].corrwith(T["T2"]).abs() < 0.1).all()
+    pd.testing.assert_frame_equal(residuals.isna(), F.join(damping).isna())
+    assert np.isfinite(MahalanobisDetector().fit(residuals).damage_index(residuals)).all()
 
 
 def test_a_larger_fall_is_never_a_smaller_residual():
@@ -105,11 +107,6 @@ def test_residuals_count_less_where_the_regression_is_less_certain_than_usual():
     np.testing.assert_allclose(other[warm], one[warm] / np.sqrt(1 + excess / unsure.scale_**2), rtol=1e-6)
 
 
-def test_folds_given_as_an_iterable_serve():
-    folds = list(KFold(4).split(X))
-    pd.testing.assert_frame_equal(compensator(cv=folds).fit_transform(X), compensator(cv=4).fit_transform(X))
-
-
 def test_a_folds_targets_enter_only_their_own_residuals():
     periods = compensator(cv="contiguous")
     before, changed, fold = periods.fit_transform(X), X.copy(), slice(80, 120)
@@ -121,24 +118,28 @@ def test_a_folds_targets_enter_only_their_own_residuals():
     assert (after.iloc[others] != before.iloc[others]).any(axis=None)
 
 
-@pytest.mark.one_case
-@pytest.mark.parametrize("method", ["fit_transform", "transform"])
-def test_frames_arrays_names_and_positions_agree(method):
+@pytest.mark.filterwarnings("ignore::skthermo.exceptions.RecordsWarning")  # modes that are not among the targets
+def test_frames_arrays_names_and_positions_agree():
     folds = BlockedKFold(5, block=8)
     by_name, by_position = compensator(cv=folds), compensator(targets=POSITIONS, cv=folds)
     plain = compensator(targets=np.array(POSITIONS), cv=folds)
-    frame = getattr(by_name.fit(X), method)(X)
-    assert list(frame.columns) == MODES
+    frame = by_name.fit_transform(X)
+    assert list(frame.columns) == list(by_name.get_feature_names_out()) == MODES
     assert frame.index.equals(X.index)
-    pd.testing.assert_frame_equal(getattr(by_position.fit(X), method)(X), frame)
-    array = getattr(plain.fit(X.to_numpy()), method)(X.to_numpy())
+    assert list(by_name.targets_) == POSITIONS
+    pd.testing.assert_frame_equal(by_position.fit_transform(X), frame)
+    array = plain.fit_transform(X.to_numpy())
     assert type(array) is np.ndarray
     np.testing.assert_array_equal(array, frame)
+    np.testing.assert_array_equal(plain.transform(X.to_numpy()), by_name.transform(X))
+    two = compensator(targets=[4, 3]).set_output(transform="pandas").fit(X.to_numpy())
+    assert list(two.transform(X.to_numpy()).columns) == ["x4", "x3"]
+    assert list(two.get_feature_names_out(X.columns)) == ["f2", "f1"]
 
 
 @pytest.mark.filterwarnings("ignore::skthermo.exceptions.RecordsWarning")  # modes that are not among the targets
 def test_one_target_is_a_vector_for_estimators_that_want_one():
-    forest = RandomForestRegressor(5, random_state=0)  # warns where a column stands for a vector
+    forest = RandomForestRegressor(2, random_state=0)  # warns where a column stands for a vector
     single = compensator(forest, targets=["f2"]).fit(X)
     others = X.drop(columns="f2")
     expected = np.log(F["f2"] / clone(forest).fit(others, F["f2"]).predict(others))
@@ -169,16 +170,6 @@ def test_out_of_fold_thresholds_keep_the_false_alarm_rate_and_in_sample_ones_do_
 # Frames, models and scikit-learn's machinery
 
 
-@pytest.mark.filterwarnings("ignore::skthermo.exceptions.RecordsWarning")  # modes that are not among the targets
-def test_output_names_and_containers():
-    fitted = compensator().fit(X)
-    assert list(fitted.get_feature_names_out()) == MODES
-    assert list(fitted.targets_) == POSITIONS
-    plain = compensator(targets=[4, 3]).set_output(transform="pandas").fit(X.to_numpy())
-    assert list(plain.transform(X.to_numpy()).columns) == ["x4", "x3"]
-    assert list(plain.get_feature_names_out(X.columns)) == ["f2", "f1"]
-
-
 # Missing values
 
 
@@ -200,14 +191,6 @@ def test_what_cannot_be_predicted_flows_through():
 # Lags and gaps
 
 
-@pytest.mark.filterwarnings("ignore:.*not-evaluated")
-def test_the_fitted_pipeline_is_whole():
-    fitted = compensator(LAGGED, targets=["f1"]).fit(hourly())
-    assert [name for name, _ in fitted.estimator_.steps] == [name for name, _ in LAGGED.steps]
-    lagged = fitted.estimator_[0].transform(hourly()[["T1"]]).dropna()
-    np.testing.assert_allclose(fitted.estimator_[1].predict(lagged), hourly()["f1"].iloc[2:], atol=1e-9)
-
-
 # Units, missing values by number, names
 
 
@@ -227,17 +210,10 @@ def test_columns_named_by_integers_keep_their_names():
     [
         (["f1", "f9"], X, r"targets \['f9'\] are not columns of X, or more than one; expected some of \['T1',"),
         (["f1", "f1"], X, r"targets \['f1', 'f1'\] repeat a column; expected each once"),
-        (
-            ["f1"],
-            X.rename(columns={"f2": "f1"}),
-            r"expected each name once",
-        ),
+        (["f1"], X.rename(columns={"f2": "f1"}), r"expected each name once"),
         ([3, 9], X, r"targets \[9\] are not columns of X; expected indexes from 0 to 8"),
-        ([-1], X, r"targets \[-1\] are not columns of X; expected indexes from 0 to 8"),
         (["f1", 4], X, "expected names of columns, or integers that are their indexes"),
-        ([True, False], X, "expected names of columns, or integers that are their indexes"),
         ([], X, "targets are 0 of the 9 columns of X; expected at least one, and at least one other column"),
-        (list(X.columns), X, "targets are 9 of the 9 columns"),
         ("f1", X, "targets is 'f1'"),
         (["f1"], X.to_numpy(), r"targets are the names \['f1'\], but X has no column names; expected a frame or ind"),
         (["f1"], X.set_axis(range(9), axis=1), "X has no column names"),
@@ -245,10 +221,9 @@ def test_columns_named_by_integers_keep_their_names():
         ([3], X.to_numpy()[:, :1], "1 feature.* minimum of 2"),
     ],
 )
-@pytest.mark.parametrize("method", ["fit", "fit_transform"])
-def test_bad_targets_are_named(method, targets, data, message):
+def test_bad_targets_are_named(targets, data, message):
     with pytest.raises(ValueError, match=message):
-        getattr(compensator(targets=targets), method)(data)
+        compensator(targets=targets).fit(data)
 
 
 def test_predictions_of_another_shape_are_refused():
@@ -256,14 +231,11 @@ def test_predictions_of_another_shape_are_refused():
         def predict(self, X):
             return super().predict(X)[:, 0]
 
-    with pytest.raises(
-        ValueError, match=r"OneColumn predicted the shape \([0-9]+, 1\); expected \([0-9]+, 6\), a column for"
-    ):
+    with pytest.raises(ValueError, match=r"OneColumn predicted the shape \([0-9]+, 1\); expected \([0-9]+, 6\)"):
         compensator(OneColumn()).fit(X).transform(X)
 
 
-@pytest.mark.parametrize("estimator", [Ridge(alpha=-1), make_pipeline(StandardScaler(), Ridge(alpha=-1))], ids=str)
-@pytest.mark.parametrize("method", ["fit", "fit_transform"])
-def test_parameters_of_the_estimator_are_checked(method, estimator):
-    with pytest.raises(ValueError, match="'alpha' parameter of Ridge must be"):
-        getattr(compensator(estimator), method)(X)
+def test_parameters_of_the_estimator_are_checked():
+    for estimator in (Ridge(alpha=-1), make_pipeline(StandardScaler(), Ridge(alpha=-1))):
+        with pytest.raises(ValueError, match="'alpha' parameter of Ridge must be"):
+            compensator(estimator).fit(X)

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.decomposition import PCA
+from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
@@ -25,7 +26,7 @@ def together(**options):
 
 
 def compensated(last, seed=0):
-    compensator = TemperatureCompensator(TemperatureMapper(), targets=list(F))
+    compensator = TemperatureCompensator(TemperatureMapper(LinearRegression()), targets=list(F))
     return make_pipeline(compensator, last).fit(together(random_state=seed))
 
 
@@ -63,9 +64,12 @@ def test_a_cone_of_all_directions_is_the_mahalanobis_distance():
 
 def test_lengths_of_directions_and_units_of_frequencies_do_not_matter():
     falls = -np.diag([1.0, 2.0, 0.5, 1.0, 3.0, 1.0])
-    one = DirectionalDetector(omnibus=0.0).fit(F).damage_index(F)
-    other = DirectionalDetector(falls, omnibus=0.0).fit(1000 * F).damage_index(1000 * F)
-    assert one.to_numpy() == pytest.approx(other.to_numpy(), abs=1e-6)
+    one, other = DirectionalDetector(omnibus=0.0).fit(F), DirectionalDetector(falls, omnibus=0.0).fit(1000 * F)
+    np.testing.assert_allclose(other.damage_index(1000 * F), one.damage_index(F), atol=1e-6)
+    losses = one.severities(F[:9]) / np.abs(falls).sum(axis=1)
+    np.testing.assert_allclose(other.severities(1000 * F[:9]), losses, rtol=1e-6, atol=1e-9)
+    alike = pd.DataFrame([[-1.0] * 6, [-2.0] * 6, falls[0]], ["deck", "girder", "bearing"], list(F))
+    assert DirectionalDetector(alike).fit(F).indistinguishable_ == [("deck", "girder")]
 
 
 def test_directions_of_a_model_are_its_derivatives(fem):
@@ -121,16 +125,12 @@ def test_what_are_no_directions_is_refused(directions, named):
         DirectionalDetector(directions).fit(F)
 
 
-def residuals_of_the_truss():
-    return TemperatureCompensator(targets=list(F)).fit_transform(T.join(F))
-
-
-@pytest.mark.parametrize("between", [StandardScaler(), PCA(), PCA(whiten=True)], ids=repr)
-def test_columns_that_are_no_relative_residuals_are_refused(between):
-    residuals = residuals_of_the_truss()
-    for directions in ("softening", make_truss()):
-        with pytest.raises(ValueError, match="neither frequencies nor relative residuals"):
-            make_pipeline(between, DirectionalDetector(directions)).fit(residuals)
+def test_columns_that_are_no_relative_residuals_are_refused():
+    residuals = TemperatureCompensator(LinearRegression(), targets=list(F)).fit_transform(T.join(F))
+    for between in (StandardScaler(), PCA(), PCA(whiten=True)):
+        for directions in ("softening", make_truss()):
+            with pytest.raises(ValueError, match="neither frequencies nor relative residuals"):
+                make_pipeline(between, DirectionalDetector(directions)).fit(residuals)
 
 
 @pytest.mark.nightly
@@ -143,49 +143,14 @@ def test_frequencies_in_any_unit_and_relative_residuals_find_the_same_losses():
     np.testing.assert_allclose(losses[2], losses[0], rtol=0.05)
 
 
-@pytest.mark.nightly
-def test_the_unit_of_given_directions_does_not_matter():
-    few = F[::3]
-    effects = DirectionalDetector(make_truss()).fit(few).directions_
-    whole, per_mille = (DirectionalDetector(effects * size).fit(few) for size in (1.0, 1e-3))
-    smallest = whole.minimum_detectable_damage()
-    np.testing.assert_allclose(per_mille.minimum_detectable_damage(), 1e3 * smallest, rtol=1e-6)
-    np.testing.assert_allclose(per_mille.pod(1e3 * smallest), whole.pod(smallest), rtol=1e-12)
-    np.testing.assert_allclose(per_mille.severities(few), 1e3 * whole.severities(few), rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.nightly
-def test_an_index_means_the_same_whichever_modes_are_there():
-    random = np.random.RandomState(0)
-    baseline, later = (
-        table.assign(**table[list(F)].mask(random.random_sample((len(table), 6)) < 0.2))
-        for table in (together(random_state=0, n_years=2), together(random_state=3, n_years=4))
-    )
-    later.iloc[:5, 3:] = np.nan
-    compensator = TemperatureCompensator(TemperatureMapper(), targets=list(F))
-    detector = make_pipeline(compensator, DirectionalDetector(make_truss())).fit(baseline)
-    with pytest.warns(UserWarning, match="not-evaluated"):
-        decisions = detector.predict(later)
-    n_there = later[list(F)].notna().sum(axis=1).to_numpy()
-    assert (decisions[:5] == 0).all()
-    assert (decisions[n_there > 0] != 0).all()
-    rates = [(decisions[few] == -1).mean() for few in (n_there == 6, (n_there > 0) & (n_there < 5))]
-    assert max(rates) < 0.05
-    losses = detector[-1].severities(detector[0].transform(later))
-    assert losses.iloc[:5].isna().all(axis=None)
-    assert (losses.iloc[5:][n_there[5:] > 0] >= 0).all(axis=None)
-    assert losses.index.equals(later.index)
-
-
 def test_more_damage_is_never_less_alarm():
     detector = compensated(DirectionalDetector(make_truss()))
-    record = together(noise=1e-9)[:1]
+    records = pd.concat([together(noise=1e-9)[:1]] * 5).set_axis(F.index[:5])
+    sizes = np.array([[0.0], [0.05], [0.1], [0.3], [0.8]])
     falls = detector[-1].directions_.to_numpy()
     for effect in [*falls, -falls[0], np.eye(6)[2], np.ones(6)]:
-        sizes = [0.0, 0.05, 0.1, 0.3, 0.8]
-        changed = (record.assign(**(record[list(F)] * np.exp(size * effect))) for size in sizes)
-        indices = [-detector.score_samples(one)[0] for one in changed]
-        in_alarm = np.array(indices) > detector[-1].threshold_
+        indices = -np.asarray(detector.score_samples(records.assign(**records[list(F)] * np.exp(sizes * effect))))
+        in_alarm = indices > detector[-1].threshold_
         assert (in_alarm[1:] >= in_alarm[:-1]).all()
         assert (np.diff(indices)[in_alarm[:-1]] > 0).all()
         assert in_alarm[-1] or np.abs(effect).max() < 0.01
@@ -193,39 +158,32 @@ def test_more_damage_is_never_less_alarm():
 
 def test_rates_that_are_expected_are_those_of_shifted_normal_records():
     random = np.random.RandomState(0)
-    level, root = (
-        1.1 * make_truss().frequencies(np.ones((1, 4)))[0],
-        0.01 * (np.eye(6) + 0.3 * random.standard_normal((6, 6))),
-    )
+    level = 1.1 * make_truss().frequencies(np.ones((1, 4)))[0]
+    root = 0.01 * (np.eye(6) + 0.3 * random.standard_normal((6, 6)))
 
     def normal(n):
         return level * (1 + random.standard_normal((n, 6)) @ root)
 
     detector = DirectionalDetector(make_truss()).fit(normal(3000))
-    for name, kind in (("bottom", "stiffness"), ("diagonal", "stiffness"), ("diagonal, section", "section")):
-        effect = detector.directions_.loc[name].to_numpy()
-        for loss in (0.0, 0.03, 0.06):
-            true = (detector.predict(normal(4000) + loss * level * effect) == -1).mean()
-            assert detector.pod([loss], kind=kind)[name].iloc[0] == pytest.approx(true, abs=0.03)
-    of_section = detector.minimum_detectable_damage(kind="section")
-    assert list(of_section.index) == [f"{group}, section" for group in GROUPS]
-    smallest = detector.minimum_detectable_damage()
-    for group, loss in smallest[np.isfinite(smallest)].items():
+    losses = [0.0, 0.03, 0.06]
+    expected = detector.pod(losses).join(detector.pod(losses, kind="section"))
+    assert list(expected) == [*GROUPS, *(f"{group}, section" for group in GROUPS)]
+    for name in ("bottom", "diagonal", "diagonal, section"):
+        for loss, rate in zip(losses, expected[name], strict=True):
+            moved = normal(4000) + loss * level * detector.directions_.loc[name].to_numpy()
+            assert rate == pytest.approx((detector.predict(moved) == -1).mean(), abs=0.03)
+    smallest = detector.minimum_detectable_damage(0.8)
+    assert np.isfinite(smallest).tolist() == [True, True, True, False]  # of verticals, no loss is found often enough
+    for group, loss in smallest[["bottom", "diagonal"]].items():
         below, at = detector.pod([0.97 * loss, loss])[group]
         assert below < at
-        assert at >= 0.9 > below - 0.02
-    assert (detector.minimum_detectable_damage(0.5) <= smallest).all()
+        assert at >= 0.8 > below - 0.02
     with pytest.raises(ValueError, match=r"1\.5"):
         detector.pod([1.5])
     with pytest.raises(ValueError, match="none of a loss of section"):
         DirectionalDetector().fit(F).minimum_detectable_damage(kind="section")
     with pytest.raises(ValueError, match="kind is 'area'"):
         detector.pod([0.1], kind="area")
-
-
-def test_groups_that_look_alike_are_named():
-    alike = pd.DataFrame([[-1.0] * 6, [-2.0] * 6, [-1.0, 0, 0, 0, 0, 0]], ["deck", "girder", "bearing"], list(F))
-    assert DirectionalDetector(alike).fit(F).indistinguishable_ == [("deck", "girder")]
 
 
 def test_copies_share_a_fitted_chain_and_decide_alike(fem):
@@ -246,8 +204,9 @@ def test_losses_that_explain_records_are_those_that_have_moved_them():
     np.testing.assert_allclose(single.severities(lighter, kind="section").iloc[-1], losses, atol=2e-3)
     assert single.explained(lighter, kind="section")[-1] == pytest.approx(1, abs=1e-3)
     assert single.explained(lighter)[-1] < 0.99
+    moved[0, 5] = np.nan
+    np.testing.assert_allclose(single.severities(moved), losses + np.zeros((7, 1)), atol=2e-3)
     raised = np.tile(baseline.mean(axis=0) * 1.02, (7, 1))
-    np.testing.assert_allclose(single.severities(moved).iloc[-1], losses, atol=2e-3)
     assert single.explained(moved)[-1] == pytest.approx(1, abs=1e-3)
     assert single.explained(raised)[-1] < 0.02
     assert (single.severities(raised).iloc[-1] < 1e-6).all()

@@ -8,7 +8,7 @@ from sklearn.ensemble import IsolationForest
 from sklearn.linear_model import LinearRegression
 from sklearn.mixture import GaussianMixture
 from sklearn.model_selection import GridSearchCV
-from sklearn.neighbors import KernelDensity, KNeighborsRegressor
+from sklearn.neighbors import KernelDensity
 from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
@@ -18,7 +18,6 @@ from skthermo.detection import (
     OutlierDetector,
     TemperatureCompensator,
 )
-from skthermo.preprocessing import BlockedKFold
 
 pytestmark = [  # folds of few records predict weather not seen, and raw frequencies follow the season
     pytest.mark.filterwarnings("ignore:.*other-weather"),
@@ -65,28 +64,11 @@ def test_with_gaps_it_is_that_of_the_modes_that_are_there():
         assert detector.score(half) == pytest.approx(detector.score(half.dropna()))
 
 
-def test_units_of_frequencies_do_not_change_the_score():
-    one, other = (MahalanobisDetector().fit(scale * X[MODES]).score(scale * HOLED[MODES]) for scale in (1, 1000))
-    assert one == pytest.approx(other)
-
-
 def test_a_pipeline_a_whole_detector_and_its_compensator_score_alike():
     whole = CompensatedDetector(MahalanobisDetector(), LinearRegression(), targets=MODES, regimes=None).fit(X)
     behind = pipeline().fit(X)
     assert whole.score(HOLED) == pytest.approx(behind.score(HOLED), rel=1e-9)
     assert behind[0].score(HOLED) == pytest.approx(behind.score(HOLED), rel=1e-3)
-
-
-@pytest.mark.nightly
-def test_a_search_without_damage_chooses_what_predicts_best():
-    grid = {"temperaturecompensator__estimator__n_neighbors": [1, 15]}
-    search = GridSearchCV(pipeline(KNeighborsRegressor()), grid, cv=BlockedKFold(3)).fit(X)
-    assert search.best_params_ == {"temperaturecompensator__estimator__n_neighbors": 15}
-    assert search.score(NEW) == search.best_estimator_.score(NEW)
-    alone = GridSearchCV(compensator(KNeighborsRegressor()), {"estimator__n_neighbors": [1, 15]}, cv=BlockedKFold(3))
-    np.testing.assert_allclose(
-        alone.fit(X).cv_results_["mean_test_score"], search.cv_results_["mean_test_score"], rtol=1e-6
-    )
 
 
 def test_rows_that_nothing_predicts_are_not_scored():

@@ -7,23 +7,21 @@ from scipy.signal import lfilter
 from sklearn.base import BaseEstimator, OutlierMixin
 from sklearn.covariance import EllipticEnvelope, MinCovDet
 from sklearn.ensemble import IsolationForest
-from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.linear_model import Ridge
 from sklearn.neighbors import LocalOutlierFactor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import OneClassSVM
 
-from skthermo.datasets import make_truss_campaign
-from skthermo.detection import MahalanobisDetector, OutlierDetector, TemperatureCompensator
+from skthermo.detection import MahalanobisDetector, OutlierDetector
 
 RNG = np.random.default_rng(0)
 STAMPS = pd.date_range("2025", periods=400, freq="h")
 F = pd.DataFrame(RNG.normal([4, 9, 12], [0.04, 0.1, 0.2], (400, 3)), STAMPS, ["f1", "f2", "f3"])
 DAMAGED = F - [0.4, 1.0, 2.0]  # ten standard deviations
 DETECTORS = [
-    IsolationForest(random_state=0),
+    IsolationForest(n_estimators=20, random_state=0),
     OneClassSVM(nu=0.1),
-    LocalOutlierFactor(novelty=True),
     EllipticEnvelope(random_state=0),
     make_pipeline(StandardScaler(), LocalOutlierFactor(novelty=True)),
 ]
@@ -78,12 +76,6 @@ def test_any_outlier_detector_serves(estimator):
     assert not [name for name in vars(estimator) if name.endswith("_")]
 
 
-@pytest.mark.nightly
-def test_the_estimators_own_threshold_is_not_used():
-    own, other = (IsolationForest(random_state=0, contamination=share) for share in (0.01, 0.4))
-    assert OutlierDetector(own).fit(F).threshold_ == OutlierDetector(other).fit(F).threshold_
-
-
 def test_the_index_of_an_elliptic_envelope_is_the_squared_mahalanobis_distance():
     envelope = OutlierDetector(EllipticEnvelope(random_state=0), 0.02, threshold="quantile").fit(F)
     robust = MahalanobisDetector(0.02, covariance=MinCovDet(random_state=0), threshold="quantile").fit(F)
@@ -119,31 +111,24 @@ class Recorder(FromZero):
 
 
 @pytest.mark.filterwarnings("ignore:.*few-records")
-def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_records_far_in_time():
-    memory = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).normal(size=1000))
-    Recorder.seen.clear()
-    detector = OutlierDetector(Recorder()).fit(np.column_stack([memory, np.arange(1000)]))
-    everything, *others = Recorder.seen
-    assert len(everything) == 1000
-    assert len(others) == 5
-    left_out = np.concatenate([np.setdiff1d(everything, rest) for rest in others])
-    assert len(np.unique(left_out)) == 1000  # the column of numbers is one long trend
-    assert detector.n_independent_ < 200
-
-
-@pytest.mark.parametrize("block", [24, "1D", pd.Timedelta("1D")])
-@pytest.mark.filterwarnings("ignore:.*few-records")
-def test_blocks_as_long_as_wanted_are_left_out_and_nothing_else(block):
+@pytest.mark.parametrize("block", [None, 24, "1D", pd.Timedelta("1D")])
+def test_each_record_is_evaluated_by_a_clone_that_was_fitted_on_the_other_blocks(block):
     rows = pd.DataFrame({"score": np.arange(400.0), "number": np.arange(400)}, STAMPS)
     rows.loc[STAMPS[[5, 100]], "score"] = np.nan
+    if block is None:  # blocks are longer than records remember
+        rows["score"] = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).normal(size=400))
     Recorder.seen.clear()
-    OutlierDetector(Recorder(), block=block).fit(rows)
+    detector = OutlierDetector(Recorder(), block=block).fit(rows)
     everything, *others = Recorder.seen
-    left_out = [np.setdiff1d(everything, rest) for rest in others]
-    np.testing.assert_array_equal(np.sort(np.concatenate(left_out)), everything)
-    if block != 24:  # of 24 complete rows, which do not begin at midnight
-        for fold, rest in enumerate(left_out):
-            assert set(rest // 24 % 5) == {fold}
+    left_out = np.concatenate([np.setdiff1d(everything, rest) for rest in others])
+    assert len(others) == 5
+    np.testing.assert_array_equal(np.unique(left_out), everything)
+    if block is None:
+        assert detector.n_independent_ < 80
+    else:
+        assert len(left_out) == len(everything) == 398
+    if block not in (None, 24):  # of 24 complete rows, which do not begin at midnight
+        assert [set(rest // 24 % 5) for rest in others] == [set(range(5)) - {fold} for fold in range(5)]
 
 
 @pytest.mark.parametrize(
@@ -159,40 +144,10 @@ def test_blocks_are_rows_or_durations(rows, block, message):
         OutlierDetector(OneClassSVM(), block=block).fit(rows)
 
 
-@pytest.mark.nightly
-def test_the_rate_asked_for_is_kept_where_records_depend_on_each_other():
-    rates = {"conformal": [], "quantile": []}
-    for seed in range(6):
-        noise = np.random.default_rng(seed).normal(size=(50 + 1000 + 2000, 4))
-        baseline, later = np.split(lfilter([1.0], [1.0, -0.8], noise, axis=0)[50:], [1000])
-        for threshold, found in rates.items():
-            detector = OutlierDetector(LocalOutlierFactor(novelty=True), 0.05, threshold=threshold).fit(baseline)
-            found.append((detector.damage_index(later) > detector.threshold_).mean())
-    assert np.mean(rates["conformal"]) < 0.05 + 2 * np.std(rates["conformal"]) / np.sqrt(6)
-    assert np.mean(rates["quantile"]) > 0.08
-
-
-def test_residuals_of_a_compensator_are_scored_in_a_pipeline():
-    healthy, damaged = (
-        campaign.temperatures.join(campaign.frequencies)
-        for campaign in (make_truss_campaign(random_state=0), make_truss_campaign(damage={"bottom": 0.3}))
-    )
-    targets = [name for name in healthy if name.startswith("f")]
-    compensator = TemperatureCompensator(LinearRegression(), targets=targets)
-    pipeline = make_pipeline(compensator, StandardScaler(), OutlierDetector(OneClassSVM())).fit(healthy)
-    residuals = StandardScaler().fit_transform(compensator.fit_transform(healthy))
-    assert pipeline[-1].threshold_ == OutlierDetector(OneClassSVM()).fit(residuals).threshold_
-    assert (pipeline.predict(damaged) == -1).mean() > 0.95
-
-
 @pytest.mark.parametrize(
     ("estimator", "message"),
     [
-        (
-            LocalOutlierFactor(),
-            r"estimator is LocalOutlierFactor\(\), which has no score_samples; expected an outlier detector that "
-            r"scores new records, such as IsolationForest\(\) or LocalOutlierFactor\(novelty=True\)",
-        ),
+        (LocalOutlierFactor(), r"estimator is LocalOutlierFactor\(\), which has no score_samples.*\(novelty=True\)"),
         (Ridge(), r"estimator is Ridge\(\), which has no score_samples"),
         (make_pipeline(StandardScaler(), Ridge()), "has no score_samples"),
         (None, "'estimator' parameter of OutlierDetector must be an object implementing 'fit'. Got None"),
@@ -203,9 +158,3 @@ def test_residuals_of_a_compensator_are_scored_in_a_pipeline():
 def test_estimators_that_cannot_serve_are_named(estimator, message):
     with pytest.raises(ValueError, match=message):
         OutlierDetector(estimator).fit(F)
-
-
-@pytest.mark.parametrize("contamination", [0, 0.6, "auto"])
-def test_contamination_is_a_share(contamination):
-    with pytest.raises(ValueError, match="'contamination' parameter of OutlierDetector must be a float in the range"):
-        OutlierDetector(IsolationForest(), contamination).fit(F)

@@ -12,6 +12,7 @@ from sklearn.covariance import EmpiricalCovariance, LedoitWolf
 from skthermo.detection import DirectionalDetector, MahalanobisDetector
 from skthermo.residuals.numbers import independent_records
 
+DETECTORS = [MahalanobisDetector, pytest.param(DirectionalDetector, marks=pytest.mark.nightly)]
 TOO_FEW = pytest.mark.filterwarnings("ignore:.*few-records")
 
 
@@ -27,10 +28,12 @@ def autoregressive(n_rows, correlation, seed=0, n_modes=4):
 
 
 @TOO_FEW
-@pytest.mark.parametrize("covariance", [None, LedoitWolf()], ids=["default", "shrunk"])
-@pytest.mark.parametrize(("n_rows", "correlation", "n_folds"), [(500, 0, 5), (123, 0, 5), (60, 0, 20), (400, 0.9, 5)])
+@pytest.mark.parametrize(
+    ("n_rows", "correlation", "n_folds", "covariance"),
+    [(123, 0, 5, None), (60, 0, 20, LedoitWolf()), (400, 0.9, 5, None)],
+)
 def test_each_record_is_evaluated_by_records_of_other_blocks_that_it_does_not_remember(
-    covariance, n_rows, correlation, n_folds
+    n_rows, correlation, n_folds, covariance
 ):
     rows, index, number = autoregressive(n_rows, correlation), np.empty(n_rows), np.arange(n_rows)
     n_independent = independent_records(rows)
@@ -47,7 +50,7 @@ def test_each_record_is_evaluated_by_records_of_other_blocks_that_it_does_not_re
 
 
 @TOO_FEW
-@pytest.mark.parametrize("detector", [MahalanobisDetector, DirectionalDetector])
+@pytest.mark.parametrize("detector", DETECTORS)
 @pytest.mark.parametrize(
     ("n_rows", "correlation", "most"), [(365, 0.0, 0.03), (60, 0.9, 0.05), (100, 0.95, 0.1), (365, 0.95, 0.03)]
 )
@@ -99,7 +102,7 @@ def test_the_empirical_covariance_is_the_default(threshold):
 
 
 @TOO_FEW
-@pytest.mark.parametrize("detector", [MahalanobisDetector, DirectionalDetector])
+@pytest.mark.parametrize("detector", DETECTORS)
 def test_false_alarms_on_new_records_are_near_what_is_asked_where_the_baseline_is_small(detector):
     rates = {"quantile": [], "conformal": []}
     for seed in range(30):

@@ -1,9 +1,9 @@
-"""PFA, POD, minimum detectable damage, error tables, scores."""
+"""PFA, POD, minimum detectable damage, time to detection, error tables, scores."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.dummy import DummyRegressor
 from sklearn.metrics import mean_absolute_percentage_error, r2_score
@@ -17,21 +17,59 @@ from skthermo.metrics import (
     minimum_detectable_damage,
     probability_of_detection,
     probability_of_false_alarm,
+    time_to_detection,
 )
 from skthermo.metrics.errors import complete_r2
 
 RNG = np.random.default_rng(0)
 MEASURED = RNG.uniform(3, 5, (60, 2))
 PREDICTED = MEASURED * RNG.normal(1, 0.02, (60, 2))
+TRUE, PRED = (pd.DataFrame(values, columns=["f1", "f2"]) for values in (MEASURED, PREDICTED))
+INDEX = pd.Series([5.0, 1.0, 2.0, np.nan, 4.0, 5.0], pd.date_range("2025-01-01", periods=6, freq="h"))
 
 
 @pytest.mark.filterwarnings("ignore:.*not-evaluated")
+@settings(max_examples=40)
 @given(st.lists(st.floats(0, 10), min_size=1), st.floats(0, 10), st.integers(0, 5))
 def test_probabilities_are_shares_above_the_threshold(index, threshold, n_missing):
     expected = sum(value > threshold for value in index) / len(index)
     padded = index + [np.nan] * n_missing
     assert probability_of_detection(padded, threshold) == pytest.approx(expected)
     assert probability_of_false_alarm(padded, threshold) == pytest.approx(expected)
+
+
+@settings(max_examples=40)
+@given(st.lists(st.floats(0, 10) | st.just(np.nan), min_size=1, max_size=30), st.floats(0, 10), st.data())
+def test_time_to_detection_is_the_number_of_records_until_the_first_alarm(index, threshold, data):
+    onset = data.draw(st.integers(0, len(index) - 1))
+    waits = [row - onset for row in range(onset, len(index)) if index[row] > threshold]
+    for values in (index, pd.Series(index)):
+        found = time_to_detection(values, threshold, onset)
+        assert isinstance(found, float)
+        np.testing.assert_equal(found, float(waits[0]) if waits else np.nan)
+
+
+@pytest.mark.parametrize(
+    ("onset", "expected"),
+    [
+        ("2025-01-01 00:00", "0h"),
+        ("2025-01-01 01:00", "3h"),
+        (pd.Timestamp("2025-01-01 01:20"), "2h 40min"),  # between two records
+        (np.datetime64("2025-01-01T01:20"), "2h 40min"),
+        (pd.Timestamp("2024-12-31 23:00"), "1h"),  # before the first record
+        (INDEX.index[5], "0h"),
+        (1, "3h"),
+    ],
+)
+def test_a_series_on_stamps_gives_a_time(onset, expected):
+    assert time_to_detection(INDEX, 3.0, onset) == pd.Timedelta(expected)
+
+
+def test_no_alarm_on_stamps_is_no_time_and_the_first_record_is_the_onset_by_default():
+    assert time_to_detection(INDEX, 5.0, INDEX.index[1]) is pd.NaT
+    zoned = INDEX.tz_localize("Europe/Rome")
+    assert time_to_detection(zoned, 3.0, zoned.index[1]) == pd.Timedelta("3h")
+    assert time_to_detection(INDEX[1:], 3.0) == pd.Timedelta("3h")
 
 
 def test_nothing_to_count_is_nan():
@@ -71,6 +109,7 @@ def test_error_table_has_a_row_for_each_scenario_in_order_and_averages():
     assert list(table.columns) == ["first", "second", "Average"]
     np.testing.assert_allclose(table.loc["SB-50", ["first", "second"]], mape(MEASURED[20:40], PREDICTED[20:40]))
     assert table.loc["Average", "Average"] == pytest.approx(table.iloc[:3, :2].to_numpy().mean())
+    assert list(error_table(*(frame.set_axis([0, 1], axis=1) for frame in frames)).columns) == [0, 1, "Average"]
     with pytest.raises(ValueError, match="row 0"):
         error_table(frames[0], frames[1].shift(freq="1D"))
     with pytest.raises(ValueError, match="scenarios"):
@@ -97,22 +136,11 @@ def test_scorer_works_in_cross_validation_and_counts_the_rows_it_scored():
     assert scored["neg_mape"] == pytest.approx(-mape(holed[complete], model.predict(T)[complete]).mean())
 
 
-# Frames, and values that are no frequencies
-
-TRUE = pd.DataFrame(MEASURED, columns=["f1", "f2"])
-PRED = pd.DataFrame(PREDICTED, columns=["f1", "f2"])
-
-
 @pytest.mark.parametrize("metric", [mape, error_table, complete_r2])
 def test_columns_of_frames_are_paired_by_name(metric):
     np.testing.assert_array_equal(metric(TRUE, PRED[["f2", "f1"]]), metric(TRUE, PRED))
     np.testing.assert_array_equal(metric(TRUE, PREDICTED), metric(TRUE, PRED))
-    for other in (
-        PRED.set_axis(["f1", "f3"], axis=1),
-        PRED.set_axis([0, 1], axis=1),
-        PRED[["f1"]],
-        PRED.assign(f3=4.0),
-    ):
+    for other in (PRED.set_axis(["f1", "f3"], axis=1), PRED.set_axis([0, 1], axis=1), PRED[["f1"]], PRED.assign(f3=4)):
         with pytest.raises(ValueError, match="columns"):
             metric(TRUE, other)
 
@@ -127,28 +155,12 @@ def test_scores_pair_columns_by_name():
     assert scores["neg_mape"] == pytest.approx(-mape(TRUE, PRED).mean())
 
 
-def test_columns_named_by_integers_keep_their_names():
-    numbered = [frame.set_axis([0, 1], axis=1) for frame in (TRUE, PRED)]
-    assert list(error_table(*numbered).columns) == [0, 1, "Average"]
-
-
-def bad(value, row=7, column=1):
-    values = MEASURED.astype(object)
-    values[row, column] = value
-    return values
-
-
 def test_masked_and_missing_values_are_ignored():
-    holed = MEASURED.copy()
-    holed[7, 1] = np.nan
+    holed, (unknown, nothing) = MEASURED.copy(), (MEASURED.astype(object) for _ in range(2))
+    holed[7, 1], unknown[7, 1], nothing[7, 1] = np.nan, pd.NA, None
     masked = np.ma.masked_array(MEASURED, np.isnan(holed))
-    for missing in (
-        masked,
-        bad(pd.NA),
-        bad(None),
-        pd.DataFrame(bad(pd.NA)),
-        pd.DataFrame(MEASURED).convert_dtypes().mask(np.isnan(holed)),
-    ):
+    frame = pd.DataFrame(MEASURED).convert_dtypes().mask(np.isnan(holed))
+    for missing in (masked, unknown, nothing, pd.DataFrame(unknown), frame):
         np.testing.assert_array_equal(mape(missing, PREDICTED), mape(holed, PREDICTED))
     index = np.ma.masked_array([1.0, 99.0, 3.0, 4.0], [False, True, False, False])
     with pytest.warns(UnevaluatedRowsWarning, match="not-evaluated"):

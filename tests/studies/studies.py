@@ -8,7 +8,7 @@ from skthermo.detection import CompensatedDetector, MahalanobisDetector, Tempera
 from skthermo.studies import DetectabilityStudy
 
 YEAR, LATER = (make_truss_campaign(random_state=seed) for seed in (0, 1))
-WEATHER = LATER.temperatures
+WEATHER = LATER.temperatures[::3]
 SIDE_BY_SIDE = YEAR.temperatures.join(YEAR.frequencies)
 MODES = list(YEAR.frequencies)
 
@@ -29,6 +29,13 @@ def windowed(window=None, regression=None, targets=MODES, **options):
 
 
 def study_of(fem, detectors, scenarios, **options):
-    """A study of two repeats with the noise alone, unless asked otherwise."""
-    options = {"n_repeats": 2, "random_state": 0, "uncertainty": "noise"} | options
+    """A study of two repeats with 1 % of noise alone, unless asked otherwise."""
+    options = {"n_repeats": 2, "random_state": 0, "noise": 0.01, "uncertainty": "noise"} | options
     return DetectabilityStudy(fem, detectors, scenarios, **options)
+
+
+def ran(fem, scenarios, detectors=None, T=WEATHER, **options):
+    """Such a study, of the distance alone unless others are named, that has been run."""
+    study = study_of(fem, MahalanobisDetector() if detectors is None else detectors, scenarios, **options)
+    study.run(T)
+    return study

@@ -11,14 +11,15 @@ from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.fem import CallableModel, add_noise
 from skthermo.studies import Scenario, compare_extensions, pod_curve, sweep
 from skthermo.surrogate import DataInformedFEM, InverseSurrogate
-from tests.studies.studies import MODES, WEATHER, YEAR, study_of
+from tests.studies.studies import LATER, MODES, WEATHER, YEAR, ran, study_of
+
+NO_OTHERS = {"modes": (), "baseline_factors": ()}
 
 
 @pytest.fixture(scope="module")
 def study(fem):
     scenarios = sweep(fem, (0.1, 0.2, 0.3), ["top"])
-    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=6, noise=0.01)
-    study.run(WEATHER)
+    study = ran(fem, scenarios, n_repeats=6)
     return study
 
 
@@ -84,9 +85,8 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
     scenarios = [
         Scenario(f"{m} kg", mass=np.full(23, m), family="mass", severity=m / 1000) for m in (5.0, 10.0, 20.0, 40.0)
     ]
-    study = study_of(fem, MahalanobisDetector(), scenarios, n_repeats=3)
-    study.run(WEATHER)
-    table = compare_extensions(study, WEATHER, modes=[8], baseline_factors=())
+    study = ran(fem, scenarios, T=LATER.temperatures, n_repeats=3, noise="fitted")
+    table = compare_extensions(study, LATER.temperatures, modes=[8], baseline_factors=())
     assert table["family"].tolist() == ["mass"]
     curve = study.pod_curve("mass")
     assert table["mdd_now"][0] == pytest.approx(curve.a90, rel=0.15)
@@ -98,10 +98,10 @@ def test_a_family_of_other_changes_keeps_its_severities(fem):
         ({"modes": [5]}, r"modes \[5\] are measured already"),
         ({"modes": [99]}, "is none of the model's"),
         ({"baseline_factors": (1.0,)}, "expected numbers above 1"),
-        ({"modes": (), "baseline_factors": ()}, "there is no candidate"),
+        (NO_OTHERS, "there is no candidate"),
         ({"noise": 2.0}, "noise is 2"),
-        ({"sensors": pd.DataFrame({"T4": YEAR.temperatures["T1"]})}, "the detector sees no temperatures"),
-        ({"sensors": YEAR.temperatures["T1"]}, "expected a frame with a column for each candidate"),
+        (NO_OTHERS | {"sensors": pd.DataFrame({"T4": YEAR.temperatures["T1"]})}, "the detector sees no temperatures"),
+        (NO_OTHERS | {"sensors": YEAR.temperatures["T1"]}, "expected a frame with a column for each candidate"),
     ],
 )
 def test_impossible_candidates_are_errors(study, arguments, message):
@@ -127,7 +127,7 @@ def test_a_model_without_other_modes_has_only_longer_baselines(fem):
     model = CallableModel(truss.frequencies, truss.parameter_names, 6)
     chain = DataInformedFEM(model, random_state=0).fit(YEAR.temperatures, YEAR.frequencies)
     scenarios = [Scenario(f"soft {s}", parameters={"top": 1 - s}, family="top", severity=s) for s in (0.2, 0.3, 0.4)]
-    study = study_of(chain, MahalanobisDetector(), scenarios, noise=0.01)
+    study = study_of(chain, MahalanobisDetector(), scenarios)
     study.run(WEATHER)
     assert compare_extensions(study, WEATHER)["kind"].tolist() == ["baseline"]
     with pytest.raises(ValueError, match="has no method 'with_modes'"):

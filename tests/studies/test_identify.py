@@ -34,6 +34,11 @@ def simulated(fem, damage=None, T=WEATHER):
     return fem.simulate(T, damage=damage) * (1 + fem.recorder_.residuals.expected(fem.weather(T).inputs))
 
 
+@pytest.fixture(scope="module")
+def healthy(fem):
+    return simulated(fem)
+
+
 def most_probable(found):
     """Amounts of the causes of the most probable explanation."""
     return found.estimates.loc[found.explanations.index[0], "severity"].to_dict() if found.most_probable else {}
@@ -69,8 +74,8 @@ def test_severe_damage_of_one_group_is_not_something_else(fem, severity):
     assert most_probable(found) == pytest.approx({"diagonal": severity}, abs=0.02)
 
 
-def test_a_healthy_structure_has_no_damage(fem):
-    found = identify_damage(fem, WEATHER, simulated(fem), GROUPS, noise=TINY, random_state=0)
+def test_a_healthy_structure_has_no_damage(fem, healthy):
+    found = identify_damage(fem, WEATHER, healthy, GROUPS, noise=TINY, random_state=0)
     assert found.most_probable == ()
     assert found.probability > 0.9
     assert (found.severities < 1e-3).all()
@@ -78,7 +83,7 @@ def test_a_healthy_structure_has_no_damage(fem):
     assert found.damage == {}
 
 
-@pytest.mark.one_case
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*uncalibrated-model")
 @pytest.mark.parametrize("method", ["shift", "scale"])
 def test_damage_behind_an_aligner(method):
@@ -112,7 +117,9 @@ def test_a_reduced_model_and_rows_in_any_order_give_the_same(fem, reduced_fem):
 
 def test_same_seed_same_bits(fem):
     F = simulated(fem, {"top": 0.2})
-    one, same, other = (identify_damage(fem, WEATHER, F, GROUPS, noise=0.01, random_state=seed) for seed in (0, 0, 1))
+    one, same, other = (
+        identify_damage(fem, WEATHER, F, ["top", "bottom"], noise=0.01, random_state=seed) for seed in (0, 0, 1)
+    )
     pd.testing.assert_frame_equal(one.draws, same.draws)
     pd.testing.assert_frame_equal(one.table, same.table)
     assert not one.draws.equals(other.draws)
@@ -132,24 +139,24 @@ def test_known_standard_error_of_a_single_group(fem):
     assert width == pytest.approx(2 * norm.isf(0.05) * found.table.loc["top", "standard_error"], rel=0.1)
 
 
-@pytest.mark.parametrize("law", ["half-normal", "uniform"])
-def test_evidence_is_the_integral_over_the_prior(fem, law):
+def test_evidence_is_the_integral_over_the_prior(fem):
     """One cause beside none: their odds are those of the integral of Student's likelihood over severities."""
     F = simulated(fem, {"top": 0.02})
-    prior = DamagePrior(numbers=(0.5, 0.5), severity=0.3, law=law, something_else=0, model_error=0)
-    found = identify_damage(fem, WEATHER, F, "top", noise=0.05, prior=prior, random_state=0)
     theta = np.nanmean(fem.predict_parameters(WEATHER), axis=0, keepdims=True)
-    severities = np.linspace(0, 0.95, 2001)
+    severities = np.linspace(0, 0.95, 401)
     base = np.log(TRUSS.frequencies(theta))
     effects = np.vstack([np.log(TRUSS.damaged({"top": s}).frequencies(theta)) - base for s in severities])
     variance = 0.05**2 * (1 / len(F) + 1 / len(YEAR.frequencies))
-    freedom, shift = len(YEAR.frequencies) - 1, np.log1p(found.shifts["measured"].to_numpy())
-    misfits = ((shift - effects) ** 2).sum(axis=1) / variance
-    likelihood = (1 + misfits / freedom) ** (-(freedom + 6) / 2)
-    density = np.exp(-((severities / 0.3) ** 2) / 2) if law == "half-normal" else (severities <= 0.3).astype(float)
-    odds = (likelihood * density).sum() / density.sum() / likelihood[0]
-    probable = found.explanations["probability"]
-    assert probable["top"] / probable["no damage"] == pytest.approx(odds, rel=0.05)
+    densities = {"half-normal": np.exp(-((severities / 0.3) ** 2) / 2), "uniform": (severities <= 0.3).astype(float)}
+    for law, density in densities.items():
+        prior = DamagePrior(numbers=(0.5, 0.5), severity=0.3, law=law, something_else=0, model_error=0)
+        found = identify_damage(fem, WEATHER, F, "top", noise=0.05, prior=prior, random_state=0)
+        freedom, shift = len(YEAR.frequencies) - 1, np.log1p(found.shifts["measured"].to_numpy())
+        misfits = ((shift - effects) ** 2).sum(axis=1) / variance
+        likelihood = (1 + misfits / freedom) ** (-(freedom + 6) / 2)
+        odds = (likelihood * density).sum() / density.sum() / likelihood[0]
+        probable = found.explanations["probability"]
+        assert probable["top"] / probable["no damage"] == pytest.approx(odds, rel=0.05)
 
 
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")  # by as little as effects differ with the weather
@@ -196,34 +203,35 @@ def test_stiffening_parameters_and_mass_are_causes_of_their_own(fem):
         assert found.table.loc[name, "kind"] in ("stiffening", "mass", "parameter")
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize(("stiffness", "amount"), [(1e7, 0.5), (1e9, 1.0)])  # N/m: as mode 1 feels, nearly rigid
-def test_a_bearing_that_locks_is_the_spring_that_was_named(fem, stiffness, amount):
+def test_a_bearing_that_locks_is_the_spring_that_was_named(fem, healthy, stiffness, amount):
     spring = np.zeros(TRUSS.n_dof)
     spring[list(TRUSS.dofs).index(("7", "x"))] = stiffness
     options = {"groups": GROUPS, "added_stiffness": {"bearing": spring}, "noise": TINY, "random_state": 0}
     theta = np.nanmean(fem.predict_parameters(WEATHER), axis=0, keepdims=True)
     locked = TRUSS.with_added(stiffness=np.diag(amount * spring)).frequencies(theta) / TRUSS.frequencies(theta)
-    found = identify_damage(fem, WEATHER, simulated(fem) * locked, **options)
+    found = identify_damage(fem, WEATHER, healthy * locked, **options)
     assert found.most_probable == ("bearing",)
     assert found.probability > 0.7
     assert found.severities["bearing"] == pytest.approx(amount, rel=0.05)
     assert found.table.loc["bearing", "kind"] == "spring"
-    for damage in ({"top": 0.05}, {"bottom": 0.1}, {"diagonal": 0.3}):
+    for damage in ({"top": 0.05}, {"diagonal": 0.3}):
         softer = identify_damage(fem, WEATHER, simulated(fem, damage), **options)
         assert most_probable(softer) == pytest.approx(damage, rel=0.1)
         assert softer.table.loc["bearing", "probability"] < 0.2
 
 
-def test_what_rises_several_times_is_found_by_the_rise_that_is_likely(fem):
+def test_what_rises_several_times_is_found_by_the_rise_that_is_likely(fem, healthy):
     theta = np.nanmean(fem.predict_parameters(WEATHER), axis=0, keepdims=True)
     ratio = TRUSS.frequencies(theta * [1, 1, 4.0, 1]) / TRUSS.frequencies(theta)
     for name, word in {"parameters": "higher", "stiffening": "stiffer"}.items():
         options = {"groups": GROUPS, "noise": TINY, "random_state": 0, name: {"diagonal": 2.0}}
-        found = identify_damage(fem, WEATHER, simulated(fem) * ratio, **options)
+        found = identify_damage(fem, WEATHER, healthy * ratio, **options)
         assert found.most_probable == (f"diagonal {word}",)
         assert abs(found.severities[f"diagonal {word}"]) == pytest.approx(3.0, rel=0.05)
         with pytest.raises(ValueError, match=r"expected a relative rise above 0"):
-            identify_damage(fem, WEATHER, simulated(fem), **{name: {"diagonal": -1.0}})
+            identify_damage(fem, WEATHER, healthy, **{name: {"diagonal": -1.0}})
 
 
 def test_a_group_is_not_both_weaker_and_stiffer(fem):
@@ -233,12 +241,11 @@ def test_a_group_is_not_both_weaker_and_stiffer(fem):
 
 
 @pytest.mark.filterwarnings("ignore:.*unexplained-shifts")
-def test_shifts_that_no_group_makes_are_something_else(fem):
-    for change in (1.05, [1, 1, 1, 1.03, 1, 1]):
-        found = identify_damage(fem, WEATHER, simulated(fem) * change, GROUPS, random_state=0)
-        assert found.most_probable == ("something else",)
-        assert found.probability_other > 0.9
-        assert found.damage == {}
+def test_shifts_that_no_group_makes_are_something_else(fem, healthy):
+    found = identify_damage(fem, WEATHER, healthy * [1, 1, 1, 1.03, 1, 1], GROUPS, random_state=0)
+    assert found.most_probable == ("something else",)
+    assert found.probability_other > 0.9
+    assert found.damage == {}
     F = simulated(fem, {"top": 0.4})
     F.iloc[:, 5] *= 1.02
     found = identify_damage(fem, WEATHER, F, GROUPS, random_state=0)
@@ -288,6 +295,7 @@ def test_mirrored_groups_are_named_and_share_the_probability(symmetric):
     assert together.indistinguishable == []
 
 
+@pytest.mark.one_case
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_shapes_tell_mirrored_groups_apart(symmetric, side):
     fem, T = symmetric
@@ -320,17 +328,16 @@ def test_shapes_show_what_frequencies_hardly_show(fem):
     assert found.table.loc["vertical", "error_alone"] < 0.5 * without.table.loc["vertical", "error_alone"]
 
 
-def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem):
-    F = simulated(fem)
+def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem, healthy):
     with pytest.warns(UserWarning, match="vertical.*undetermined"):
-        found = identify_damage(fem, WEATHER[::2], F[::2], random_state=0)
+        found = identify_damage(fem, WEATHER[::2], healthy[::2], random_state=0)
     assert found.unobservable == ["vertical"]
     # of the explanations that remain, those with or without it: 1/5 of single causes, one of which is all groups
     expected = 0.3 / 5 / (0.5 + 0.3 / 5)
     assert expected / 3 < found.table.loc["vertical", "probability"] < 1.5 * expected
     assert found.table.loc["vertical", "if_damaged"] == pytest.approx(0.2 * np.sqrt(2 / np.pi), rel=0.6)
     with pytest.raises(ValueError, match=r"no group can be seen; .* vertical "):
-        identify_damage(fem, WEATHER[::8], F[::8], ["vertical"])
+        identify_damage(fem, WEATHER[::8], healthy[::8], ["vertical"])
 
 
 # Records
@@ -339,7 +346,6 @@ def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem):
 @pytest.mark.filterwarnings("ignore:.*not-evaluated")
 def test_gaps_outliers_and_what_has_just_begun_are_counted(fem):
     F = fem.simulate(WEATHER, damage={"top": 0.2}, noise="fitted", random_state=0)
-    clean = identify_damage(fem, WEATHER, F, GROUPS, random_state=0)
     T, worse = WEATHER.copy(), F.copy()
     T.iloc[3], worse.iloc[10:20], worse.iloc[::2, 0] = np.nan, np.nan, np.nan
     worse.iloc[30, 2] *= 1.3
@@ -347,7 +353,7 @@ def test_gaps_outliers_and_what_has_just_begun_are_counted(fem):
         found = identify_damage(fem, T, worse, GROUPS, random_state=0)
     assert found.records["compared"] == 61
     assert found.most_probable == ("top",)
-    assert found.severities["top"] == pytest.approx(clean.severities["top"], abs=0.03)
+    assert found.severities["top"] == pytest.approx(0.2, abs=0.03)
     last = fem.simulate(WEATHER[-10:], damage={"diagonal": 0.5}, noise="fitted", random_state=1)
     F.iloc[-10:] = last.to_numpy()
     with pytest.warns(UserWarning, match="may have just changed.*not-evaluated"):
@@ -358,7 +364,8 @@ def test_gaps_outliers_and_what_has_just_begun_are_counted(fem):
 @pytest.mark.filterwarnings("ignore:.*few-records")
 def test_one_record_says_less_than_many(fem):
     record = simulated(fem, {"diagonal": 0.4})
-    one, many = (identify_damage(fem, WEATHER[:n], record[:n], GROUPS, random_state=0) for n in (1, 73))
+    groups = ["top", "diagonal"]
+    one, many = (identify_damage(fem, WEATHER[:n], record[:n], groups, random_state=0) for n in (1, 73))
     assert one.most_probable == many.most_probable == ("diagonal",)
     assert one.table.loc["diagonal", "standard_error"] > many.table.loc["diagonal", "standard_error"]
 
@@ -375,18 +382,15 @@ def test_records_that_depend_on_those_before_count_less():
     assert errors[0.9] > 2 * errors[0.0]
 
 
-def test_records_in_foreign_weather_are_not_compared(fem):
-    F, foreign = simulated(fem), WEATHER.copy()
+def test_records_in_foreign_weather_are_not_compared(fem, healthy):
+    F, foreign = healthy, WEATHER.copy()
     foreign.iloc[:5] += 60
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = identify_damage(fem, foreign, F, GROUPS, random_state=0)
-    assert sorted(str(one.message).rpartition("[")[2] for one in caught) == [
-        "not-evaluated]",
-        "other-weather]",
-    ]
+        found = identify_damage(fem, foreign, F, "top", random_state=0)
+    assert sorted(one.message.kind for one in caught) == ["not-evaluated", "other-weather"]
     assert {one.filename for one in caught} == {__file__}
-    expected = identify_damage(fem, WEATHER[5:], F[5:], GROUPS, random_state=0)
+    expected = identify_damage(fem, WEATHER[5:], F[5:], "top", random_state=0)
     pd.testing.assert_series_equal(found.severities, expected.severities, atol=1e-3)
     with pytest.raises(ValueError, match=r"none of 73\srecords can be compared .*: 73 in weather far outside"):
         identify_damage(fem, WEATHER + 60, F, GROUPS)
@@ -452,13 +456,13 @@ def test_silence_is_never_healthy():
         ({"shapes": (np.ones((3, 6)),) * 2, "dofs": [0, 1]}, "expected a row for each of 2 sensors"),
     ],
 )
-def test_bad_options(fem, change, message):
+def test_bad_options(fem, healthy, change, message):
     with pytest.raises(ValueError, match=message):
-        identify_damage(fem, WEATHER, simulated(fem), **{"groups": GROUPS, **change})
+        identify_damage(fem, WEATHER, healthy, **{"groups": GROUPS, **change})
 
 
-def test_bad_records(fem):
-    F = simulated(fem)
+def test_bad_records(fem, healthy):
+    F = healthy
     with pytest.raises(ValueError, match="temperatures"):
         identify_damage(fem, WEATHER, F[:-1], GROUPS)
     with pytest.raises(ValueError, match=r"have the columns \['a', .*expected \['f1'"):
@@ -470,17 +474,16 @@ def test_bad_records(fem):
     zero = F.copy()
     zero.iloc[3, 2] = 0.0
     with pytest.warns(UserWarning, match="'f3' is 0 Hz in 1 of 73 rows.*set-aside"):
-        found = identify_damage(fem, WEATHER, zero, GROUPS, random_state=0)
-    pd.testing.assert_frame_equal(
-        found.table, identify_damage(fem, WEATHER, zero.where(zero > 0), GROUPS, random_state=0).table
-    )
+        found = identify_damage(fem, WEATHER, zero, "top", random_state=0)
+    expected = identify_damage(fem, WEATHER, zero.where(zero > 0), "top", random_state=0)
+    pd.testing.assert_frame_equal(found.table, expected.table)
     for factors, message in ((2 * np.pi, "rad/s"), (0.001, "kHz"), ([1, 1, 1, 1, 1, 5], "1 of 6 modes are .*, f6 ")):
         with pytest.raises(ValueError, match=message):
             identify_damage(fem, WEATHER, F * factors, GROUPS)
 
 
-def test_what_is_no_fitted_chain_or_cannot_be_damaged_is_named(fem):
-    F = simulated(fem)
+def test_what_is_no_fitted_chain_or_cannot_be_damaged_is_named(fem, healthy):
+    F = healthy
     with pytest.raises(ValueError, match=r"fem is AffineModel.*expected a fitted DataInformedFEM"):
         identify_damage(TRUSS, WEATHER, F)
     with pytest.raises(NotFittedError):

@@ -1,16 +1,16 @@
 """The ranking of several detectors: what is significant, and at equal false alarms."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp
 from sklearn.base import BaseEstimator, OutlierMixin
-from sklearn.ensemble import IsolationForest
 from sklearn.metrics import roc_auc_score
 
 from skthermo.datasets import make_truss_campaign
-from skthermo.detection import MahalanobisDetector, OutlierDetector
-from skthermo.studies import DetectabilityStudy, ProgressiveDamage, Scenario, sweep
-from tests.studies.studies import WEATHER, compensated, study_of
+from skthermo.detection import MahalanobisDetector
+from skthermo.studies import ProgressiveDamage, Scenario, sweep
+from tests.studies.studies import WEATHER, compensated, ran, study_of
 
 SIMULATED = "simulated"
 
@@ -35,11 +35,19 @@ class Dice(OutlierMixin, BaseEstimator):
         return self.score_samples(X) - self.share
 
 
+class Deaf(MahalanobisDetector):
+    """Such as a one-class SVM, whose index saturates far from its records."""
+
+    def decision_function(self, X):
+        return np.ones(len(X))
+
+
 def detectors():
     return {
         "raw": MahalanobisDetector(),
         "twin": MahalanobisDetector(),
         "dice": Dice(),
+        "deaf": Deaf(),
         "loud": MahalanobisDetector(0.1),
         "lines": compensated(),
         "broken": Dice(fails=True),
@@ -48,9 +56,8 @@ def detectors():
 
 @pytest.fixture(scope="module")
 def study(fem):
-    scenarios = [*sweep(fem, (0.1, 0.2), ["bottom"]), ProgressiveDamage("crack", {"top": 0.3}, 100, 300)]
-    study = study_of(fem, detectors(), scenarios, n_repeats=8)
-    study.run(WEATHER)
+    scenarios = [*sweep(fem, (0.1, 0.2), ["bottom"]), ProgressiveDamage("crack", {"top": 0.3}, 33, 100)]
+    study = ran(fem, scenarios, detectors(), n_repeats=6)
     return study
 
 
@@ -62,18 +69,18 @@ def table(study):
 def damaged(study, name):
     """Decisions on damaged records from the onset on, by scenario."""
     found = [study.decisions_[name, one.name, SIMULATED] for one in study.scenarios_ if not one.is_healthy]
-    return [*found[:-1], found[-1][:, 100:]]
+    return [*found[:-1], found[-1][:, 33:]]
 
 
 @pytest.mark.nightly
 def test_best_first_then_those_with_too_many_false_alarms_then_failures(table):
-    assert table.index.tolist() == ["lines", "raw", "twin", "dice", "loud", "broken"]
-    assert table["within_limit"].tolist() == [True] * 4 + [False] * 2
+    assert table.index.tolist() == ["lines", "raw", "twin", "dice", "deaf", "loud", "broken"]
+    assert table["within_limit"].tolist() == [True] * 5 + [False] * 2
     assert table.loc["loud", "false_alarms_ci_low"] > 0.02
-    assert table["error"].tolist() == [""] * 5 + ["OSError: no dice"]
+    assert table["error"].tolist() == [""] * 6 + ["OSError: no dice"]
     assert table.loc["broken"].drop(["within_limit", "significantly_worse", "error"]).isna().all()
     assert table["within_limit"].dtype == table["significantly_worse"].dtype == bool
-    ranked = table["pod"][:4]
+    ranked = table["pod"][:5]
     assert ranked.is_monotonic_decreasing
     assert table.loc["loud", "pod"] > table.loc["raw", "pod"]
 
@@ -90,37 +97,25 @@ def test_rates_are_means_of_those_of_the_results(study, table):
         assert row["pod bottom"] == pytest.approx(rates["rate"].iloc[1:3].mean())
         assert row["not_evaluated"] == 0
         smallest = study.minimum_detectable_damage(detector=name)["mdd"].iloc[0]
-        assert row["mdd bottom"] == smallest or np.isnan([row["mdd bottom"], smallest]).all()
-        assert row["time_to_detection"] == rates["time_to_detection"].iloc[1:].mean()
+        wait = rates["time_to_detection"].iloc[1:].mean()
+        for found, expected in ((row["mdd bottom"], smallest), (row["time_to_detection"], wait)):
+            assert found == expected or pd.isna([found, expected]).all()
 
 
 def test_equal_false_alarms_move_the_threshold_on_the_calibration_records(study, table):
     for name in table.index[:-1]:
         calibration = np.sort(study.calibration_[name, SIMULATED].ravel())
         threshold = calibration[int(0.02 * calibration.size)]
-        n_tied = (calibration == threshold).sum()  # resampled noise repeats some records
+        n_tied = (calibration == threshold).sum()
         assert 0 <= int(0.02 * calibration.size) - (calibration < threshold).sum() < n_tied
         pod = np.mean([(decisions < threshold).mean() for decisions in damaged(study, name)])
         assert table.loc[name, "pod_at_equal_pfa"] == pytest.approx(pod)
 
 
-@pytest.mark.nightly
-def test_a_moved_threshold_gives_the_asked_rate_on_fresh_records(fem, study):
-    for name in ("raw", "loud", "dice"):
-        calibration = np.sort(study.calibration_[name, SIMULATED].ravel())
-        threshold = calibration[int(0.02 * calibration.size)]
-        seeds = range(100, 120)
-        fresh = [fem.simulate(WEATHER, noise="fitted", random_state=seed) for seed in seeds]
-        alarms = sum((study.detectors_[name].decision_function(records) < threshold).sum() for records in fresh)
-        # The threshold scatters as a rate of its own number of records, which are fewer.
-        spread = np.sqrt(0.02 * 0.98 * (1 / calibration.size + 1 / (365 * len(seeds))))
-        assert alarms / (365 * len(seeds)) == pytest.approx(0.02, abs=3 * spread)
-
-
 def test_differences_of_the_rates_have_t_intervals_over_the_repeats(study, table):
     shares = {name: np.mean([(d < 0).mean(axis=1) for d in damaged(study, name)], axis=0) for name in table.index[:-1]}
     for name in table.index[1:-1]:
-        confidence = 1 - 0.05 / 4  # Bonferroni, four comparisons with the best
+        confidence = 1 - 0.05 / 5  # Bonferroni, five comparisons with the best
         difference = shares["lines"] - shares[name]
         lowest, highest = ttest_1samp(difference, 0).confidence_interval(confidence)
         assert table.loc[name, "pod_deficit"] == pytest.approx(difference.mean())
@@ -128,6 +123,7 @@ def test_differences_of_the_rates_have_t_intervals_over_the_repeats(study, table
             table.loc[name, ["pod_deficit_ci_low", "pod_deficit_ci_high"]].astype(float), [lowest, highest], atol=1e-9
         )
         assert table.loc[name, "significantly_worse"] == (lowest > 0)
+    assert table.loc["deaf", ["significantly_worse", "pod"]].tolist() == [True, 0.0]
     assert table.loc["lines", ["pod_deficit", "pod_deficit_ci_low", "pod_deficit_ci_high"]].tolist() == [0, 0, 0]
 
 
@@ -137,11 +133,8 @@ def test_equal_detectors_tie(study):
         columns = [name for name in table if not name.startswith("pod_deficit")]
         assert table.loc["raw", columns].tolist() == table.loc["twin", columns].tolist()
         assert table.loc["raw", "pod_deficit"] == table.loc["twin", "pod_deficit"]
-    pair = study_of(
-        study.fem, {"b": MahalanobisDetector(), "a": MahalanobisDetector()}, [{}, {"top": 0.2}], n_repeats=3
-    )
-    pair.run(WEATHER)
-    table = pair.ranking()
+    twins = {"b": MahalanobisDetector(), "a": MahalanobisDetector()}
+    table = ran(study.fem, [{}, {"top": 0.2}], twins, n_repeats=3).ranking()
     assert table.index.tolist() == ["a", "b"]
     assert (table[["pod_deficit", "pod_deficit_ci_low", "pod_deficit_ci_high"]] == 0).all(axis=None)
     assert not table["significantly_worse"].any()
@@ -153,11 +146,11 @@ def test_bounds_at_equal_false_alarms_hold_the_error_of_the_moved_thresholds(stu
         threshold = calibration[int(0.02 * calibration.size)]
         return np.mean([(decisions[kept] < threshold).mean() for decisions in damaged(study, name)])
 
-    table, repeats = study.ranking(by="pod_at_equal_pfa"), np.arange(8)
+    table, repeats = study.ranking(by="pod_at_equal_pfa"), np.arange(6)
     for name in ("raw", "dice"):
         without = np.array([found("lines", repeats != r) - found(name, repeats != r) for r in repeats])
-        pseudo = 8 * table.loc[name, "pod_deficit"] - 7 * without
-        lowest, highest = ttest_1samp(pseudo, 0).confidence_interval(1 - 0.05 / 4)
+        pseudo = 6 * table.loc[name, "pod_deficit"] - 5 * without
+        lowest, highest = ttest_1samp(pseudo, 0).confidence_interval(1 - 0.05 / 5)
         assert table.loc[name, "pod_deficit_ci_high"] - table.loc[name, "pod_deficit_ci_low"] == pytest.approx(
             highest - lowest
         )
@@ -178,35 +171,15 @@ def test_in_sentences(study, table):
     said = study.summary().splitlines()
     best = table.iloc[0]
     rates = f"{best['pod']:.1%} of the damaged records at a false-alarm rate of {best['false_alarms']:.1%}"
-    assert said[0] == f"'lines' detects {rates}."
-    assert said[1].startswith("Significantly worse at 95% confidence: 'raw' (")
-    assert "noise only" in said[2]
-    assert said[3].startswith("False-alarm rates above the limit of 2.0%: 'loud' (")
-    assert said[4] == "Stopped by an error: 'broken' (OSError: no dice)."
-
-
-def test_a_detector_whose_decisions_never_vary_is_significantly_worse(fem):
-    """Such as a one-class SVM, whose index saturates far from its records."""
-
-    class Deaf(MahalanobisDetector):
-        def decision_function(self, X):
-            return np.ones(len(X))
-
-    some = {"deaf": Deaf(), "raw": MahalanobisDetector()}
-    study = study_of(fem, some, [{}, {"top": 0.2}], n_repeats=4)
-    study.run(WEATHER)
-    table = study.ranking()
-    assert table.loc["deaf", ["significantly_worse", "pod"]].tolist() == [True, 0.0]
-    assert table.loc["deaf", "pod_deficit_ci_low"] > 0
-    assert "Significantly worse at 95% confidence: 'deaf'" in study.summary()
+    for words, line in zip(([rates, "'lines'"], ["'raw'", "'deaf'"], [], ["'loud'"], ["OSError"]), said, strict=True):
+        assert all(word in line for word in words)
 
 
 @pytest.mark.one_case
 @pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
 def test_without_other_noise_nothing_is_significant(fem, options):
     some = {"raw": MahalanobisDetector(), "lines": compensated()}
-    study = DetectabilityStudy(fem, some, [{}, {"top": 0.2}], random_state=0, uncertainty="noise", **options)
-    study.run(WEATHER)
+    study = ran(fem, [{}, {"top": 0.2}], some, **options)
     for by in ("pod", "pod_at_equal_pfa"):
         table = study.ranking(by=by)
         assert table[["pod_deficit_ci_low", "pod_deficit_ci_high"]].isna().all(axis=None)
@@ -215,11 +188,9 @@ def test_without_other_noise_nothing_is_significant(fem, options):
 
 
 def test_measured_records_rank_by_what_was_found(fem):
-    some = {"raw": MahalanobisDetector(), "lines": compensated(), "forest": OutlierDetector(IsolationForest())}
-    study = study_of(fem, some, [Scenario("healthy"), Scenario("top", {"top": 0.2})])
-    campaigns = {
-        name: make_truss_campaign(damage=d, random_state=1) for name, d in (("healthy", None), ("top", {"top": 0.2}))
-    }
+    some, damage = {"raw": MahalanobisDetector(), "lines": compensated()}, {"healthy": {}, "top": {"top": 0.2}}
+    study = study_of(fem, some, [Scenario(name, lost) for name, lost in damage.items()])
+    campaigns = {name: make_truss_campaign(damage=lost, random_state=1) for name, lost in damage.items()}
     study.run(WEATHER, reference={name: one.temperatures.join(one.frequencies) for name, one in campaigns.items()})
     table = study.ranking(source="reference")
     results = study.results_[study.results_["source"] == "reference"].set_index(["detector", "scenario"])["rate"]

@@ -8,33 +8,32 @@ import pytest
 from joblib import parallel_config
 from sklearn.base import clone
 
-from skthermo.datasets import make_truss, make_truss_campaign
+from skthermo.datasets import make_truss
 from skthermo.detection import MahalanobisDetector
-from skthermo.studies import DetectabilityStudy, Scenario, UncertainDamage, sweep
+from skthermo.studies import Scenario, UncertainDamage, sweep
 from skthermo.surrogate import refitted, resampled
+from tests.studies import studies as shared
+from tests.studies.studies import WEATHER, YEAR
 
 PARTS = ("noise", "weather", "baseline", "model")
-YEAR = make_truss_campaign(random_state=0)
-WEATHER = make_truss_campaign(random_state=1).temperatures
 MODELS = [make_truss().damaged({"bottom": loss}) for loss in (-0.03, 0.04, 0.0)]
 
 
 def study_of(fem, uncertainty, **options):
-    scenarios = sweep(fem, (0.1, 0.2), groups=["bottom"])
-    settings = {"n_repeats": 2, "n_replicates": 2, "random_state": 0} | options
-    return DetectabilityStudy(fem, MahalanobisDetector(), scenarios, uncertainty=uncertainty, **settings)
+    options = {"uncertainty": uncertainty, "n_replicates": 2, "noise": "fitted"} | options
+    return shared.study_of(fem, MahalanobisDetector(), sweep(fem, (0.1, 0.2), groups=["bottom"]), **options)
 
 
 @pytest.fixture(scope="module")
-def study(fem):
-    study = study_of(fem, PARTS, models=MODELS)
+def study(fem_of_few):
+    study = study_of(fem_of_few, PARTS, models=MODELS)
     study.run(WEATHER)
     return study
 
 
 @pytest.mark.nightly
-def test_repeats_do_not_depend_on_the_replicates(fem, study):
-    alone = study_of(fem, "noise")
+def test_repeats_do_not_depend_on_the_replicates(fem_of_few, study):
+    alone = study_of(fem_of_few, "noise")
     results = alone.run(WEATHER)
     left = study.results_.drop(columns=["pi_low", "pi_high"])
     pd.testing.assert_frame_equal(results.drop(columns=["pi_low", "pi_high"]), left)
@@ -48,10 +47,11 @@ def test_repeats_do_not_depend_on_the_replicates(fem, study):
 
 
 @pytest.mark.nightly
-def test_replicates_do_not_depend_on_the_number_of_jobs(fem):
+def test_results_do_not_depend_on_the_number_of_jobs(fem):
     study = study_of(fem, ("noise", "baseline", "weather"))
     twin = clone(study).set_params(n_jobs=2)
     results = study.run(WEATHER)
+    pd.testing.assert_frame_equal(twin.run(WEATHER), results)
     with parallel_config("threading"):
         pd.testing.assert_frame_equal(twin.run(WEATHER), results)
     pd.testing.assert_frame_equal(pickle.loads(pickle.dumps(twin)).uncertainty_, study.uncertainty_)
@@ -104,14 +104,8 @@ class Failing(Scenario):
 
 def test_replicates_that_fail_are_counted(fem, monkeypatch):
     years = [WEATHER, WEATHER + 0.1, WEATHER + 0.2, WEATHER + 0.3]
-    study = DetectabilityStudy(
-        fem,
-        MahalanobisDetector(),
-        [Failing("damage", {"bottom": 0.2})],
-        n_repeats=2,
-        uncertainty="weather",
-        n_replicates=4,
-    )
+    damage = [Failing("damage", {"bottom": 0.2})]
+    study = shared.study_of(fem, MahalanobisDetector(), damage, uncertainty="weather", n_replicates=4)
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.25)
     with pytest.warns(UserWarning, match="1 of 4 .*too warm.*no-solution"):
         study.run(years)
@@ -123,9 +117,7 @@ def test_replicates_that_fail_are_counted(fem, monkeypatch):
 
 def test_uncertain_damage_differs_from_replicate_to_replicate(fem):
     uncertain = UncertainDamage("some", pd.DataFrame({"bottom": np.linspace(0.05, 0.3, 6)}))
-    options = {"n_repeats": 2, "noise": 0.01, "uncertainty": "weather", "n_replicates": 4, "random_state": 0}
-    study = DetectabilityStudy(fem, MahalanobisDetector(), [uncertain], **options)
-    study.run(WEATHER)
+    study = shared.ran(fem, [uncertain], uncertainty="weather", n_replicates=4)
     rates = study.replicates_.rates["MahalanobisDetector", "some"][:, -1]
     assert len(np.unique(rates.round(2))) == 4
 
