@@ -1,10 +1,12 @@
 """Files of a synthetic bridge that a newcomer tries the commands on."""
 
 import pandas as pd
+import pytest
 
-from tests.commands.folders import run
+from tests.commands.folders import edit, run
 
 
+@pytest.mark.usefixtures("one_detector")
 def test_the_files_follow_each_other_and_the_other_commands_take_them(tmp_path):
     folder = tmp_path / "trial"
     done = run("demo", folder)
@@ -21,4 +23,5 @@ def test_the_files_follow_each_other_and_the_other_commands_take_them(tmp_path):
     assert (damaged[list(F)].median() / new[list(F)].median() - 1).max() < 0
 
     assert run("init", folder / "T.csv", folder / "F.csv", "--into", folder / "bridge").code == 0
+    edit(folder / "bridge" / "monitor.toml", "# until = ...", f'until = "{T.index[240].isoformat()}"')  # enough to fit
     assert run("fit", folder / "bridge").code == 0

@@ -9,7 +9,6 @@ import os
 import shutil
 import signal
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -137,21 +136,14 @@ def test_a_line_of_transitions_that_was_cut_off_is_written_again(bridge, after, 
     assert_goes_on(bridge, records, after)
 
 
-def test_a_damaged_line_of_transitions_is_named_by_its_number(bridge, after, records):
-    file = bridge / "transitions.jsonl"
-    file.write_text('{"bridge": "another", "id": 1}\nnonsense\n', encoding="utf-8")
-    done = run("update", bridge, "--now", str(records.index[LAST - 1]))
-    assert "line 2 of" in done.err
-    assert "transitions.jsonl is damaged" in done.err
-    assert done.code == ALARM
-
-
-def test_what_a_killed_run_has_left_of_the_metrics_is_removed(bridge, records):
+def test_a_damaged_line_of_transitions_is_named_and_what_a_killed_run_has_left_is_removed(bridge, records):
+    (bridge / "transitions.jsonl").write_text('{"bridge": "another", "id": 1}\nnonsense\n', encoding="utf-8")
     left = [bridge / f".metrics.prom.{name}.unfinished" for name in ("old", "new")]
     for file in left:
         file.touch()
     os.utime(left[0], (0, 0))
-    run("update", bridge, "--now", str(records.index[LAST - 1]))
+    done = night(bridge, records)
+    assert (done.code, "line 2 of" in done.err, "transitions.jsonl is damaged" in done.err) == (ALARM, True, True)
     assert [file.exists() for file in left] == [False, True]  # another process may be at work on a new one
 
 
@@ -209,52 +201,3 @@ def test_a_wrong_clock_of_the_computer_changes_no_evaluation(bridge, after, reco
     assert done.code == ALARM
     monkeypatch.undo()
     assert_goes_on(bridge, records, after)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("change", ["one less", "text", "empty"])
-def test_columns_that_have_changed(bridge, before, after, records, change):
-    file = bridge / "new" / f"{records.index[DAMAGED]:%Y-%m-%d}.csv"
-    good, table = file.read_text(), records[DAMAGED:LAST]
-    texts = {
-        "one less": table.drop(columns="f3").to_csv(),
-        "text": table.astype(str).assign(f3="fault").to_csv(),
-        "empty": "\n",
-    }
-    file.write_text(texts[change])
-    done = night(bridge, records, "--json")
-    (said,) = done.json["bridges"]
-    assert (done.code, len(said["errors"])) == (FAILED, 1)
-    assert str(file) in said["errors"][0]
-    assert not assert_is_before_or_after(bridge, before, after)
-    file.write_text(good)
-    assert_goes_on(bridge, records, after)
-
-
-@pytest.mark.nightly
-def test_an_hour_that_comes_twice(tmp_path):
-    """Hourly records by a clock that goes back in October: each night's decisions are those of times in UTC."""
-    random = np.random.default_rng(0)
-    utc = pd.date_range("2026-08-01", "2026-10-29", freq="h", tz="UTC")
-    warm = 10 + 8 * np.sin(np.arange(len(utc)) / 24 * 2 * np.pi) + random.normal(0, 1, len(utc))
-    table = pd.DataFrame({"T1": warm, "f1": 4 - 0.005 * warm + random.normal(0, 0.01, len(utc))}, utc)
-    local, end = table.tz_convert("Europe/Brussels"), "2026-10-23"
-    monitors = []
-    for name, shown, zone in (
-        ("utc", table, "UTC"),
-        ("local", local.tz_localize(None), "Europe/Brussels"),
-        ("offsets", local, "Europe/Brussels"),
-    ):
-        days = local.index.strftime("%Y-%m-%d")
-        shown[days < end].to_csv(tmp_path / "all.csv")
-        made = run("init", tmp_path / "all.csv", "--into", tmp_path / name, "--zone", zone)
-        edit(tmp_path / name / "monitor.toml", '# page = "status.html"', 'page = ""')
-        assert (made.code, run("fit", tmp_path / name / "monitor.toml").code) == (0, 0)
-        for day in sorted(set(days[days >= end])):
-            shown[days == day].to_csv(tmp_path / name / "new" / f"{day}.csv")
-            run("update", tmp_path / name / "monitor.toml", "--now", f"{day} 23:59")
-        monitors.append(load_monitor(tmp_path / name / "monitor.joblib"))
-    evaluated = [one.evaluations_.tz_convert("UTC") for one in monitors]
-    assert len(evaluated[0]) > 120
-    for one in evaluated[1:]:
-        pd.testing.assert_frame_equal(one, evaluated[0], check_names=False, check_freq=False)

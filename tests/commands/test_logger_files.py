@@ -3,7 +3,6 @@
 import io
 import re
 import sys
-import warnings
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,6 +14,7 @@ from skthermo.commands._bridge import check_layout, read_baseline, read_columns
 from skthermo.commands._settings import read_settings
 from skthermo.preprocessing import read_records
 from tests.commands.folders import run
+from tests.nights import by_day
 
 FAILED = 3
 N = 80  # records of a file
@@ -78,14 +78,9 @@ def toa5(width, records=RECORDS):
     """Four header lines, the first of which is as long as the records if these have eight columns."""
     names, *cells = rows(records)
     more = [f"V{n}" for n in range(width - 5)]
-    first = ["TOA5", "Bridge", "CR1000X", "1234", "CR1000X.Std.05", "CPU:bridge.CR1X", "5678", "Hourly"]
-    units = ["TS", "RN", "Deg C", "Hz", "", *("Volts" for _ in more)]
-    head = [
-        first,
-        ["TIMESTAMP", "RECORD", *names[1:], *more],
-        units,
-        ["", "", "Avg", "Avg", "Avg", *("Smp" for _ in more)],
-    ]
+    head = [["TOA5", "Bridge", "CR1000X", "1234", "CR1000X.Std.05", "CPU:bridge.CR1X", "5678", "Hourly"],
+            ["TIMESTAMP", "RECORD", *names[1:], *more], ["TS", "RN", "Deg C", "Hz", "", *("Volts" for _ in more)],
+            ["", "", "Avg", "Avg", "Avg", *("Smp" for _ in more)]]  # fmt: skip
     body = [[f'"{stamp}"', str(n), *(one or '"NAN"' for one in values), *("12.5" for _ in more)]
             for n, (stamp, *values) in enumerate(cells)]  # fmt: skip
     return quoted(head), body
@@ -96,7 +91,7 @@ def with_column(cells, name, values, place=None):
     return [[*row[:place], cell, *row[place:]] for row, cell in zip(cells, [name, *values], strict=True)]
 
 
-def workbook(cells, truth=RECORDS, more=(), before=()):
+def workbook(cells, truth=RECORDS, more=()):
     """An Excel workbook in which numbers are numbers and times are times."""
     openpyxl = pytest.importorskip("openpyxl")
     book, file = openpyxl.Workbook(), io.BytesIO()
@@ -104,8 +99,6 @@ def workbook(cells, truth=RECORDS, more=(), before=()):
         book.active.append([None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row])
     for name in more:
         book.create_sheet(name).append(["notes"])
-    for name in before:
-        book.create_sheet(name, 0).append(["a report"])
     book.save(file)
     return Log({"log.xlsx": file.getvalue()}, truth)
 
@@ -120,13 +113,7 @@ def in_cells(records=RECORDS, *stamps):
 
 def with_commas(cells, *columns):
     """Numbers of some columns as texts with decimal commas."""
-    return [
-        [
-            repr(cell).replace(".", ",") if isinstance(cell, float) and n in columns else cell
-            for n, cell in enumerate(row)
-        ]
-        for row in cells
-    ]
+    return [[comma(c) if isinstance(c, float) and n in columns else c for n, c in enumerate(row)] for row in cells]
 
 
 def with_texts_for_times(cells):
@@ -162,18 +149,13 @@ def changed(place, value, column="T1", records=RECORDS):
     return records
 
 
-def markers(*texts, write=repr):
-    """Cells of a file in which missing temperatures are written in several ways."""
-    records = RECORDS.copy()
-    records.iloc[10 : 10 + len(texts), 0] = np.nan
-    cells = rows(records, write=write, missing="NaN")
-    for n, text in enumerate(texts):
-        cells[11 + n][1] = text
-    return cells, records
-
-
 def marked(*texts, separator=",", write=repr):
-    cells, truth = markers(*texts, write=write)
+    """Missing temperatures that are written in several ways."""
+    truth = RECORDS.copy()
+    truth.iloc[10 : 10 + len(texts), 0] = np.nan
+    cells = rows(truth, write=write, missing="NaN")
+    for row, text in zip(cells[11:], texts, strict=False):
+        row[1] = text
     return log(cells, separator, truth=truth)
 
 
@@ -209,12 +191,11 @@ UNDERSTOOD = {
     "separators after a title": lambda: log([["Bridge", "", "", ""], ["Logger", "12", "", ""], *rows()], ";"),
     "separators to the width of a spreadsheet": lambda: log(
         [[*row, "", "", ""] for row in [["Bridge", "", "", ""], *rows()]]),
-    "#N/A": lambda: marked("#N/A", "#NA", "n/a", "NULL"),
-    "1.#QNAN": lambda: marked("1.#QNAN", "-1.#IND", "1.#QNAN0", "-nan(ind)"),
+    "marks of missing values": lambda: marked(
+        "#N/A", "#NA", "n/a", "NULL", "1.#QNAN", "-1.#IND", "1.#QNAN0", "-nan(ind)"),
     "1,#QNAN": lambda: marked("1,#QNAN", "-1,#IND00", separator=";", write=comma),
-    "errors of a spreadsheet": lambda: marked("#DIV/0!", "#VALUE!", "#REF!", "#NUM!"),
-    "dashes": lambda: marked("-", "--", "---"),
-    "infinity": lambda: marked("INF", "-INF", "1.#INF", "-1.#INF00"),
+    "dashes, infinity and errors of a spreadsheet": lambda: marked(
+        "-", "--", "---", "INF", "-INF", "1.#INF", "-1.#INF00", "#DIV/0!", "#VALUE!", "#REF!", "#NUM!"),
     "thousands in quotes": lambda: log(quoted(rows(write=thousands(",", ".")))),
     "thousands by points": lambda: log(rows(RECORDS, GERMAN, write=thousands(".", ",")), ";"),
     "thousands by narrow spaces": lambda: log(rows(RECORDS, GERMAN, write=thousands("\u202f", ",")), ";"),
@@ -237,7 +218,6 @@ UNDERSTOOD = {
     "seconds since 1970 after counts": lambda: log(
         with_column(rows(UTC, lambda one: f"{one.timestamp():.0f}"), "RECORD", COUNTS, 0), truth=UTC),
     "written dates after numbers like serial dates": lambda: log(with_column(rows(), "RECORD", COUNTS, 0)),
-    "a workbook, with midnights": lambda: workbook(in_cells(EARLY), truth=EARLY),
     "a workbook with titles and units": lambda: workbook(
         [["Bridge"], ["Logger", 12], [], in_cells()[0], [None, "degC", "Hz", "um/m"], *in_cells()[1:]], more=["Notes"]),
     "a workbook with dates and times": lambda: workbook(in_cells(RECORDS, pd.Timestamp.date, pd.Timestamp.time)),
@@ -245,7 +225,6 @@ UNDERSTOOD = {
     "a workbook with decimal commas as texts": lambda: workbook(with_commas(in_cells(), *range(9))),
     "a workbook with decimal commas in a column": lambda: workbook(with_commas(in_cells(), 2)),
     "a workbook in which some times are texts": lambda: workbook(with_texts_for_times(in_cells())),
-    "a workbook with a cover": lambda: workbook(in_cells(), before=["cover"]),
     "names and units again": lambda: log([*rows()[:1], ["", "degC", "Hz", ""], *rows()[1:9], rows()[0],
                                           ["", "degC", "Hz", ""], *rows()[9:]]),
     "names again as the last line": lambda: log([*rows(), rows()[0]]),
@@ -332,7 +311,7 @@ LATER = {
 """Logs that come after a plain one: the place that is named, or None for those that are read."""
 
 
-pytestmark = pytest.mark.usefixtures("one_detector")
+pytestmark = [pytest.mark.usefixtures("one_detector"), pytest.mark.filterwarnings("ignore:.*read-as")]
 
 
 def write(one, folder):
@@ -360,24 +339,30 @@ def assert_read(found, truth):
     )  # fmt: skip
 
 
-@pytest.mark.filterwarnings("ignore:.*read-as")
+def assert_settings_read(file, truth):
+    """The baseline of the settings has all records."""
+    made = read_settings(file)
+    baseline, _ = read_baseline(list(map(made.path, made.records.baseline)), made.csv, made.records)
+    assert_read(baseline, truth)
+    assert list(baseline) == [*made.records.temperatures, *made.records.responses] == list(truth)
+
+
 @pytest.mark.parametrize("kind", UNDERSTOOD)
 def test_what_loggers_write_is_read_as_it_was_meant(kind, tmp_path):
     one = UNDERSTOOD[kind]()
+    names = list(one.truth)
+    chosen = {name[2:]: value for name, value in pairwise(one.options) if name in ("--zone", "--stamps")}
+    T, F = read_records(*write(one, tmp_path), temperatures=names[:1], responses=names[1:], **chosen)
+    assert_read(T.join(F), one.truth)
+    assert [list(T), list(F)] == [names[:1], names[1:]]
+
+
+@pytest.mark.parametrize("kind", by_day([*UNDERSTOOD][::4], at_night=UNDERSTOOD))
+def test_the_settings_of_what_loggers_write_read_it_again(kind, tmp_path):
+    one = UNDERSTOOD[kind]()
     done, file = begin(one, tmp_path)
     assert done.code == 0, done.err
-    settings = read_settings(file)
-    files = [settings.path(name) for name in settings.records.baseline]
-    baseline, _ = read_baseline(files, settings.csv, settings.records)
-    assert_read(baseline, one.truth)
-    assert list(baseline) == list(one.truth)
-    chosen = {"temperatures": settings.records.temperatures, "responses": settings.records.responses}
-    chosen |= {name[2:]: value for name, value in pairwise(one.options) if name in ("--zone", "--stamps")}
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", ".*read-as")
-        T, F = read_records(*(tmp_path / name for name in one.files), **chosen)
-    assert_read(T.join(F), one.truth)
-    assert [list(T), list(F)] == [settings.records.temperatures, settings.records.responses]
+    assert_settings_read(file, one.truth)
 
 
 @pytest.mark.parametrize("kind", REFUSED)
@@ -400,21 +385,23 @@ def assert_one_error(text, folder, *parts):
         assert part in lines[0]
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """Settings that were made of a plain log."""
+    return read_settings(begin(log(rows()), tmp_path_factory.mktemp("plain"))[1])
+
+
 @pytest.mark.parametrize("kind", LATER)
-def test_later_files_of_another_form_are_read_or_refused(kind, tmp_path):
+def test_later_files_of_another_form_are_read_or_refused(kind, plain, tmp_path):
     make, place = LATER[kind]
-    done, file = begin(log(rows()), tmp_path)
-    assert done.code == 0, done.err
-    settings = read_settings(file)
-    (tmp_path / "later").mkdir()
-    (later,) = write(make(), tmp_path / "later")
+    (later,) = write(make(), tmp_path)
     if place is None:
-        table = read_columns(later, settings.csv, settings.records)
-        check_layout(table, later, settings.records, [])
+        table = read_columns(later, plain.csv, plain.records)
+        check_layout(table, later, plain.records, [])
         assert_read(table, RECORDS)
         return
     with pytest.raises(ValueError, match=re.escape(str(later))) as refused:
-        check_layout(read_columns(later, settings.csv, settings.records), later, settings.records, [])
+        check_layout(read_columns(later, plain.csv, plain.records), later, plain.records, [])
     assert place in str(refused.value)
     assert "\n" not in str(refused.value)
 
@@ -427,15 +414,15 @@ IN_CELLS = {
 
 
 @pytest.mark.parametrize("first", IN_CELLS)
-@pytest.mark.parametrize("then", IN_CELLS)
-def test_dates_serial_dates_and_texts_of_a_workbook_mean_the_same(first, then, tmp_path):
+def test_dates_serial_dates_and_texts_of_a_workbook_mean_the_same(first, tmp_path):
     done, file = begin(workbook(in_cells(RECORDS, IN_CELLS[first])), tmp_path)
     assert done.code == 0, done.err
     settings = read_settings(file)
-    cells = in_cells(RECORDS, IN_CELLS[then])
-    cells[5:20] = in_cells(RECORDS, IN_CELLS["dates"])[5:20]
-    (later,) = write(workbook(cells), tmp_path)
-    assert_read(read_columns(later, settings.csv, settings.records), RECORDS)
+    for then in IN_CELLS.values():
+        cells = in_cells(RECORDS, then)
+        cells[5:20] = in_cells(RECORDS, IN_CELLS["dates"])[5:20]
+        (later,) = write(workbook(cells), tmp_path)
+        assert_read(read_columns(later, settings.csv, settings.records), RECORDS)
 
 
 @pytest.mark.one_case
@@ -447,12 +434,9 @@ def test_a_workbook_beside_a_text_of_another_form_is_read(kind, tmp_path):
     for order in (files, dict(reversed(files.items()))):
         place = tmp_path / next(iter(order))[0]
         place.mkdir()
-        one = Log(order, RECORDS, ("--temperatures", "T1", "--responses", "f1", "s1"))
-        done, file = begin(one, place)
+        done, file = begin(Log(order, RECORDS, ("--temperatures", "T1", "--responses", "f1", "s1")), place)
         assert done.code == 0, done.err
-        settings = read_settings(file)
-        baseline, _ = read_baseline(list(map(settings.path, settings.records.baseline)), settings.csv, settings.records)
-        assert_read(baseline, RECORDS)
+        assert_settings_read(file, RECORDS)
 
 
 @pytest.mark.parametrize("first", ["dates", "serial dates"])

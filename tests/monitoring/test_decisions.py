@@ -1,5 +1,7 @@
 """Events and states of damage indices by the rule of persistence, release and hold."""
 
+import copy
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -30,31 +32,36 @@ class GivenIndex(BaseEstimator):
         return -X["f"].to_numpy()
 
 
-def monitor_of(stamps, threshold=3.0, release=2.0, persistence=3):
-    """A monitor of damage indices with given levels, before the first of some stamps."""
-    step, rng = stamps[1] - stamps[0], np.random.default_rng(0)
-    n = max(100, int(pd.Timedelta("14D") / step))
-    before = pd.DataFrame({"f": rng.uniform(1, 2, n)}, pd.date_range(end=stamps[0] - step, periods=n, freq=step))
-    monitor = Monitor(GivenIndex(), targets=["f"], sensors=False, persistence=persistence).fit(before)
+@cache
+def fitted(start, step, persistence):
+    """A monitor of damage indices before some time."""
+    rng, n = np.random.default_rng(0), max(100, int(pd.Timedelta("14D") / step))
+    before = pd.DataFrame({"f": rng.uniform(1, 2, n)}, pd.date_range(end=start - step, periods=n, freq=step))
+    return Monitor(GivenIndex(), targets=["f"], sensors=False, persistence=persistence).fit(before)
+
+
+def after(indices, threshold=3.0, release=2.0, persistence=3, n_batches=1):
+    """A monitor with given levels after a series of damage indices, and its answers."""
+    first, second = indices.index[:2]
+    monitor = copy.deepcopy(fitted(first, second - first, persistence))
     monitor.threshold_, monitor.clear_threshold_ = threshold, release
-    return monitor
+    parts = np.array_split(np.arange(len(indices)), n_batches)
+    return monitor, pd.concat([monitor.update(indices.iloc[rows].to_frame("f")) for rows in parts])
 
 
 @pytest.mark.parametrize("name", LEVELS)
 def test_the_same_indices_give_the_states_and_events_of_version_0_2(name):
     recorded = pd.read_csv(RECORDED / f"{name}.csv.gz", index_col="time", parse_dates=True)
     threshold, release, n_events = LEVELS[name]
-    monitor = monitor_of(recorded.index, threshold, release)
-    for _, part in recorded.groupby(np.arange(len(recorded)) // 500):
-        monitor.update(part[["index"]].set_axis(["f"], axis=1))
-    assert (monitor.evaluations_["state"] == recorded["state"]).mean() > 0.999
+    monitor, answers = after(recorded["index"], threshold, release, n_batches=len(recorded) // 500 + 1)
+    assert (answers["state"] == recorded["state"]).mean() > 0.999
     assert monitor.events_["n_times"].sum() == n_events
 
 
-def answers_to(indices, freq="6h", **levels):
-    stamps = pd.date_range("2026-01-01", periods=len(indices), freq=freq)
-    monitor = monitor_of(stamps, **levels)
-    return monitor, monitor.update(pd.DataFrame({"f": np.asarray(indices, dtype=float)}, stamps))
+def answers_to(indices, **options):
+    """The same of damage indices every six hours."""
+    stamps = pd.date_range("2026-01-01", periods=len(indices), freq="6h")
+    return after(pd.Series(np.asarray(indices, dtype=float), stamps), **options)
 
 
 def test_three_of_five_records_above_the_threshold_open_an_event_and_two_do_not():
@@ -97,7 +104,7 @@ def test_an_event_opens_by_a_number_of_the_last_records_that_were_evaluated(rule
 
 def test_a_number_of_records_is_that_many_of_twice_as_many_less_one():
     indices = np.random.default_rng(3).uniform(0, 5, 300)
-    (one, answers), (two, same) = (answers_to(indices, persistence=rule) for rule in (3, [3, 5]))
+    (one, answers), (two, same) = (answers_to(indices, persistence=rule) for rule in (3, (3, 5)))
     pd.testing.assert_frame_equal(answers, same)
     pd.testing.assert_frame_equal(one.events_, two.events_)
     assert one.smallest_changes_.as_dict() == two.smallest_changes_.as_dict()

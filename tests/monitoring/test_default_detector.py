@@ -1,7 +1,6 @@
 """The detector of a monitor to which none is given."""
 
-import pickle
-import warnings
+import copy
 
 import numpy as np
 import pandas as pd
@@ -11,20 +10,18 @@ from skthermo.datasets import make_truss, make_truss_campaign
 from skthermo.detection import CompensatedDetector, DirectionalDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
 from skthermo.surrogate import DataInformedFEM
+from tests.monitoring.nightly import joined, quietly
 
 MODES = [f"f{mode}" for mode in range(1, 7)]
 
 
 def records(damage=None, seed=0, start="2025-01-01"):
-    campaign = make_truss_campaign(damage=damage, random_state=seed)
-    table = campaign.temperatures.join(campaign.frequencies)
+    table = joined(make_truss_campaign(damage=damage, random_state=seed))
     return table.set_index(pd.date_range(start, periods=len(table), freq="1D"))
 
 
 def fitted(**options):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a year in which one event is expected
-        return Monitor(**options).fit(records())
+    return quietly(Monitor(**options).fit, records())
 
 
 @pytest.mark.nightly
@@ -46,48 +43,38 @@ LOSSES = {"bottom": 0.15, "top": 0.15, "diagonal": 0.1, "bottom ": -0.2}
 
 
 @pytest.mark.parametrize(
-    ("window", "groups"),
+    ("detector", "groups"),
     [
-        (7, ["diagonal"]),
-        pytest.param(7, ["bottom "], marks=pytest.mark.nightly),
-        pytest.param(None, [*LOSSES], marks=pytest.mark.nightly),
+        (None, ["diagonal"]),
+        pytest.param({"window": 7}, ["diagonal", "bottom "], marks=pytest.mark.nightly),
+        pytest.param({"window": None}, [*LOSSES], marks=pytest.mark.nightly),
     ],
+    ids=str,
 )
-def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_loss(fem, window, groups):
-    detector = CompensatedDetector(DirectionalDetector(fem), targets=MODES, window=window)
+def test_events_name_the_damage_groups_that_explain_them_and_none_of_what_is_no_loss(fem, detector, groups):
+    if detector is not None:
+        detector = CompensatedDetector(DirectionalDetector(fem), targets=MODES, **detector)
     fresh = fitted(detector=detector, fem=fem)
+    last = fresh.detector_.detectors_[0]
+    assert isinstance(last, DirectionalDetector)
+    assert last.directions is fem
+    assert list(last.directions_.index[:5]) == ["bottom", "top", "diagonal", "vertical", "bottom, section"]
     for group in groups:
         loss = LOSSES[group]
-        changed = records({group.strip(): loss}, 1, "2026-01-01")[:30]
-        whole, by_day = clone_fitted(fresh), clone_fitted(fresh)
-        answers = whole.update(changed)
-        parts = pd.concat([by_day.update(changed[start : start + 4]) for start in range(0, len(changed), 4)])
-        assert (answers["groups"] == parts["groups"]).all()
+        changed = records({group.strip(): loss}, 1, "2026-01-01")[:28]
+        whole, parts = copy.deepcopy(fresh), copy.deepcopy(fresh)
+        answers, of_parts = whole.update(changed), [parts.update(changed[:20]), parts.update(changed[20:])]
+        assert (answers["groups"] == pd.concat(of_parts)["groups"]).all()
         event = whole.events_.iloc[-1]
         assert event["kind"] == "damage"
         assert event["groups"].split(", ")[0] == (group if loss > 0 else "")
         assert event["size"] == pytest.approx(loss, rel=0.3) if loss > 0 else np.isnan(event["size"])
-        assert list(whole.status("2026-01-31").events[-1]["groups"]) == [g for g in event["groups"].split(", ") if g]
-
-
-def clone_fitted(monitor):
-    return pickle.loads(pickle.dumps(monitor))
-
-
-def test_a_chain_gives_the_directions_of_its_groups(fem):
-    monitor = fitted(fem=fem)
-    last = monitor.detector_.detectors_[0]
-    assert isinstance(last, DirectionalDetector)
-    assert last.directions is fem
-    assert list(last.directions_.index[:5]) == ["bottom", "top", "diagonal", "vertical", "bottom, section"]
-    monitor.update(records({"bottom": 0.08}, 1, "2026-01-01")[:14])
-    assert monitor.status(monitor.last_).state == "alarm"
+        status, names = whole.status("2026-01-29"), [name for name in event["groups"].split(", ") if name]
+        assert (status.state, list(status.events[-1]["groups"])) == ("alarm", names)
 
 
 def test_without_temperatures_the_detector_sees_the_responses_alone():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        monitor = Monitor(units="Hz", targets=MODES).fit(records()[MODES])
+    monitor = quietly(Monitor(units="Hz", targets=MODES).fit, records()[MODES])
     assert isinstance(monitor.detector_, DirectionalDetector)
     with pytest.raises(ValueError, match="targets"):
         Monitor().fit(records())

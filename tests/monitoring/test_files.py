@@ -1,6 +1,5 @@
 """A saved monitor goes on where it stopped, and what is no whole monitor is refused."""
 
-import copy
 import json
 import sys
 import zipfile
@@ -18,7 +17,7 @@ from skthermo.datasets import make_truss
 from skthermo.detection import MahalanobisDetector
 from skthermo.monitoring import Monitor, load_monitor
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, TemperatureMapper
-from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor, truss_records
+from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history, fitted_monitor
 
 ENDINGS = ("joblib", "skops")
 each_form = pytest.mark.parametrize("ending", ENDINGS)
@@ -26,16 +25,6 @@ each_form = pytest.mark.parametrize("ending", ENDINGS)
 
 class OwnRegression(LinearRegression):
     """A regressor of a package that skthermo does not know."""
-
-
-@pytest.fixture(scope="module")
-def records():
-    return truss_records()
-
-
-@pytest.fixture
-def monitor(truss_monitor):
-    return copy.deepcopy(truss_monitor)
 
 
 @pytest.fixture

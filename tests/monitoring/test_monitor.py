@@ -2,7 +2,7 @@
 
 import copy
 import pickle
-import warnings
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -15,14 +15,10 @@ from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 
-from skthermo.detection import (
-    CompensatedDetector,
-    MahalanobisDetector,
-    OutlierDetector,
-    TemperatureCompensator,
-)
+from skthermo.detection import CompensatedDetector, MahalanobisDetector, OutlierDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import HingeFeatures, LagFeatures
+from tests.monitoring.nightly import quietly
 
 TEMPERATURES, MODES = ["T1", "T2", "T3"], ["f1", "f2", "f3"]
 N_BASELINE, N_SERVICE = 1000, 100  # six-hourly: 250 and 25 days
@@ -84,8 +80,7 @@ DETECTORS = {
     "raw": MahalanobisDetector(),
     "lags": make_pipeline(compensator(lagged()), MahalanobisDetector()),
     "mean by time": whole(lagged(), "36h"),
-    "mean by number": whole(lagged(), 5),
-    "neighbours, mean by number": whole(KNeighborsRegressor(20), 6),
+    "mean by number": whole(KNeighborsRegressor(20), 6),
     "hinges, mean by time": whole(HINGES, "2D"),
     "forest": make_pipeline(compensator(lagged()), FOREST),
 }
@@ -96,20 +91,20 @@ SETTINGS = settings(
     phases=[Phase.generate],  # a smaller example would take minutes
     suppress_health_check=list(HealthCheck),
 )
-_fitted = {}
+
+
+@cache
+def of_baseline(name, **options):
+    """A fitted monitor, its answers to all records at once, and how it stands then."""
+    monitor = quietly(Monitor(DETECTORS[name], targets=MODES, **options).fit, BASELINE)
+    after = copy.deepcopy(monitor)
+    return monitor, quietly(after.update, SERVICE), after
 
 
 def fitted(name, **options):
-    """A fitted monitor, its answers to all records at once, and how it stands then."""
-    key = (name, *options.items())
-    if key not in _fitted:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            monitor = Monitor(DETECTORS[name], targets=MODES, **options).fit(BASELINE)
-            after = copy.deepcopy(monitor)
-            _fitted[key] = monitor, after.update(SERVICE), after
-    monitor, answers, after = _fitted[key]
-    return copy.deepcopy(monitor), answers, after
+    """The same with a monitor that may be changed."""
+    monitor, *others = of_baseline(name, **options)
+    return copy.deepcopy(monitor), *others
 
 
 def last_of_each(parts):
@@ -119,7 +114,7 @@ def last_of_each(parts):
 
 def assert_same_history(monitor, answers, after, parts):
     pd.testing.assert_frame_equal(last_of_each(parts)[ANSWER], answers[ANSWER], check_exact=True)
-    for name in ("events_", "days_", "evaluations_", "faults_", "records_", "corrected_"):
+    for name in ("events_", "days_", "evaluations_", "faults_", "records_", "corrected_", "weeks_"):
         pd.testing.assert_frame_equal(getattr(monitor, name), getattr(after, name), check_exact=True)
     for count in ("n_records", "n_not_evaluated", "n_left_out"):
         assert monitor.counts_[count] == after.counts_[count]
@@ -153,9 +148,7 @@ def test_indices_are_those_of_the_detector_on_all_records(name):
     service = ALL[N_BASELINE:].drop(ALL.index[-50:-40])
     answers = monitor.update(service)
     columns = MODES if name == "raw" else list(ALL)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        expected = -monitor.detector_.score_samples(pd.concat([BASELINE, service])[columns])
+    expected = -quietly(monitor.detector_.score_samples, pd.concat([BASELINE, service])[columns])
     np.testing.assert_allclose(answers["index"], expected[N_BASELINE:], atol=1e-6)
 
 
@@ -164,10 +157,8 @@ def test_days_summarise_their_records():
     _, answers, after = fitted("mean by time")
     by_day = answers.groupby(answers.index.normalize())
     assert after.days_["n_records"].tolist() == by_day.size().tolist()
-    assert (
-        after.days_["n_evaluated"].tolist()
-        == (answers["state"] != "not evaluated").groupby(by_day.ngroup()).sum().tolist()
-    )
+    n_evaluated = (answers["state"] != "not evaluated").groupby(by_day.ngroup()).sum()
+    assert after.days_["n_evaluated"].tolist() == n_evaluated.tolist()
     np.testing.assert_array_equal(after.days_["index_max"], by_day["index"].max())
     np.testing.assert_array_equal(after.days_["index_median"], by_day["index"].median())
 
@@ -218,25 +209,22 @@ def test_known_records_are_repeated_or_refused():
     assert pickle.dumps(monitor) == saved
 
 
-@pytest.mark.parametrize(
-    ("change", "match"),
-    [
-        (
-            lambda records: records.rename(columns={"T2": "T9"}),
-            r"lack the columns \['T2'\] of the baseline, and have \['T9'\]",
-        ),
-        (lambda records: records.reset_index(drop=True), "expected a DatetimeIndex"),
-        (lambda records: records.astype({"f1": object}).assign(f1="5 Hz"), "5 Hz"),
-        (lambda records: records.tz_localize("UTC"), "time zone UTC, the baseline None"),
-        (pd.DataFrame.to_numpy, "of type ndarray; expected a frame"),
-    ],
-)
-def test_records_that_cannot_be_read_leave_the_monitor_as_it_was(change, match):
+UNREADABLE = {
+    r"lack the columns \['T2'\] of the baseline, and have \['T9'\]": lambda new: new.rename(columns={"T2": "T9"}),
+    "expected a DatetimeIndex": lambda new: new.reset_index(drop=True),
+    "5 Hz": lambda new: new.astype({"f1": object}).assign(f1="5 Hz"),
+    "time zone UTC, the baseline None": lambda new: new.tz_localize("UTC"),
+    "of type ndarray; expected a frame": pd.DataFrame.to_numpy,
+}
+
+
+def test_records_that_cannot_be_read_leave_the_monitor_as_it_was():
     monitor, _, _ = fitted("lags")
     monitor.update(SERVICE[:10])
     saved = pickle.dumps(monitor)
-    with pytest.raises(ValueError, match=match):
-        monitor.update(change(SERVICE[10:15]))
+    for match, change in UNREADABLE.items():
+        with pytest.raises(ValueError, match=match):
+            monitor.update(change(SERVICE[10:15]))
     assert pickle.dumps(monitor) == saved
 
 

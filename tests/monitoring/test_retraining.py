@@ -1,6 +1,5 @@
 """Laws of retraining: what may train, when a new detector takes over, and a new baseline after an intervention."""
 
-import warnings
 from copy import deepcopy
 
 import numpy as np
@@ -12,27 +11,17 @@ from sklearn.pipeline import make_pipeline
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import MahalanobisDetector, TemperatureCompensator
 from skthermo.monitoring import Monitor
+from tests.monitoring.nightly import joined, quietly
 
 YEAR = 365
 STATES = {"healthy": {}, "damaged": {"bottom": 0.3}, "small": {"bottom": 0.015}, "repaired": {"diagonal": -0.15}}
 SAME = {"check_freq": False, "check_index_type": False}
-WEEK, DAY = pd.Timedelta("7D"), pd.Timedelta("1D").value
+WEEK = pd.Timedelta("7D")
 
 
-def joined(campaign):
-    return campaign.temperatures.join(campaign.frequencies)
-
-
-def quietly(call, *args, **settings):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what a year tells of one alarm a year
-        return call(*args, **settings)
-
-
-def put_into_service(healthy, last=None):
+def put_into_service(healthy):
     targets = [name for name in healthy if name.startswith("f")]
-    compensator = TemperatureCompensator(LinearRegression(), targets=targets)
-    detector = make_pipeline(compensator, last or MahalanobisDetector())
+    detector = make_pipeline(TemperatureCompensator(LinearRegression(), targets=targets), MahalanobisDetector())
     return quietly(Monitor(detector, sensors=False, random_state=0, persistence=1).fit, healthy[:YEAR])
 
 
@@ -54,14 +43,6 @@ def fitted(records):
 @pytest.fixture
 def monitor(fitted):
     return deepcopy(fitted)
-
-
-@pytest.fixture(scope="module")
-def with_event(fitted, records):
-    """A monitor after a year with seven weeks of damage."""
-    healthy, monitor = records["healthy"], deepcopy(fitted)
-    quietly(monitor.update, pd.concat([healthy[YEAR:450], records["damaged"][450:500], healthy[500 : 2 * YEAR]]))
-    return monitor
 
 
 @pytest.fixture(scope="module")
@@ -96,8 +77,9 @@ def test_nothing_new_changes_nothing(monitor, records):
 
 
 @pytest.mark.nightly
-def test_rows_of_an_event_never_train(with_event):
-    monitor = deepcopy(with_event)
+def test_rows_of_an_event_never_train(monitor, records):
+    healthy, damaged = records["healthy"], records["damaged"][450:500]  # seven weeks
+    quietly(monitor.update, pd.concat([healthy[YEAR:450], damaged, healthy[500 : 2 * YEAR]]))
     event = monitor.events_.loc[1]
     found = quietly(monitor.refit)
     assert not found.baseline.index.to_series().between(event["start"] - WEEK, event["end"]).any()
@@ -129,6 +111,8 @@ def test_after_an_intervention_indices_are_as_before(renewed, fitted, records):
     assert monitor.status(monitor.last_).state == "healthy"
     assert monitor.events_["end"].notna().all()
     assert monitor.events_["note"].str.contains("new baseline").any()
+    what = [one["what"] for one in monitor.transitions()]
+    assert "closed" in what[what.index("rebaseline") :]
     later = slice(YEAR + 21, 2 * YEAR)
     fresh, old = decisions(monitor, records["repaired"][later]), decisions(fitted, records["healthy"][later])
     ratios = [float((one["index"] / one["threshold"]).median()) for one in (fresh, old)]

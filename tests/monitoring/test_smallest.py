@@ -30,28 +30,26 @@ def bridge(n_days=500, noise=0.003, slope=1e-3, seed=0):
     return pd.DataFrame(np.hstack([T, F]), stamps, ["T1", "T2", *MODES])
 
 
-def fitted(records, last=None, **options):
-    window = "1D" if last is None else None
-    detector = CompensatedDetector(last or MahalanobisDetector(), LinearRegression(), targets=MODES, window=window)
+def fitted(records, window="1D", **options):
+    detector = CompensatedDetector(MahalanobisDetector(), LinearRegression(), targets=MODES, window=window)
     return Monitor(detector, **options).fit(records)
 
 
 @cache
-def of_a_year(last=None, rule=3):
+def of_a_year(window, rule):
     """Its monitor after a year, to be copied before it is changed."""
-    return fitted(bridge()[:"2025"], last, persistence=rule)
+    return fitted(bridge()[:"2025"], window, persistence=rule)
+
+
+DAILY = [(None, 3, MODES), (None, (4, 6), ["f3"])]
+EACH = [(last, rule, modes) for last in (None, "1D") for rule in (3, (4, 6)) for modes in (MODES, ["f1"], ["f3"])]
 
 
 @pytest.mark.parametrize(
-    "modes", [MODES, ["f3"], *(pytest.param([mode], marks=pytest.mark.nightly) for mode in MODES[:2])], ids=str
+    ("window", "rule", "modes"), [pytest.param(*one, marks=() if one in DAILY else pytest.mark.nightly) for one in EACH]
 )
-@pytest.mark.parametrize("rule", [3, (4, 6)], ids=str)
-@pytest.mark.parametrize(
-    "last",
-    [pytest.param(None, id="window", marks=pytest.mark.nightly), pytest.param(MahalanobisDetector(), id="record")],
-)
-def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_records_below(modes, last, rule):
-    monitor, share = copy.deepcopy(of_a_year(last, rule)), 0.5 if rule == 3 else 3.5 / 6
+def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_records_below(window, rule, modes):
+    monitor, share = copy.deepcopy(of_a_year(window, rule)), 0.5 if rule == 3 else 3.5 / 6
     changes = monitor.smallest_changes_
     size = changes.common if len(modes) > 1 else changes.single[modes[0]]
     new = bridge()["2026":"2026-02"].copy()
@@ -81,7 +79,7 @@ def test_responses_about_zero_have_falls_in_their_units_and_none_in_common():
 def test_a_short_baseline_says_in_its_warning_what_is_seen():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        monitor = fitted(bridge(noise=0.01)[: 24 * PER_DAY], MahalanobisDetector())
+        monitor = fitted(bridge(noise=0.01)[: 24 * PER_DAY], None)
     (found,) = [one for one in caught if "few-records" in str(one.message)]
     assert issubclass(found.category, FewRecordsWarning)
     assert str(monitor.smallest_changes_) in str(found.message)
