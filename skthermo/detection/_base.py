@@ -16,13 +16,14 @@ from sklearn.utils.metaestimators import available_if
 from skthermo._core.arrays import NORMAL, Array, spread_evenly
 from skthermo._core.estimators import Estimator, Interval, _fit_context, check_is_fitted, validate_data
 from skthermo._core.frames import row_times
+from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.numbers import independent_records
 
 
-class DamageIndexMixin(OutlierMixin):
+class DamageIndexMixin(SavesFrames, OutlierMixin):
     """Alarms of a detector that has a threshold, from the damage index that ``_index_of(X)`` gives each record."""
 
     offset_: float

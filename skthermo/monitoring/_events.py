@@ -17,6 +17,7 @@ from scipy.stats import nbinom
 
 from skthermo._core.arrays import Array
 from skthermo._core.frames import DAY, YEAR
+from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.text import counted_number, duration_text, percent, plain
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, ResultWarning, SkthermoWarning
 
@@ -590,7 +591,7 @@ def crossing(steps: Array, ratios: Array) -> float:
 
 
 @dataclass(frozen=True)
-class SmallestChanges:
+class SmallestChanges(SavesFrames):
     """Falls of responses that raise an alarm: enough of the records are above a threshold, ``within`` a time.
 
     ``common`` is that of all responses by one share, NaN where some are not positive throughout; ``single`` that of

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, median, robust_deviation
 from skthermo._core.frames import check_duration, has_stamps
+from skthermo._core.saved_frames import SavesFrames
 
 Regimes = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class WindowMeans:
+class WindowMeans(SavesFrames):
     """Trailing means of residuals, and what they need of the baseline.
 
     ``width`` is the number of records in the longest window; ``limits``, (n_regimes, 2, n_targets), are the lowest and

@@ -33,7 +33,7 @@ def page_of(monitor, now=None, limit=0.1):
 
 @functools.cache
 def usual_page():
-    """The page on a monitor of which nothing is to be told."""
+    """The page on a healthy monitor."""
     return page_of(FakeMonitor())
 
 
