@@ -17,7 +17,7 @@ from sklearn.multioutput import MultiOutputRegressor
 from sklearn.pipeline import FeatureUnion, Pipeline
 from sklearn.utils import get_tags
 
-from skthermo._core.arrays import Array, as_floats, is_model
+from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import BaseSearchCV, _BaseImputer, fit_checked, fit_outputs, last_step, predict_with_std
 from skthermo._core.frames import column_names
 from skthermo.preprocessing import BlockedKFold
@@ -87,7 +87,7 @@ def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:
     """A clone fitted to the rows that it can take; where gaps of the targets differ, a clone for each target."""
     usable = np.ones(inputs.shape[0], dtype=bool) if takes_nan(estimator) else are_complete(inputs)
     present, last = ~np.isnan(as_floats(F)), last_step(estimator)
-    if is_model(getattr(last, "model", None)) or getattr(last, "_leaves_out_gaps", False):  # as a chain does itself
+    if getattr(last, "_leaves_out_gaps", False):  # as a chain does itself
         present[:] = True
     rows = usable[:, np.newaxis] & present
     if not rows.any(axis=0).all():

@@ -200,6 +200,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     True
     """
 
+    _leaves_out_gaps = True
     _parameter_constraints: dict = {
         "model": [HasMethods(["frequencies"])],
         "inverse": [HasMethods(["fit", "transform"]), None],
