@@ -143,7 +143,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("detection/_base.py", "detection/test_thresholds.py"): [
         ("blocks longer than the memory", "np.clip(number / 4, 5, 50)", "50"),
     ],
-    ("residuals/baseline.py", "surrogate/test_uncertainty.py"): [
+    ("residuals/baseline.py", "residuals/test_baseline.py"): [
         ("spread of the same period", "np.where(test[:, np.newaxis], np.nan, self.values)", "self.values"),
         ("spread beyond the range", " * (1 + beyond)[:, np.newaxis]", ""),
         ("order statistic", "(len(scores) + 1) * confidence", "len(scores) * confidence"),
