@@ -356,7 +356,7 @@ def midnight(stamp: pd.Timestamp) -> pd.Timestamp:
 
 
 def midnights_between(first: pd.Timestamp, last: pd.Timestamp) -> pd.DatetimeIndex:
-    """The first moment of each calendar day from that of one stamp to that of another."""
+    """The first moment of each calendar day from the day of one stamp to the day of another."""
     ends = (stamp.tz_localize(None).normalize() for stamp in (first, last))
     return _localized(pd.date_range(*ends, freq="D"), first.tz).as_unit(first.unit)
 

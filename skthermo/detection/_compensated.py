@@ -108,7 +108,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
 
     Notes
     -----
-    The damage index is that of the regime's detector. In the second regime it is multiplied by the ratio of both
+    The regime's detector gives the damage index. In the second regime it is multiplied by the ratio of both
     thresholds, so that one threshold holds for all records. Records of `fit` are the history of the windows of later
     records. Rows have to be in order of time where a window is asked for.
 
@@ -378,7 +378,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         return frame_like(Z, self.means_(Z, regime)), regime, findings
 
     def _ratio(self, number: int) -> float:
-        """Threshold of the first regime's detector over that of another regime."""
+        """Threshold of the first regime's detector over the threshold of another regime's."""
         return self.detectors_[0].threshold_ / self.detectors_[number].threshold_
 
     def _chosen_regime(self, X: Any, T: Any, R: Array, healthy: Rows) -> tuple[Any, float] | None:

@@ -79,7 +79,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     regression_ : object
         The estimator behind its first transformers, which takes the rows that have all inputs.
     normal_ : object
-        Normal distribution of the residuals of the baseline, of which `score` is the likelihood.
+        Normal distribution of the residuals of the baseline; `score` is a likelihood under it.
     sensors_ : object
         Regression of each of the other columns on the others: ``sensors_.fill(T)`` and ``sensors_.departures(T)``.
     training_range_ : object
@@ -110,9 +110,9 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     for either end.
 
     ``fit_transform(X)`` differs from ``fit(X).transform(X)`` by design: it predicts each row of the baseline by a clone
-    fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than those of new
-    records. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``. Rows should be
-    in order of time.
+    fitted on the other folds, because residuals of rows that a regressor was fitted on are smaller than residuals of
+    new records. In a pipeline, a detector that follows gets these out-of-fold residuals in its own ``fit``. Rows should
+    be in order of time.
 
     Targets whose residuals are farther than eight robust standard deviations from the median do not train the
     regression a second time; their residuals stay. A missing temperature is filled from the other sensors of its row. A
@@ -198,7 +198,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64]: ...
     @_fit_context(prefer_skip_nested_validation=False)
     def fit_transform(self, X: ArrayLike, y: ArrayLike | None = None) -> NDArray[np.float64] | pd.DataFrame:
-        """Fit on all rows of a baseline, and give its out-of-fold residuals; errors and warnings are those of `fit`.
+        """Fit on all rows of a baseline, and give its out-of-fold residuals, with the errors and warnings of `fit`.
 
         Parameters
         ----------
@@ -244,8 +244,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         Warns
         -----
         UserWarning
-            If temperatures are missing or far outside those of `fit`; if a sensor departs from what the others predict,
-            as one that drifts or is stuck does; if rows cannot be predicted.
+            If temperatures are missing or far outside their range in `fit`; if a sensor departs from what the others
+            predict, as one that drifts or is stuck does; if rows cannot be predicted.
         """
         residuals, _, findings = self.evaluated(X)
         warn_each(findings)
@@ -281,7 +281,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     @overload
     def extrapolation_distance(self, X: ArrayLike) -> NDArray[np.float64]: ...
     def extrapolation_distance(self, X: ArrayLike) -> NDArray[np.float64] | pd.DataFrame:
-        """How far the temperatures of records lie outside those of the baseline.
+        """How far the temperatures of records lie outside their range in the baseline.
 
         Parameters
         ----------

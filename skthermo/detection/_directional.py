@@ -65,7 +65,7 @@ class DirectionalDetector(MahalanobisDetector):
     covariance_ : estimator
         Fitted: mean (``location_``) and covariance of the baseline.
     baseline_index_ : ndarray of shape (n_samples,)
-        Damage index of the baseline; with the conformal threshold, each record's index from those of other folds.
+        Damage index of the baseline; with the conformal threshold, each record's index from records of other folds.
     n_independent_ : float
         Number of independent records that the residuals of the baseline are worth, or its indices where columns are
         frequencies.
@@ -111,7 +111,7 @@ class DirectionalDetector(MahalanobisDetector):
     70%
     85%
 
-    Who looks for losses of section too finds those of stiffness less often. The smallest ones of the last detector:
+    Who looks for losses of section too finds losses of stiffness less often. The smallest ones of the last detector:
 
     >>> detector.minimum_detectable_damage()[["bottom", "top", "diagonal"]].round(2)
     direction
@@ -144,7 +144,7 @@ class DirectionalDetector(MahalanobisDetector):
         self.threshold = threshold
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        # those of a chain that gives the directions are its own
+        # a chain that gives the directions keeps its own
         return {name: value for name, value in super().get_params(deep).items() if not name.startswith("directions__")}
 
     def __sklearn_clone__(self) -> DirectionalDetector:
@@ -191,7 +191,7 @@ class DirectionalDetector(MahalanobisDetector):
 
     @property
     def _cones(self) -> dict[str, NDArray[np.intp]]:
-        """Numbers of the directions of each kind of loss that has some, those of section last."""
+        """Numbers of the directions of each kind of loss that has some, losses of section last."""
         are_section = self.directions_.index.str.endswith(", section")
         numbers = {"stiffness": np.flatnonzero(~are_section), "section": np.flatnonzero(are_section)}
         return {kind: own for kind, own in numbers.items() if len(own)}
@@ -244,7 +244,7 @@ class DirectionalDetector(MahalanobisDetector):
         return np.divide(np.minimum(lengths, distances) ** 2, distances**2, out=shares, where=distances > 0)
 
     def pod(self, severities: ArrayLike, *, kind: Literal["stiffness", "section"] = "stiffness") -> pd.DataFrame:
-        """Probability of detection of single records: of those of the baseline, with its gaps, moved by a loss.
+        """Probability of detection of single records: records of the baseline, with its gaps, moved by a loss.
 
         Parameters
         ----------

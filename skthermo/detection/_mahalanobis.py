@@ -49,7 +49,7 @@ class MahalanobisDetector(DamageDetector):
     covariance_ : estimator
         Fitted: mean (``location_``) and covariance of the baseline.
     baseline_index_ : ndarray of shape (n_samples,)
-        Damage index of the baseline; with the conformal threshold, each record's distance from those of other folds.
+        Damage index of the baseline; with the conformal threshold, each record's distance from records of other folds.
     n_independent_ : float
         Number of independent records that the residuals of the baseline are worth, or its indices where columns are
         frequencies, from the variance of the means of a dozen parts.

@@ -172,7 +172,7 @@ def split_pipeline(estimator: BaseEstimator) -> tuple[Pipeline | None, BaseEstim
 
 
 def takes_nan(estimator: BaseEstimator) -> bool:
-    """Whether an estimator accepts NaN in X, also inside a wrapper, of which scikit-learn's tag does not say so."""
+    """Whether an estimator accepts NaN in X, also inside a wrapper whose tag in scikit-learn does not say so."""
     if estimator is None or isinstance(estimator, str):  # "passthrough" or "drop"
         return True
     if isinstance(estimator, Pipeline):

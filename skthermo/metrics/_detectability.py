@@ -206,6 +206,6 @@ def _share_above(damage_index: ArrayLike, threshold: float) -> float:
     index, limit = _checked(damage_index, threshold)
     present = index[~np.isnan(index)]
     if len(present) < len(index):
-        text = "records without a damage index (NaN) are not evaluated. The rate is that of the others"
+        text = "records without a damage index (NaN) are not evaluated. The rate counts the others"
         warn_each([UnevaluatedRowsWarning(text, "not-evaluated")])
     return float((present > limit).mean()) if present.size else float("nan")

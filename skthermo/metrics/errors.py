@@ -86,7 +86,7 @@ def error_table(y_true: ArrayLike, y_pred: ArrayLike, *, scenarios: Sequence[Any
     if pd.isna(labels).any():
         raise ValueError(f"the scenario of row {np.flatnonzero(pd.isna(labels))[0]} is missing; expected one")
     if "Average" in labels:
-        raise ValueError("a scenario is called 'Average'; expected another name: it is that of the averages")
+        raise ValueError("a scenario is called 'Average'; expected another name: the averages have it")
     table = pd.DataFrame(
         {label: _percentages(measured[labels == label], predicted[labels == label]) for label in dict.fromkeys(labels)},
         index=column_names(y_true, "f"),

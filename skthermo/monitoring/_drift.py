@@ -75,7 +75,7 @@ def lasting_covariance(rest: Array, n_columns: int, lags: int = 10, n_waves: int
 
     ``rest`` has a row a day, NaN where a mode is missing, from a regression on so many columns. What is left of them
     by the day before is summed with its products up to some lags apart (Newey and West). What lasts for months, such
-    as moisture, shows in the slowest waves over all days, a few of which the regression has taken: where these are
+    as moisture, shows in the slowest waves over all days (the regression has taken a few of them): where these are
     larger, they count.
     """
     n_days, rest = (~np.isnan(rest)).sum(axis=0), np.nan_to_num(rest)
@@ -103,7 +103,7 @@ class DailyRegression:
     """Ln f of each mode on the weather of the day and, last, on columns of time, with noise that lasts.
 
     ``change`` are the coefficients of time, (n_modes, n_times), and ``covariance`` is theirs, mode by mode; ``rest``
-    are residuals by day, and ``freedom`` is that of their noise.
+    are residuals by day, and ``freedom`` counts the degrees of freedom of their noise.
     """
 
     change: Array
@@ -615,7 +615,7 @@ class ParameterHistory(Sentences):
         Raises
         ------
         ValueError
-            If F is no frame with times, or has other modes; if values are no frequencies, all of which it lists.
+            If F is no frame with times, or has other modes; if values are no frequencies: the error lists them all.
         """
         if not has_stamps(F) or list(getattr(F, "columns", [])) != list(self.shifts.columns):
             raise ValueError(

@@ -144,8 +144,8 @@ def alike(one: Array, other: Array, cosine: float = 0.7) -> bool:
 class Run:
     """Records in a row, ``first`` up to ``stop``, in which a level is open, and what departs in them.
 
-    ``level`` is that of each record, NaN where there is none, and ``direction`` the mean departure of the responses.
-    ``effects`` and ``losses`` of damage groups are sums over its records, or over ``n_weeks`` of means.
+    ``level`` is the level of each record, NaN where there is none, and ``direction`` the mean departure of the
+    responses. ``effects`` and ``losses`` of damage groups are sums over its records, or over ``n_weeks`` of means.
     """
 
     kind: str
@@ -172,7 +172,7 @@ class Run:
 class Parts:
     """Departures of modes, effects and losses of damage groups in some rows of a table, summed.
 
-    Names and order are those of another table, of weeks; 0 where the table has none.
+    Another table, of weeks, gives names and order; 0 where the table has none.
     """
 
     def __init__(self, table: pd.DataFrame, weeks: pd.DataFrame):
@@ -193,7 +193,7 @@ class Events:
     another event. No event goes on beyond a new baseline. Values of sensors that have failed have events of their own.
 
     ``table`` has a row for each event, counted from 1; ``sign`` is its first sign. ``answered`` is the table with what
-    the owner has said of each. ``runs`` are those of each event.
+    the owner has said of each. ``runs`` are the runs of each event.
     """
 
     def __init__(
@@ -320,7 +320,7 @@ class Events:
         """How the structure stands at each record by its events, whether it is evaluated or not, and the event.
 
         What the owner has answered of an event holds for later records up to one and a half times the level that it had
-        reached; that of a mean of 30 days goes on to rise for so long after a change. After damage that is known,
+        reached; the level of a mean of 30 days goes on to rise for so long after a change. After damage that is known,
         nothing is healthy until a new baseline.
         """
         states, numbers = np.full(len(self.times), "healthy", dtype=object), np.zeros(len(self.times), dtype=np.int64)
@@ -352,7 +352,7 @@ class Events:
     def set_aside(self, number: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether each record is in an event of responses that were set aside which nobody has explained, or in any.
 
-        The numbers of records without another event become those of faults.
+        Records without another event get the numbers of faults in ``number``, in its place.
         """
         is_unexplained, is_set_aside = np.zeros((2, len(self.times)), dtype=bool)
         for place, run in ((place, run) for place, runs in self.runs.items() for run in runs if run.kind == FAULT):
@@ -414,7 +414,7 @@ def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = 7 * DAY) -> NDArra
 
 
 def level_exceeded(peaks: Array, times: float, n_highest: int = 16) -> float:
-    """The level that a healthy structure exceeds so many times, in as long a time as that of the peaks, on average.
+    """The level that a healthy structure exceeds so many times on average, in as long a time as the peaks come from.
 
     Peaks are in descending order, of times that are independent of each other. The k-th highest peak is exceeded k
     times. The highest one is exceeded once, and the squares beyond it are taken as exponential, like the k highest
@@ -431,7 +431,7 @@ def level_exceeded(peaks: Array, times: float, n_highest: int = 16) -> float:
 
 
 def times_exceeded(peaks: Array, level: float, n_highest: int = 16) -> float:
-    """How often a healthy structure exceeds a level, in as long a time as that of the peaks, on average.
+    """How often a healthy structure exceeds a level on average, in as long a time as the peaks come from.
 
     The inverse of `level_exceeded`, at most once beyond the highest peak.
     """
@@ -594,7 +594,7 @@ def crossing(steps: Array, ratios: Array) -> float:
 class SmallestChanges(SavesFrames):
     """Falls of responses that raise an alarm: enough of the records are above a threshold, ``within`` a time.
 
-    ``common`` is that of all responses by one share, NaN where some are not positive throughout; ``single`` that of
+    ``common`` is the fall of all responses by one share, NaN where some are not positive throughout; ``single`` of
     each alone, a share where ``is_relative``, else in its unit. ``groups`` are losses of stiffness of damage groups, of
     a detector that has their directions. NaN where no fall or loss is seen.
     """

@@ -230,7 +230,7 @@ def fit_fleet(
         Where each bridge is kept as soon as it is fitted, a file for each. The same call goes on where the first was
         stopped, and fits anew what has changed. By default all is kept in memory.
     n_jobs : int, optional
-        Number of bridges that are worked on at once; each has one core. By default that of the active
+        Number of bridges that are worked on at once; each has one core. By default the number of jobs of the active
         ``joblib.parallel_config``, else 1.
     random_state : int, RandomState or None, default=0
         With the name of a bridge, the seed of all its parts that have none. With None, each call fits all anew.
@@ -388,7 +388,7 @@ class Fleet:
     >>> Fleet("no such folder")
     Traceback (most recent call last):
     ...
-    ValueError: the folder 'no such folder' holds no bridge; expected that of a fit_fleet
+    ValueError: the folder 'no such folder' holds no bridge; expected the folder of a fit_fleet
     """
 
     def __init__(self, folder: str | os.PathLike[str]):
@@ -397,7 +397,7 @@ class Fleet:
         self._kept: dict[Hashable, Any] = {}
         self._read()
         if not self._known:
-            raise ValueError(f"the folder {str(folder)!r} holds no bridge; expected that of a fit_fleet")
+            raise ValueError(f"the folder {str(folder)!r} holds no bridge; expected the folder of a fit_fleet")
 
     @classmethod
     def _in(cls, folder: Path | None) -> Fleet:
@@ -568,7 +568,7 @@ class Fleet:
             raise ValueError(f"records are {records!r:.100}; expected a mapping of the names of bridges to new records")
         if unknown := [name for name in records if name not in self._known]:
             raise ValueError(
-                f"names of records are those of no bridge ({unknown!r:.200}); expected names of the {len(self)} bridges"
+                f"records have names of no bridge ({unknown!r:.200}); expected names of the {len(self)} bridges"
             )
         answers: dict[Hashable, pd.DataFrame] = {}
         with only_user(self._folder):
@@ -622,7 +622,7 @@ class Fleet:
         Parameters
         ----------
         now : str or datetime, optional
-            The time. By default that of the computer's clock; if records have no time zone, the local time.
+            The time. By default the computer's clock tells it; if records have no time zone, the local time.
         max_age : str or timedelta, optional
             Age of a newest record beyond which nothing is healthy. By default the usual time between the records of
             the bridge, and two days more.
@@ -745,11 +745,11 @@ class Discoveries:
         in the monitor's ``events_``), ``start``, ``end``, ``peak``, ``modes``, ``p_value``, ``acknowledged``, and
         ``is_discovery``: it is open, and its bridge is significant.
     p_values : Series
-        By bridge that was evaluated: that of its highest open event, 1 without one.
+        By bridge that was evaluated: p value of its highest open event, 1 without one.
     level : float
         P value up to which bridges are significant.
     not_evaluated : list
-        Names of bridges with a monitor of which nothing is known: they count neither as healthy nor as significant.
+        Names of bridges with a monitor that has evaluated nothing: they count neither as healthy nor as significant.
     false_discoveries_per_year : float
         Expected number of bridges with a significant event in a year at this level, if all are healthy.
     false_alarms_per_year : float
@@ -859,5 +859,5 @@ def events_since(monitor: Monitor, begin: pd.Timestamp) -> tuple[pd.DataFrame, f
 
 
 def without_zone(stamp: pd.Timestamp) -> pd.Timestamp:
-    """A stamp of UTC without a time zone, by which those of all bridges can be compared."""
+    """A stamp of UTC without a time zone, so that stamps of all bridges can be compared."""
     return stamp if stamp.tzinfo is None else stamp.tz_convert("UTC").tz_localize(None)

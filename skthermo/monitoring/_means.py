@@ -22,12 +22,12 @@ from skthermo.residuals.mean_errors import MeanErrors, chance_of
 
 @dataclass(frozen=True)
 class MeanTest(SavesFrames):
-    """Whether the mean of the residuals of the last ``n_days`` is that of the baseline.
+    """Whether the mean of the residuals of the last ``n_days`` has stayed as in the baseline.
 
-    ``errors`` are those of means of days, None where the baseline is too short to tell them. ``chance`` is the largest
-    probability of a mean that counts as moved, and ``scales`` are standard deviations of what the detector sees.
-    ``directions`` are relative changes of the modes by a loss of each damage group, None without; those that cannot be
-    distinguished are ``joined`` under one name.
+    ``errors`` are the errors of means of days, None where the baseline is too short to tell them. ``chance`` is the
+    largest probability of a mean that counts as moved, and ``scales`` are standard deviations of what the detector
+    sees. ``directions`` are relative changes of the modes by a loss of each damage group, None without; those that
+    cannot be distinguished are ``joined`` under one name.
     """
 
     errors: MeanErrors | None

@@ -89,8 +89,8 @@ class Monitor(SavesFrames, Estimator):
         directions of ``fem`` if there is one, and a `~skthermo.detection.MahalanobisDetector` any others: only
         frequencies have a side on which damage lies.
     targets : sequence of str, optional
-        Names of the responses: natural frequencies, or any others of any sign and unit. By default those of the
-        compensator, else those that ``fem`` was fitted on; with a compensator, they have to be its own.
+        Names of the responses: natural frequencies, or any others of any sign and unit. By default the targets of the
+        compensator, else the modes that ``fem`` was fitted on; with a compensator, they have to be its own.
     reference : sequence of str, optional
         Names of columns with temperatures from elsewhere, such as a weather station or a reanalysis. They check the
         thermometers and fill their gaps, and are no inputs of the detector.
@@ -184,8 +184,8 @@ class Monitor(SavesFrames, Estimator):
         Values of the baseline that cannot be, and count as missing: a row for each finding, as in
         `~skthermo.preprocessing.RecordFindings`.
     columns_, reference_, features_ : list
-        Names of the columns that `fit` saw, which `update` expects, those of ``reference`` among them, and those that
-        the detector sees.
+        Names of the columns that `fit` saw and `update` expects, names of the ``reference`` among them, and columns
+        that the detector sees.
     trained_ : DataFrame
         What the detector in charge was fitted on: the baseline, or what `refit` or `rebaseline` made of it.
     prior_, since_ : DataFrame and Timestamp, or None
@@ -348,7 +348,7 @@ class Monitor(SavesFrames, Estimator):
 
     @property
     def faults_(self) -> pd.DataFrame:
-        """Sensors that have failed, those of columns that are left out first."""
+        """Sensors that have failed, columns that are left out first."""
         found = self.corrections_.faults(self.states_[-1])
         if not self.left_out_:
             return found
@@ -405,8 +405,8 @@ class Monitor(SavesFrames, Estimator):
         ------
         ValueError
             If the records are no frame on a ``DatetimeIndex`` with each stamp once; if the responses are not known, or
-            not those of the compensator; if values make the baseline useless, such as kelvin or a frequency of 1e6, all
-            of which the error lists; if the detector looks at later records, farther back than its parts tell, or
+            not the targets of the compensator; if values make the baseline useless, such as kelvin or a frequency of
+            1e6 (the error lists them all); if the detector looks at later records, farther back than its parts tell, or
             drops large changes.
 
         Warns
@@ -425,7 +425,7 @@ class Monitor(SavesFrames, Estimator):
         given, of_clocks = without_wrong_clocks(X, read_records(X))
         if not len(given):
             raise ValueError(
-                "the baseline has no records; expected those of the healthy structure, of a year if possible"
+                "the baseline has no records; expected records of the healthy structure, of a year if possible"
             )
         if given.index.has_duplicates:
             again = given.index[given.index.duplicated()]
@@ -586,7 +586,7 @@ class Monitor(SavesFrames, Estimator):
             fallen = lowered(records, {name: fall * records[name] for name in self.targets_})
             is_blind = is_outside & (self._index(fallen)[place:] <= self.threshold_) & (notes["n_held"] == 0)
         remarks = {
-            "extrapolated: temperatures outside those of the baseline": is_outside,
+            "extrapolated: temperatures outside the range of the baseline": is_outside,
             f"even a fall of all responses by {100 * fall:.2g} % would stay undetected": is_blind,
         }
         said = [causes(new, self.targets_, temperatures, index, self._outages()), notes["note"]]
@@ -731,8 +731,8 @@ class Monitor(SavesFrames, Estimator):
         Parameters
         ----------
         now : str or datetime, optional
-            The time, such as that of the newest record, ``last_``. By default that of the computer's clock; if the
-            records have no time zone, the local time.
+            The time, such as the stamp of the newest record, ``last_``. By default the computer's clock tells it; if
+            the records have no time zone, the local time.
         max_age : str or timedelta, optional
             Age of the newest record beyond which nothing is healthy. By default the usual time between records, and
             two days more.
@@ -766,12 +766,12 @@ class Monitor(SavesFrames, Estimator):
             "withdrawn" (late records, or a sensor that has failed, have shown that there was no event), "acknowledged",
             "fault" or "put back" (a sensor), "refit", "rebaseline" or "discarded". ``time``: when it happened, by the
             stamps of the records. ``newest``: the newest record when it was reported. ``event``: the number of the
-            event, 0 for none. ``kind``: that of the event or fault. ``column``: the sensor, else "". ``detail``: text.
+            event, 0 for none. ``kind``: kind of the event or fault. ``column``: the sensor, else "". ``detail``: text.
 
         Raises
         ------
         ValueError
-            If ``after`` is not a number from 0 to that of the newest entry.
+            If ``after`` is not a number from 0 to the number of the newest entry.
 
         Notes
         -----
@@ -960,7 +960,7 @@ class Monitor(SavesFrames, Estimator):
         Parameters
         ----------
         since : str or Timestamp
-            When the intervention was complete. Records from then on are those of the structure as it is now.
+            When the intervention was complete. Records from then on show the structure as it is now.
         until : str or Timestamp, optional
             The last moment whose records may train; by default all may.
 

@@ -61,7 +61,7 @@ def read_records(X: Any, columns: list[Any] | None = None, zone: Any = None) -> 
         X = X.loc[:, list(columns)]
     refuse_no_table(X, "the table of records")
     stamps = X.index.as_unit("ns")
-    stamps.freq = None  # that of one batch is not that of its parts
+    stamps.freq = None  # a batch and its parts differ in it
     frame = pd.DataFrame(as_floats(X), stamps, X.columns)
     return frame if X.index.is_monotonic_increasing else frame.sort_index(kind="stable")
 
@@ -100,8 +100,8 @@ def refuse_other_units(new: pd.DataFrame, baseline: pd.DataFrame, far: float = 1
     for name in units:
         if (beyond["degrees Celsius"] > far).all() and (beyond[name] <= 0).all():
             raise ValueError(
-                f"the temperatures {list(known)} of {counted(len(new), 'record')} are far from those of this season in "
-                f"the baseline, and within them as in {name}; expected degrees Celsius, as in the baseline"
+                f"the temperatures {list(known)} of {counted(len(new), 'record')} are far from the season's values "
+                f"in the baseline, and within them as in {name}; expected degrees Celsius, as in the baseline"
             )
 
 
@@ -109,7 +109,7 @@ def refuse_other_units(new: pd.DataFrame, baseline: pd.DataFrame, far: float = 1
 class Intake:
     """What a batch brings: ``fresh`` records to evaluate, and others with the reasons why they are not evaluated.
 
-    ``ahead`` are all records that are set aside as stamped too far ahead, ``early`` those of this batch.
+    ``ahead`` are all records that are set aside as stamped too far ahead, ``early`` the ones of this batch.
     """
 
     fresh: pd.DataFrame
@@ -252,7 +252,7 @@ def _reach(part: Any, above: tuple[Any, ...] = ()) -> tuple[int, int]:
 
 
 def _inner(part: Any) -> Iterator[Any]:
-    """Estimators and objects of which a part is made."""
+    """Estimators and objects within a part."""
     for value in list(getattr(part, "__dict__", {}).values()):
         values = value.values() if isinstance(value, Mapping) else value if isinstance(value, list | tuple) else [value]
         for one in values:
@@ -270,7 +270,7 @@ def compensators_of(detector: BaseEstimator | None) -> list[Any]:
 
 @dataclass(frozen=True)
 class Columns:
-    """Roles of columns: ``inputs`` are all but those of ``reference``, and ``targets`` the responses among them."""
+    """Roles of columns: ``inputs`` are all but the ``reference``, and ``targets`` the responses among them."""
 
     inputs: list[Any]
     reference: list[Any]
@@ -295,7 +295,7 @@ class Columns:
             wanted = monitor.fem.mode_names_
         targets = _among(wanted, inputs, "targets")
         if not targets or (own is not None and set(targets) != set(own)):
-            expected = f"some of the columns {inputs}" if own is None else f"those of the compensator {own}"
+            expected = f"some of the columns {inputs}" if own is None else f"the targets of the compensator {own}"
             raise ValueError(f"targets are {targets}; expected {expected}")
         of_targets = monitor.units if isinstance(monitor.units, str) else "" if monitor.fem is None else "Hz"
         given = dict(monitor.units) if isinstance(monitor.units, Mapping) else {}

@@ -254,7 +254,7 @@ def level_changes(
     if p_value < chance and size > matters:
         worst = table.loc[(table["change"] / table["standard_error"]).abs().idxmax()]
         reasons = (
-            f"the new records are not those of the baseline's structure: {what}, beside the weather, {worst.name} "
+            f"the new records do not show the baseline's structure: {what}, beside the weather, {worst.name} "
             f"changes by {worst['change']:+.2g} +- {worst['standard_error']:.1g}, all modes together by {size:.2g} "
             f"standard deviations of a day (p value {probability_text(p_value)}); a detector fitted to them would not "
             "detect that change",

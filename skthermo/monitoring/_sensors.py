@@ -153,8 +153,8 @@ class Responses:
     ``together`` is the distribution of temperatures and responses, ``reach`` the lowest and highest responses.
     ``limits`` are departures from which a value that moves alone is implausible: more than 25 robust deviations, a
     quarter of its level, and three times the departure that one value in a thousand of the baseline exceeds.
-    ``deviations`` are those of daily medians, and ``pairs`` positions of responses of the same unit and size, which may
-    be exchanged.
+    ``deviations`` are deviations of daily medians, and ``pairs`` positions of responses of the same unit and size,
+    which may be exchanged.
     """
 
     together: Gaussian

@@ -111,7 +111,7 @@ class MonitorStatus:
     reason : str
         Why it is not evaluated, or what else is worth saying of the newest record; "" if nothing is.
     now : Timestamp or None
-        Time of which the status is.
+        Time of the status.
     records : RecordTimes
         When records came: ``baseline_end``, ``newest``, ``evaluated`` (the newest that was), ``age``, ``max_age``,
         ``step`` and ``counts``; ``is_late`` and ``is_ahead``.
@@ -135,10 +135,10 @@ class MonitorStatus:
 
     Notes
     -----
-    Keys of `as_dict` are the names above, those of ``records`` and ``levels`` side by side with the others. Times are
-    texts of ISO 8601, in the time zone of the records; ``age``, ``max_age`` and ``step`` are in seconds; what is not
-    known is None. Of a bridge without a monitor, ``state`` is "not evaluated", with the reason, and the numbers are
-    None.
+    Keys of `as_dict` are the names above, with the names in ``records`` and ``levels`` side by side with the others.
+    Times are texts of ISO 8601, in the time zone of the records; ``age``, ``max_age`` and ``step`` are in seconds; what
+    is not known is None. Of a bridge without a monitor, ``state`` is "not evaluated", with the reason, and the numbers
+    are None.
 
     Examples
     --------
@@ -164,7 +164,7 @@ class MonitorStatus:
         Parameters
         ----------
         now : str or datetime, optional
-            The time. By default that of the computer's clock; if the records have no time zone, the local time.
+            The time. By default the computer's clock tells it; if the records have no time zone, the local time.
         max_age : str or timedelta, optional
             Age of the newest record beyond which nothing is healthy. By default the usual time between records, and
             two days more.

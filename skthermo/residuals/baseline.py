@@ -85,7 +85,7 @@ class BaselineResiduals:
 
         A smoothed stationary bootstrap: each row takes the record after the one before it took or, where such a run
         ends by chance, one of the 25 records with the most similar weather. In weather that scatters more or less than
-        that of its records, a run is scaled, or ends where that is a factor of 2. A second draw of its own
+        the weather of its records, a run is scaled, or ends where the factor is 2. A second draw of its own
         is added with a small weight, so that the largest residual of the training records is not the largest of all.
         Rows of unknown weather are NaN.
         """
@@ -189,7 +189,7 @@ class BaselineResiduals:
         logs, here = np.log(self._levels[1]), np.log(np.sqrt(similar @ self._levels[1] ** 2))
         starts = np.union1d([0], ends)
         stops = np.append(starts[1:], n_rows)
-        while len(starts):  # runs, each of which may end early, where another one begins
+        while len(starts):  # runs; each may end early, where another one begins
             lengths = stops - starts
             first, run = np.cumsum(lengths) - lengths, np.repeat(np.arange(len(starts)), lengths)
             step = np.arange(len(run)) - first[run]

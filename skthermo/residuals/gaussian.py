@@ -17,7 +17,7 @@ SINGULAR_WITH_GAPS = 1e-7  # variance below which a combination of standardised 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Mean and covariance of all modes; a row's distance is that of the modes that it has.
+    """Mean and covariance of all modes; a row's distance counts the modes that it has.
 
     ``is_settled`` says whether expectation maximisation has converged, where gaps made it necessary.
     """
@@ -82,7 +82,7 @@ class Gaussian:
         return filled, np.where(np.isnan(rows), np.where(empty, np.nan, deviations), 0.0)
 
     def error_roots(self, rows: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Cholesky roots of the covariance of what `completed` fills in, and which of them is that of each row."""
+        """Cholesky roots of the covariance of what `completed` fills in, and the number of each row's root."""
         masks, of_row = patterns(~np.isnan(rows))
         rest = _conditionals(self.covariance, masks)[1]
         missing = ~masks[:, :, np.newaxis] & ~masks[:, np.newaxis, :]

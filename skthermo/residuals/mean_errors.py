@@ -19,8 +19,8 @@ class MeanErrors(SavesFrames):
     """How means of residuals scatter while nothing changes, as learned from healthy ones.
 
     ``known`` are the modes that were learned, (n_modes,), and ``limits`` the residuals between which one is no outlier,
-    (2, n_modes). ``covariance`` is that of a record, (n_known, n_known), ``for_one`` how many records in a row are
-    worth one independent one, and ``n_trained`` how many independent ones were learned from, (n_modes,).
+    (2, n_modes). ``covariance`` is the covariance of a record, (n_known, n_known), ``for_one`` how many records in a
+    row are worth one independent one, and ``n_trained`` how many independent ones were learned from, (n_modes,).
     ``is_estimated`` says whether the covariance was.
     """
 

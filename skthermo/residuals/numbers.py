@@ -17,7 +17,7 @@ def independent_records(values: Array, n_parts: int = 12) -> float:
     n_parts : int, default=12
         Parts of equal length; the variance of their means tells the variance of the mean of all records. Of several
         columns, the correlation of neighbouring parts tells how much larger it is where records remember for longer
-        than a part; of one column, that of a dozen parts is too vague.
+        than a part; a dozen parts tell it too vaguely from one column.
 
     Returns
     -------
