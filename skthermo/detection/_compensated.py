@@ -24,7 +24,7 @@ from skthermo._core.estimators import (
     _safe_indexing,
     check_is_fitted,
 )
-from skthermo._core.frames import column_names, first_disorder, frame_like, has_stamps, row_times
+from skthermo._core.frames import first_disorder, frame_like, has_stamps, row_times
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import DamageDetector, DamageIndexMixin, labelled_damaged, mean_log_density
 from skthermo.detection._compensator import TemperatureCompensator
@@ -189,7 +189,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             self.feature_names_in_ = self.compensator_.feature_names_in_
         T, R = self.compensator_.inputs(X)[0], as_floats(residuals)
         self.regime_ = self._chosen_regime(X, T, R, np.flatnonzero(~labelled_damaged(y, len(R))))
-        regime = regimes_of(T, self.regime_)
+        regime = self._regimes(T)
         self.means_ = None
         Z = as_frame(X, residuals)
         if self.window is not None:
@@ -371,7 +371,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         """Residuals of records or their means, the regime of each record, and findings."""
         check_is_fitted(self)
         residuals, T, findings = self.compensator_.evaluated(X)
-        Z, regime = as_frame(X, residuals), regimes_of(T, self.regime_)
+        Z, regime = as_frame(X, residuals), self._regimes(T)
         if self.means_ is None:
             return Z, regime, findings
         self._check_order(X)
@@ -383,7 +383,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
 
     def _chosen_regime(self, X: Any, T: Any, R: Array, healthy: Rows) -> tuple[Any, float] | None:
         """The input, by name or position, and the value at which records are divided."""
-        names = column_names(T, "") if isinstance(T, pd.DataFrame) else list(range(T.shape[1]))
+        names = self._input_names(T)
         if isinstance(self.regimes, tuple):
             if len(self.regimes) != 2 or self.regimes[0] not in names or not isinstance(self.regimes[1], Real):
                 raise ValueError(f"regimes is {self.regimes!r}; expected an input among {names}, and a value")
@@ -406,11 +406,24 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         Means over a window scatter so little that a slow change counts as damage in the narrower regime.
         """
         n_first = 2 * len(T) // 3
-        if np.bincount(regimes_of(T, (name, value))[:n_first], minlength=2).min() < least_rows:
+        first_regime = as_floats(T)[:n_first, self._input_names(T).index(name)] <= value
+        if min(first_regime.sum(), (~first_regime).sum()) < least_rows:
             return False
         with collected():
             earlier = clone(self).set_params(regimes=(name, value), cv=None).fit(X[:n_first])
             return bool(np.mean(earlier.predict(X[n_first:]) == -1) <= most)
+
+    def _input_names(self, T: Any) -> list[Any]:
+        """Names of the inputs, or their positions where `fit` saw no names."""
+        names = getattr(self, "feature_names_in_", None)
+        return list(range(T.shape[1])) if names is None else list(np.delete(names, self.compensator_.targets_))
+
+    def _regimes(self, T: Any) -> Regimes:
+        """The number of the regime of each record: 0 up to the value, 1 above; a missing input counts as above."""
+        if self.regime_ is None:
+            return np.zeros(len(T), dtype=np.intp)
+        name, value = self.regime_
+        return (~(as_floats(T)[:, self._input_names(T).index(name)] <= value)).astype(np.intp)
 
     def _check_order(self, X: Any) -> None:
         """Refuse records whose windows are not defined."""
@@ -429,7 +442,8 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
     def _cause(self, X: Any, rows: NDArray[np.bool_]) -> str:
         if self.window is None:
             return super()._cause(X, rows)
-        return "their windows hold too few records with a value; the first rows of a call need the records before them"
+        own = "" if self.regime_ is None else " in their own regime (regime_)"
+        return f"windows hold too few records with a value{own}; the first rows of a call need the records before them"
 
     def _part(self) -> DamageDetector:
         """A new detector of a regime."""
@@ -440,15 +454,6 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         if name == "regressor":
             return TemperatureCompensator(targets=self.targets)._default_part("estimator")
         return DirectionalDetector() if name == "detector" else None
-
-
-def regimes_of(T: Any, regime: tuple[Any, float] | None) -> Regimes:
-    """The number of the regime of each record: 0 up to the value, 1 above; a missing input counts as above."""
-    if regime is None:
-        return np.zeros(len(T), dtype=np.intp)
-    name, value = regime
-    column = T[name] if isinstance(T, pd.DataFrame) else T[:, name]
-    return (~(as_floats(column) <= value)).astype(np.intp)
 
 
 def of_other_kind(kind: str) -> dict[str, str]:

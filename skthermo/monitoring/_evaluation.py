@@ -166,15 +166,19 @@ def causes(
     temperatures: list[Any],
     index: Array,
     outages: list[tuple[pd.Timestamp, Any, Any]],
+    regime: tuple[Any, float] | None = None,
 ) -> list[str]:
     """Why new records have no damage index, or whose index they have; "" for the others.
 
-    A record that reaches into an outage names it.
+    A record that reaches into an outage names it. Windows hold records of one ``regime``: up to a value of an input, or
+    above it.
     """
     without = {"mode": new[targets].isna().all(axis=1).to_numpy()}
     without["temperature"] = new[temperatures].isna().all(axis=1).to_numpy() if temperatures else without["mode"]
     what = np.select(list(without.values()), [f"no {name} has a value" for name in without], "")
-    unknown = np.where(what == "", "too few values in its window, its lags or among its modes", what).astype(object)
+    within = "" if regime is None else f" and regime ({regime[0]} up to or above {regime[1]:.3g})"
+    few = f"too few values in its window{within}, its lags or among its modes"
+    unknown = np.where(what == "", few, what).astype(object)
     for end, until, length in outages:
         text = f"too few records for its window, means or lags since the outage of {duration_text(length)}"
         unknown[(new.index >= end) & (new.index <= until) & (what == "")] = f"{text} up to {end:%Y-%m-%d %H:%M}"

@@ -589,7 +589,8 @@ class Monitor(SavesFrames, Estimator):
             "extrapolated: temperatures outside the range of the baseline": is_outside,
             f"even a fall of all responses by {100 * fall:.2g} % would stay undetected": is_blind,
         }
-        said = [causes(new, self.targets_, temperatures, index, self._outages()), notes["note"]]
+        regime = getattr(last_step(self.detector_), "regime_", None)
+        said = [causes(new, self.targets_, temperatures, index, self._outages(), regime), notes["note"]]
         said += [np.where(rows, text, "") for text, rows in remarks.items()]
         reason = ["; ".join(filter(None, parts)) for parts in zip(*said, strict=True)]
         then = self._index_then(records, place, index, drifts)

@@ -1,6 +1,7 @@
 """Regression, regimes, windows and a detector in one estimator."""
 
 import functools
+import warnings
 
 import numpy as np
 import pandas as pd
@@ -100,6 +101,25 @@ def test_regimes_are_found_where_scatter_changes_and_find_damage_on_warm_days():
     for window, records, n_regimes in ((None, creeping, 2), ("2D", frosty(0), 2), ("2D", creeping, 1)):
         detector = whole(MahalanobisDetector(), targets=modes, window=window).fit(records)
         assert len(detector.detectors_) == n_regimes == 1 + (detector.regime_ is not None)
+
+
+def test_a_regime_is_the_same_for_frames_and_arrays():
+    """An input has a name in a frame and a position in an array; rows of either kind are evaluated alike."""
+    named = whole(MahalanobisDetector(), regimes=("T1", 10.0)).fit(YEAR)
+    expected = named.damage_index(LATER)
+    polars = pytest.importorskip("polars")
+    targets = [YEAR.columns.get_loc(name) for name in MODES]
+    bare = whole(MahalanobisDetector(), targets=targets, regimes=(0, 10.0)).fit(YEAR.to_numpy())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # scikit-learn's, of names that one of both lacks
+        for detector, rows in [
+            (named, LATER.to_numpy()),
+            (named, polars.from_pandas(LATER)),
+            (bare, LATER),
+            (bare, LATER.to_numpy()),
+            (whole(MahalanobisDetector(), regimes=("T1", 10.0)).fit(polars.from_pandas(YEAR)), LATER),
+        ]:
+            np.testing.assert_array_equal(detector.damage_index(rows), expected)
 
 
 def test_the_baseline_is_the_history_of_later_windows_and_batches_are_one_pass():
