@@ -12,6 +12,7 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import BaseSearchCV
+from skthermo._core.frames import DAY
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected
 from skthermo.detection import CompensatedDetector, DirectionalDetector, TemperatureCompensator
@@ -39,6 +40,15 @@ def parts_of(detector: Any) -> list[Any]:
     if isinstance(detector, Pipeline):
         return [part for _, step in detector.steps for part in parts_of(step)]
     return [] if detector is None or detector == "passthrough" else [detector]
+
+
+def window_of(detector: Any) -> Lookback:
+    """How far back a fitted detector takes means of residuals; its memory of the weather delays no alarm."""
+    *_, last = parts = parts_of(detector)
+    after = 1 + max((n for n, part in enumerate(parts) if isinstance(part, TemperatureCompensator)), default=-1)
+    averaged = [last.means_] if isinstance(last, CompensatedDetector) else parts[after:]
+    found = [Lookback.learned(part) for part in averaged if part is not None]
+    return Lookback(sum(one.rows for one in found), sum((one.time for one in found), pd.Timedelta(0)))
 
 
 def residuals(
@@ -208,13 +218,16 @@ def blind_findings(
     detector: Any, columns: list[Any], trained: pd.DataFrame, targets: list[Any], lookback: Lookback, threshold: float
 ) -> Iterator[ResultWarning]:
     """The finding of responses whose large fall raises no alarm; an error where a larger one ends it."""
-    number = trained[targets].notna().sum(axis=1).to_numpy()
+    number, times = trained[targets].notna().sum(axis=1).to_numpy(), trained.index.asi8
     row = int(number[len(number) // 2 :].argmax()) + len(number) // 2
-    part, blind = trained.iloc[lookback.start(trained.index.asi8, row) : row + 1], []
+    first = min(int(times.searchsorted(times[row] - 7 * DAY.value)), row)  # single records may lack a full window
+    part, blind = trained.iloc[lookback.start(times, first) : row + 1], []
+    n_last = row + 1 - first
     for target, deviation in trained[targets].std(ddof=0).replace(0.0, 1.0).items():
         sizes = (5, 20, 80)  # standard deviations by which it is lowered
         changed = (lowered(part, {target: size * deviation}) for size in sizes)
-        seen = [index_of(detector, columns, records)[-1] > threshold for records in changed]
+        indices = (pd.Series(index_of(detector, columns, records)[-n_last:]) for records in changed)
+        seen = [index.median() > threshold for index in indices]
         for smaller, larger, *found in zip(sizes[:-1], sizes[1:], seen[:-1], seen[1:], strict=True):
             if found == [True, False]:
                 raise ValueError(

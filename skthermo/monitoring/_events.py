@@ -662,10 +662,14 @@ class SmallestChanges(SavesFrames):
 
 
 def _range_text(changes: Mapping[Any, float], form: str) -> str:
-    """The smallest and the largest of some changes, with their names; "" where none is seen."""
+    """The smallest and the largest of some changes, with their names; "" where none is seen.
+
+    Changes that are no percentages may have several units: all of them.
+    """
     seen = {name: value for name, value in changes.items() if np.isfinite(value)}
     if not seen:
         return ""
+    if "%" not in form:
+        return "by " + ", ".join(f"{form.format(size)} ({name})" for name, size in seen.items())
     ends = dict.fromkeys((min(seen, key=seen.__getitem__), max(seen, key=seen.__getitem__)))
-    factor = 100 if "%" in form else 1
-    return "by " + " to ".join(f"{form.format(factor * seen[name])} ({name})" for name in ends)
+    return "by " + " to ".join(f"{form.format(100 * seen[name])} ({name})" for name in ends)

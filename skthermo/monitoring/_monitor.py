@@ -48,6 +48,7 @@ from skthermo.monitoring._evaluation import (
     refuse_other_batches,
     residuals,
     rounded,
+    window_of,
 )
 from skthermo.monitoring._events import (
     FAULT,
@@ -491,7 +492,8 @@ class Monitor(SavesFrames, Estimator):
             self.watch_threshold_ = min(watch.threshold, self.threshold_)
         step = usual_step(trained.index)
         number, among = rule_of(self.persistence)
-        within, share_above = self.lookback_.duration(step) + among * step, (number - 0.5) / among
+        window = window_of(detector) if self.lookback is None else self.lookback_
+        within, share_above = window.duration(step) + among * step, (number - 0.5) / among
         self.smallest_changes_ = SmallestChanges.measured(
             self._index, trained, self.targets_, self.threshold_, within, share_above, losses_of(detector)
         )

@@ -180,10 +180,10 @@ class DropsOutliers(TransformerMixin, BaseEstimator):
 
 
 class Bounded(MahalanobisDetector):
-    """A detector whose index does not grow beyond what the baseline has."""
+    """A detector whose index does not grow beyond most of the baseline."""
 
     def score_samples(self, X):
-        return np.maximum(super().score_samples(X), -self.baseline_index_.max())
+        return np.maximum(super().score_samples(X), -np.nanquantile(self.baseline_index_, 0.9))
 
 
 def test_a_detector_that_drops_large_changes_is_refused_and_a_blind_one_is_reported():
@@ -343,8 +343,8 @@ def test_a_column_that_says_nothing_is_left_out_and_named():
 @pytest.mark.parametrize(
     ("options", "change", "match"),
     [
-        ({"targets": MODES[:4]}, {}, "expected those of the compensator"),
-        ({"targets": [*MODES, "T1"]}, {}, "expected those of the compensator"),
+        ({"targets": MODES[:4]}, {}, r"compensator \["),
+        ({"targets": [*MODES, "T1"]}, {}, r"compensator \["),
         ({"detector": MahalanobisDetector()}, {}, "expected targets="),
         ({"detector": make_pipeline(HampelFilter(5), detector(MODES))}, {}, "compares records with later ones"),
         ({}, {"T1": 273.15, "T2": 273.15}, "kelvin"),

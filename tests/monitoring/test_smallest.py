@@ -12,6 +12,7 @@ from sklearn.linear_model import LinearRegression
 from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.exceptions import FewRecordsWarning
 from skthermo.monitoring import Monitor
+from skthermo.surrogate import TemperatureMapper
 
 MODES, PER_DAY = ["f1", "f2", "f3"], 4
 pytestmark = pytest.mark.filterwarnings("ignore:.*(other-weather|not-evaluated|few-records)")
@@ -62,6 +63,16 @@ def test_a_larger_change_raises_an_alarm_in_time_and_a_smaller_one_leaves_most_r
     answers = monitor.update(fallen)
     assert (answers.loc[answers.index[0] + changes.within :, "state"] == "alarm").mean() > 0.9
     assert changes.within < pd.Timedelta("3D")
+
+
+def test_memory_of_the_weather_delays_no_alarm():
+    """A month of earlier temperatures moves no mean of residuals: an alarm follows within the window and five steps."""
+    plain, remembering = LinearRegression(), TemperatureMapper(means=("20D",))
+    for regressor, reach in ((plain, "1D"), (remembering, "100D")):
+        whole = CompensatedDetector(MahalanobisDetector(), regressor, targets=MODES, window="1D", regimes=None)
+        monitor = Monitor(whole, sensors=False).fit(bridge()[:"2025-08"])
+        assert monitor.lookback_.duration(pd.Timedelta("6h")) >= pd.Timedelta(reach)
+        assert monitor.smallest_changes_.within == pd.Timedelta("1D") + 5 * pd.Timedelta("6h")
 
 
 @pytest.mark.nightly
