@@ -261,9 +261,10 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         if min(3 * self.n_independent_, len(F)) < 1 / self.contamination - 1:
             self.findings_.append(
                 FewRecordsWarning(
-                    "the baseline has too few independent records (n_independent_) for a false-alarm rate of "
-                    f"{self.contamination:.2g}: expected {np.ceil(1 / self.contamination - 1):.0f} or more. Later "
-                    "records may raise several times as many alarms. Give a longer baseline, or a higher contamination",
+                    "the baseline, or one of its regimes (detectors_), has far too few independent records "
+                    f"(n_independent_) for a false-alarm rate of {self.contamination:.2g}, which "
+                    f"{np.ceil(1 / self.contamination - 1):.0f} or more tell. Later records may raise several times as "
+                    "many alarms. Give a longer baseline, or a higher contamination",
                     "few-records",
                 )
             )
