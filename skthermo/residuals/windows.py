@@ -73,6 +73,10 @@ class WindowMeans(SavesFrames):
         The records of the baseline are the history of later records.
         """
         values, index, n_before = residuals.to_numpy(), residuals.index, 0
+        if self.history is not None:
+            known, zone = self.history[0].index.tz, getattr(index, "tz", "none, as no DatetimeIndex")
+            if (known is None) != (zone is None):
+                raise ValueError(f"X has stamps in time zone {zone}; expected {known}, as in fit")
         if self.history is not None and not is_baseline and len(index) and index[0] > self.history[0].index[-1]:
             before, before_regime = self.history
             values, index, n_before = np.vstack([before, values]), before.index.append(index), len(before)

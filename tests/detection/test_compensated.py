@@ -122,6 +122,15 @@ def test_a_regime_is_the_same_for_frames_and_arrays():
             np.testing.assert_array_equal(detector.damage_index(rows), expected)
 
 
+def test_windows_refuse_stamps_of_another_kind_than_in_fit():
+    stamps = pd.date_range("2025", periods=len(YEAR), freq="D")
+    zoned = YEAR.set_axis(stamps.tz_localize("UTC"))
+    naive = LATER.set_axis(stamps + pd.Timedelta("365D"))
+    for records, others in ((zoned, naive), (naive, zoned), (naive, LATER.reset_index(drop=True))):
+        with pytest.raises(ValueError, match=r"time zone|DatetimeIndex"):
+            whole(MahalanobisDetector(), window="3D", regimes=None).fit(records).predict(others)
+
+
 def test_the_baseline_is_the_history_of_later_windows_and_batches_are_one_pass():
     stamps = pd.date_range("2025", periods=2 * len(YEAR), freq="D")
     records = pd.concat([YEAR, LATER]).set_axis(stamps)
