@@ -30,7 +30,7 @@ from skthermo._core.arrays import (
     real_array,
     shape_array,
 )
-from skthermo._core.parallel import map_on_blas_threads, n_blas_threads, single_blas_thread
+from skthermo._core.parallel import map_on_blas_threads
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._terms import (
@@ -280,14 +280,7 @@ class AffineModel:
         ValueError
             If theta has the wrong width, or a value that is not finite and positive.
         """
-        rows, size = check_theta(theta, self.parameter_names), self.rows_per_chunk
-        if len(rows) > size and n_blas_threads() > 1:
-            return self._in_chunks(self._core.frequencies, rows)[0]
-        with single_blas_thread():
-            parts = list(map(self._core.frequencies, np.split(rows, range(size, len(rows), size))))
-        frequencies = np.concatenate(parts, axis=1)[0]
-        warn_each(self.findings(rows, frequencies))
-        return frequencies
+        return self._in_chunks(self._core.frequencies, theta)[0]
 
     def modes(self, theta: ArrayLike) -> tuple[Array, Array]:
         """Natural frequencies and mode shapes.

@@ -91,8 +91,8 @@ class AffineCore:
 
     def with_scaled_stiffness(self, factors: Array) -> "AffineCore":
         """The core with its stiffness terms multiplied; its columns stay the same nominal modes."""
-        stiffness, solver = self.stiffness.with_factors(self.stiffness.factors * factors), self.solver.scaled(factors)
-        return replace(self, stiffness=stiffness, solver=solver, healthy=self.healthy or self)
+        stiffness = self.stiffness.with_factors(self.stiffness.factors * factors)
+        return self._with_terms(healthy=self.healthy or self, stiffness=stiffness)
 
     def with_scaled_parts(self, parts: AffineTerms) -> "AffineCore":
         """The core whose parts of the mass have these factors and exponents; its columns stay the same nominal modes.
@@ -109,13 +109,13 @@ class AffineCore:
             np.vstack([parts.exponents[are_other], old.exponents[are_other]]),
             np.append(parts.factors[are_other], old.factors[are_other]),
         )
-        solver, nominal = eigen_solver(self.stiffness, mass), self.nominal.beside(mass, share=1.0)
-        return replace(self, mass=mass, parts=parts, solver=solver, nominal=nominal, healthy=self.healthy or self)
+        nominal = self.nominal.beside(mass, share=1.0)
+        return self._with_terms(mass=mass, parts=parts, nominal=nominal, healthy=self.healthy or self)
 
     def rescaled(self, row: Array) -> "AffineCore":
         """The core whose theta = 1 is this one's theta = row; its columns stay the same nominal modes."""
         changed = {name: one.with_factors(one.coefficients(row)[0]) for name, one in self._terms.items()}
-        return self._with_terms(changed, self.healthy or self)
+        return self._with_terms(**changed, healthy=self.healthy or self)
 
     def with_modes(self, ranks: NDArray[np.intp]) -> "AffineCore":
         """The core whose columns are other modes of the healthy nominal state."""
@@ -126,20 +126,18 @@ class AffineCore:
 
     def with_parameters(self, columns: NDArray[np.intp]) -> "AffineCore":
         """The core of fewer parameters, the others being 1."""
-        healthy = self.healthy.with_parameters(columns) if self.healthy else None
         changed = {name: one.with_factors(one.factors, one.exponents[:, columns]) for name, one in self._terms.items()}
-        return self._with_terms(changed, healthy)
+        return self._with_terms(**changed)
 
     def with_group_factors(self, scaled: NDArray[np.int64]) -> "AffineCore":
         """The core with further parameters that multiply groups of stiffness terms, (n_terms, n_groups)."""
-        healthy = self.healthy.with_group_factors(scaled) if self.healthy else None
         further = {name: np.zeros((len(one.factors), scaled.shape[1]), int) for name, one in self._terms.items()}
-        further["stiffness"] = scaled[: len(self.stiffness.factors)]  # the healthy core may lack terms that were added
+        further["stiffness"] = scaled
         changed = {
             name: one.with_factors(one.factors, np.hstack([one.exponents, further[name]]))
             for name, one in self._terms.items()
         }
-        return self._with_terms(changed, healthy)
+        return self._with_terms(**changed)
 
     def with_mass_factors(self, masses: Sequence[Matrix]) -> "AffineCore":
         """The core with further parameters: 1 + the number of times that each of these masses is added."""
@@ -147,12 +145,12 @@ class AffineCore:
         none = np.zeros((len(masses), self.mass.exponents.shape[1]), dtype=np.int64)
         once = np.hstack([none, np.eye(len(masses), dtype=np.int64)])
         heavy = wider.mass.with_terms(masses, once).with_terms([-mass for mass in masses], 0 * once)
-        solver, nominal = eigen_solver(wider.stiffness, heavy), self.nominal.beside(heavy)
-        return replace(wider, mass=heavy, solver=solver, nominal=nominal)
+        return wider._with_terms(mass=heavy, nominal=self.nominal.beside(heavy))
 
-    def _with_terms(self, changed: dict[str, Any], healthy: "AffineCore | None") -> "AffineCore":
-        solver = eigen_solver(changed["stiffness"], changed["mass"])
-        return replace(self, **changed, solver=solver, healthy=healthy)
+    def _with_terms(self, **changed: Any) -> "AffineCore":
+        """The core with other terms, a solver of them, and other changes."""
+        solver = eigen_solver(changed.get("stiffness", self.stiffness), changed.get("mass", self.mass))
+        return replace(self, **changed, solver=solver)
 
     @property
     def _terms(self) -> dict[str, AffineTerms]:
@@ -168,16 +166,15 @@ class AffineCore:
         if mass is not None:
             total = heavy.assemble(np.ones((1, heavy.exponents.shape[1])))[0]
             count_modes(total, at_least=len(self.ranks), what="mass, with what is added,")
-        solver, nominal = eigen_solver(stiff, heavy), self.nominal.beside(heavy)
-        return replace(self, stiffness=stiff, mass=heavy, solver=solver, nominal=nominal, healthy=self.healthy or self)
+        nominal = self.nominal.beside(heavy)
+        return self._with_terms(stiffness=stiff, mass=heavy, nominal=nominal, healthy=self.healthy or self)
 
     def with_divided_terms(
         self, stiffness: Sequence[tuple[int, Matrix]], parts: Sequence[tuple[int, Matrix]]
     ) -> "AffineCore":
         """The core with some of its stiffness terms, and of the parts of its mass, divided."""
-        divided = self.stiffness.divided(stiffness)
         smaller = self.parts if self.parts is None or not parts else self.parts.divided(parts)
-        return replace(self, stiffness=divided, parts=smaller, solver=eigen_solver(divided, self.mass))
+        return self._with_terms(stiffness=self.stiffness.divided(stiffness), parts=smaller)
 
     def projected(self, basis: Array, tol: float) -> "AffineCore":
         """The core on a basis (n_dof, n) of shapes, whose own relative errors are much smaller than ``tol``."""
@@ -321,10 +318,6 @@ class DenseSolver(ABC):
         """Lowest eigenvalues, (n_samples, n_modes)."""
 
     @abstractmethod
-    def scaled(self, factors: Array) -> "DenseSolver":
-        """The solver of the same structure with its stiffness terms multiplied."""
-
-    @abstractmethod
     def modes(self, theta: Array, n_modes: int) -> tuple[Array, Array]:
         """Lowest eigenvalues and their shapes, (n_samples, n_dof, n_modes)."""
 
@@ -360,12 +353,6 @@ class StandardSolver(DenseSolver):
         positive = np.where(eigenvalues[:, :1] > 0, eigenvalues, np.nan)
         return positive[:, :n_modes], self._basis @ shapes[:, :, :n_modes]
 
-    def scaled(self, factors: Array) -> "StandardSolver":
-        factors = self._stiffness.factors * factors
-        return StandardSolver(
-            self._transformed.with_factors(factors), self._basis, self._stiffness.with_factors(factors)
-        )
-
 
 class FlexibilitySolver(DenseSolver):
     """B y = y / lambda with B = L^-1 M L^-T and phi = L^-T y sqrt(lambda), for K = L L'.
@@ -387,9 +374,6 @@ class FlexibilitySolver(DenseSolver):
         inverse_eigenvalues, shapes = np.linalg.eigh(flexibility)
         eigenvalues = ones / inverse_eigenvalues[:, ::-1][:, :n_modes]
         return eigenvalues, back @ shapes[:, :, ::-1][:, :, :n_modes] * np.sqrt(eigenvalues)[:, np.newaxis]
-
-    def scaled(self, factors: Array) -> "FlexibilitySolver":
-        return FlexibilitySolver(self._stiffness.with_factors(self._stiffness.factors * factors), self._mass)
 
     def _flexibility(self, theta: Array) -> tuple[Array, Array, Array]:
         """B, L^-T, and a column of ones with NaN where the stiffness has no L."""

@@ -37,9 +37,6 @@ class ShiftInvertSolver:
             eigenvalues[row], shapes[row] = lowest_modes(*matrices, n_modes, self._start)
         return eigenvalues, shapes
 
-    def scaled(self, factors: Array) -> "ShiftInvertSolver":
-        return ShiftInvertSolver(self._stiffness.with_factors(self._stiffness.factors * factors), self._mass)
-
     def _matrices(self, theta: Array) -> Iterator[tuple[Matrix, Solve | None, Matrix]]:
         """Stiffness, solves with it, and mass, row by row."""
         for stiffness, mass in zip(self._stiffness.each(theta), self._mass.each(theta), strict=True):
