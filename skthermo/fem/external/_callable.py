@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from joblib import Memory
@@ -15,14 +16,7 @@ from numpy.typing import ArrayLike
 from skthermo._core.arrays import Array, check_flag, check_path, check_theta, mapping_of, positive_integer, real_array
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ModelWarning, SkthermoWarning
-from skthermo.fem._terms import (
-    ROWS_PER_CHUNK,
-    by_name,
-    check_different,
-    check_severities,
-    failures,
-    failures_named,
-)
+from skthermo.fem._terms import ROWS_PER_CHUNK, by_name, check_different, check_severities, failures, failures_named
 from skthermo.fem.damage import LossKind, damage_directions, kind_option
 
 if TYPE_CHECKING:
@@ -126,17 +120,15 @@ class CallableModel:
         self.groups = read_parameter_groups(groups, self.parameter_names)
         self._factors = np.ones(len(self.parameter_names))
         self._is_quiet = False
-        self._memory = None
-        if cache is not None:
-            folder = check_path(cache, "cache").absolute()  # wherever the process goes
-            if folder.is_file():
-                raise ValueError(f"{folder}: the cache is a file; expected a folder")
-            self._memory = Memory(folder, verbose=0)
+        folder = None if cache is None else check_path(cache, "cache").absolute()  # wherever the process goes
+        if folder is not None and folder.is_file():
+            raise ValueError(f"{folder}: the cache is a file; expected a folder")
+        self._memory = Memory(folder, verbose=0)
 
     @property
     def cache(self) -> Path | None:
         """The folder that keeps solved rows."""
-        return None if self._memory is None else Path(self._memory.location)
+        return self._memory.location and Path(self._memory.location)
 
     @property
     def rows_per_chunk(self) -> int:
@@ -168,52 +160,31 @@ class CallableModel:
         rows = check_theta(theta, self.parameter_names) * self._factors
         keys = [row.tobytes() for row in rows.astype("<f8")]
         different = dict(zip(keys, rows, strict=True))
-        found = {key: self._kept(key, row) for key, row in different.items() if self._is_kept(key)}
-        solved, failed = self._solve_each({key: row for key, row in different.items() if key not in found})
+        asked, kept = (self.parameter_names, self.n_modes), self._memory.cache(frequencies_of_row, ignore=["solve"])
+        missing = [key for key in different if not kept.check_call_in_cache(*asked, key, None)]
+        found: dict[bytes, Array] = {}
+        failed: dict[bytes, RuntimeError] = {}
+        for batch in [missing] if self.vectorized and missing else [[key] for key in missing]:
+            try:
+                solved = self._solve(np.array([different[key] for key in batch]))
+            except RuntimeError as failure:
+                failed |= dict.fromkeys(batch, failure)
+                continue
+            for key, own in zip(batch, solved, strict=True):
+                try:
+                    found[key] = kept(*asked, key, partial(self._possible, different[key], own))
+                except RuntimeError as failure:
+                    failed[key] = failure
         first = next(iter(failed.values()), None)
         if first is not None and not self._is_quiet:
             are_one = all(failure is first for failure in failed.values())  # an error for many rows at once
             if len(failed) > 1 and (len(failed) == len(different) or are_one):
                 raise first
             warn_each([ModelWarning(f"some rows are NaN, because the model failed: {first}", "no-solution")])
-        found |= solved | dict.fromkeys(failed, np.full(self.n_modes, np.nan))
+        found |= dict.fromkeys(failed, np.full(self.n_modes, np.nan))
+        for key in different.keys() - found.keys():  # which the memory has, or solves again if its file is damaged
+            found[key] = kept(*asked, key, lambda row=different[key]: self._solve(row[np.newaxis])[0])
         return np.array([found[key] for key in keys]).reshape(len(rows), self.n_modes)
-
-    def _solve_each(self, missing: Mapping[bytes, Array]) -> tuple[dict[bytes, Array], dict[bytes, RuntimeError]]:
-        """Frequencies of rows, which are kept, and the errors of rows at which the function fails."""
-        solved: dict[bytes, Array] = {}
-        failed: dict[bytes, RuntimeError] = {}
-        for batch in [list(missing)] if self.vectorized and missing else [[key] for key in missing]:
-            rows = np.array([missing[key] for key in batch])
-            try:
-                frequencies = self._solve(rows)
-            except RuntimeError as failure:
-                failed |= dict.fromkeys(batch, failure)
-                continue
-            impossible = self._impossible(rows, frequencies)
-            failed |= {batch[row]: failure for row, failure in impossible.items()}
-            good = {key: frequencies[row] for row, key in enumerate(batch) if row not in impossible}
-            for key, own in good.items():
-                self._keep(key, own)
-            solved |= good
-        return solved, failed
-
-    def _is_kept(self, key: bytes) -> bool:
-        return self._memory is not None and self._remembering().check_call_in_cache(*self._asked(key), None)
-
-    def _kept(self, key: bytes, row: Array) -> Array:
-        return self._remembering()(*self._asked(key), lambda: self._solve(np.atleast_2d(row))[0])
-
-    def _keep(self, key: bytes, frequencies: Array) -> None:
-        if self._memory is not None:
-            self._remembering()(*self._asked(key), lambda: frequencies)
-
-    def _asked(self, key: bytes) -> tuple[tuple[str, ...], int, bytes]:
-        """Arguments by which the memory recognises a row."""
-        return self.parameter_names, self.n_modes, key
-
-    def _remembering(self) -> Any:
-        return self._memory.cache(frequencies_of_row, ignore=["solve"])  # type: ignore[union-attr]
 
     def _solve(self, rows: Array) -> Array:
         argument, shape = (rows, (len(rows), self.n_modes)) if self.vectorized else (rows[0], (self.n_modes,))
@@ -229,15 +200,14 @@ class CallableModel:
             )
         return result.reshape(len(rows), self.n_modes)
 
-    def _impossible(self, rows: Array, frequencies: Array) -> dict[int, RuntimeError]:
+    def _possible(self, row: Array, frequencies: Array) -> Array:
         wrong = ~np.isnan(frequencies) & ~(np.isfinite(frequencies) & (frequencies > 0))
-        return {
-            int(row): RuntimeError(
-                f"the model's function returned {frequencies[row][wrong[row]][0]} Hz at theta = "
-                f"{by_name(rows[row], self.parameter_names)}; expected frequencies that are finite and positive, or NaN"
+        if wrong.any():
+            raise RuntimeError(
+                f"the model's function returned {frequencies[wrong][0]} Hz at theta = "
+                f"{by_name(row, self.parameter_names)}; expected frequencies that are finite and positive, or NaN"
             )
-            for row in np.flatnonzero(wrong.any(axis=1))
-        }
+        return frequencies
 
     def damaged(self, damage: Mapping[str, float], *, kind: LossKind = "stiffness") -> CallableModel:
         """A new model with damage: the parameters of each group are multiplied by 1 - severity.
