@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator
 from contextlib import closing
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -41,49 +41,87 @@ if TYPE_CHECKING:
     from skthermo.fem._samples import Samples
 
 
-def solve_rows(
-    model: FEModel,
-    theta: Array,
-    method: str,
-    shapes: Mapping[str, tuple[int, ...]],
-    n_jobs: int | None,
-    *,
-    dofs: NDArray[np.intp] | None = None,
-    progress: bool | None = False,
-) -> tuple[list[Array], list[SkthermoWarning]]:
-    """Results of a model's method for every row of theta, NaN where theta has NaN, with the findings about them.
+RESULTS = {
+    "frequencies": ("frequencies",),
+    "modes": ("frequencies", "shapes"),
+    "linearised": ("frequencies", "derivatives"),
+    "linearised_modes": ("frequencies", "derivatives", "shapes", "derivatives of shapes"),
+}
+"""What each method of a model gives for rows of theta."""
 
-    ``shapes`` names the results and gives the shape of each for one row; frequencies are the first. Shapes of modes are
-    those at ``dofs``.
-    """
-    results = [np.full((len(theta), *shape), np.nan) for shape in shapes.values()]
-    known = np.flatnonzero(~np.isnan(theta).any(axis=1))
-    if not known.size:
-        return results, []
-    size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
-    places = np.split(known, range(size, len(known), size))
-    thread_safe = getattr(model, "thread_safe", False)
-    job = Job(model.quiet() if thread_safe else model, method, dofs)  # type: ignore[attr-defined]
-    parts: Generator[Any, None, None]
-    if thread_safe and effective_n_jobs(n_jobs) == 1:
-        parts = map_on_blas_threads(lambda rows: (job(rows), []), [theta[place] for place in places])
-    else:
-        jobs = (delayed(on_one_thread)(job, theta[place]) for place in places)
-        parts = as_they_come(jobs, n_jobs=n_jobs, prefer=getattr(model, "prefer", None))
-    findings: list[SkthermoWarning] = []
-    with closing(parts):
-        shown = with_progress(parts, len(known), progress, count=lambda part: len(np.atleast_1d(part[0][0])))
-        for place, (arrays, found) in zip(places, shown, strict=True):
-            findings += found
-            for result, array, what in zip(results, arrays, shapes, strict=True):
-                expected = (len(place), *shapes[what])
-                if np.shape(array) != expected:
-                    raise ValueError(
-                        f"the model's {what} have shape {np.shape(array)}; expected {expected}, the first for the rows "
-                        "of theta"
-                    )
-                result[place] = array
-    return results, [*findings, *getattr(model, "findings", failures)(theta, results[0])]
+
+class Solves:
+    """Questions to a model for many rows of theta, with shapes at some degrees of freedom, and its findings."""
+
+    def __init__(self, model: Any, n_jobs: int | None, dofs: ArrayLike | None = None):
+        check_model(model)
+        check_jobs(n_jobs)
+        self.model, self.n_jobs, self.dofs = model, n_jobs, dofs
+        self.findings: list[SkthermoWarning] = []
+
+    def rows(self, theta: ArrayLike) -> Array:
+        """Checked rows of theta, which may hold NaN."""
+        return check_theta(theta, self.model.parameter_names, allow_nan=True)
+
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Positions of the degrees of freedom."""
+        model, nominal = self.model, np.ones((1, len(self.model.parameter_names)))
+        n_dof = model.n_dof if hasattr(model, "n_dof") else np.shape(model.modes(nominal)[1])[1]
+        return check_dofs(self.dofs, n_dof, getattr(model, "dofs", ()))  # type: ignore[arg-type]
+
+    def results(self, method: str, theta: Array, progress: bool | None = False) -> list[Array]:
+        """Results of a model's method for every row of theta, NaN where theta has NaN; frequencies are the first."""
+        model = self.model
+        if method == "modes" and not hasattr(model, "modes"):
+            raise ValueError(f"{model!r} has no method 'modes'; expected one that gives mode shapes, as of AffineModel")
+        places = self.places if "shapes" in RESULTS[method] else np.empty(0, dtype=np.intp)
+        n_modes, n_parameters, n_dofs = model.n_modes, theta.shape[1], len(places)
+        shapes = {
+            "frequencies": (n_modes,),
+            "derivatives": (n_modes, n_parameters),
+            "shapes": (n_dofs, n_modes),
+            "derivatives of shapes": (n_dofs, n_modes, n_parameters),
+        }
+        results = [np.full((len(theta), *shapes[what]), np.nan) for what in RESULTS[method]]
+        known = np.flatnonzero(~np.isnan(theta).any(axis=1))
+        if not known.size:
+            return results
+        size = getattr(model, "rows_per_chunk", ROWS_PER_CHUNK)
+        chunks = np.split(known, range(size, len(known), size))
+        thread_safe = getattr(model, "thread_safe", False)
+        job = Job(model.quiet() if thread_safe else model, method, places)
+        parts: Generator[Any, None, None]
+        if thread_safe and effective_n_jobs(self.n_jobs) == 1:
+            parts = map_on_blas_threads(lambda rows: (job(rows), []), [theta[chunk] for chunk in chunks])
+        else:
+            jobs = (delayed(on_one_thread)(job, theta[chunk]) for chunk in chunks)
+            parts = as_they_come(jobs, n_jobs=self.n_jobs, prefer=getattr(model, "prefer", None))
+        with closing(parts):
+            shown = with_progress(parts, len(known), progress, count=lambda part: len(np.atleast_1d(part[0][0])))
+            for chunk, (arrays, found) in zip(chunks, shown, strict=True):
+                self.findings += found
+                for result, array, what in zip(results, arrays, RESULTS[method], strict=True):
+                    expected = (len(chunk), *shapes[what])
+                    if np.shape(array) != expected:
+                        raise ValueError(
+                            f"the model's {what} have shape {np.shape(array)}; expected {expected}, the first for the "
+                            "rows of theta"
+                        )
+                    result[chunk] = array
+        self.findings += getattr(model, "findings", failures)(theta, results[0])
+        return results
+
+    def slopes(self, theta: Array, step: float | None) -> list[Array]:
+        """Frequencies and their derivatives, exact or, with a step or where the model has none, by differences."""
+        if step is None and (hasattr(self.model, "linearised") or hasattr(self.model, "jacobian")):
+            return self.results("linearised", theta)
+        (frequencies,) = self.results("frequencies", theta)
+
+        def moved(rows: Array) -> Array:
+            return self.results("frequencies", rows)[0]
+
+        return [frequencies, central_differences(moved, theta, frequencies, _step_size(step))]
 
 
 class Job:
@@ -158,25 +196,10 @@ def evaluate(model: FEModel, theta: ArrayLike, *, n_jobs: int | None = None, pro
     array([[ 7.48, 27.5 ],
            [  nan,   nan]])
     """
-    rows = _read_rows(model, theta, n_jobs)
-    frequencies, findings = solve_frequencies(model, rows, n_jobs, progress)
-    warn_each(findings)
+    solves = Solves(model, n_jobs)
+    (frequencies,) = solves.results("frequencies", solves.rows(theta), progress)
+    warn_each(solves.findings)
     return frequencies
-
-
-def _read_rows(model: FEModel, theta: ArrayLike, n_jobs: int | None) -> Array:
-    check_model(model)
-    check_jobs(n_jobs)
-    return check_theta(theta, model.parameter_names, allow_nan=True)
-
-
-def solve_frequencies(
-    model: FEModel, theta: Array, n_jobs: int | None, progress: bool | None = False
-) -> tuple[Array, list[SkthermoWarning]]:
-    """Frequencies of rows of theta, and the findings about them."""
-    expected = {"frequencies": (model.n_modes,)}
-    (frequencies,), findings = solve_rows(model, theta, "frequencies", expected, n_jobs, progress=progress)
-    return frequencies, findings
 
 
 def evaluate_modes(
@@ -217,28 +240,10 @@ def evaluate_modes(
     >>> frequencies.shape, shapes.shape
     ((1, 6), (1, 2, 6))
     """
-    rows = _read_rows(model, theta, n_jobs)
-    (frequencies, shapes), findings = solve_modes(model, rows, dofs, n_jobs)
-    warn_each(findings)
+    solves = Solves(model, n_jobs, dofs)
+    frequencies, shapes = solves.results("modes", solves.rows(theta))
+    warn_each(solves.findings)
     return frequencies, shapes
-
-
-def solve_modes(
-    model: FEModel, theta: Array, dofs: ArrayLike, n_jobs: int | None
-) -> tuple[list[Array], list[SkthermoWarning]]:
-    """Frequencies and shapes of rows of theta, and the findings about them."""
-    if not hasattr(model, "modes"):
-        raise ValueError(f"{model!r} has no method 'modes'; expected a model that gives mode shapes, as AffineModel")
-    places = _positions(model, dofs)
-    expected = {"frequencies": (model.n_modes,), "shapes": (len(places), model.n_modes)}
-    return solve_rows(model, theta, "modes", expected, n_jobs, dofs=places)
-
-
-def _positions(model: Any, dofs: ArrayLike) -> NDArray[np.intp]:
-    """Positions of degrees of freedom of a model, given by position or by label."""
-    nominal = np.ones((1, len(model.parameter_names)))
-    n_dof = model.n_dof if hasattr(model, "n_dof") else np.shape(model.modes(nominal)[1])[1]
-    return check_dofs(dofs, n_dof, getattr(model, "dofs", ()))
 
 
 def linearise(
@@ -286,29 +291,13 @@ def linearise(
     >>> jacobian[:, 0, 0].round(6)
     array([0.5, 0.5])
     """
-    rows = _read_rows(model, theta, n_jobs)
-    (frequencies, jacobian), findings = solve_slopes(model, rows, step, n_jobs)
+    solves = Solves(model, n_jobs)
+    rows = solves.rows(theta)
+    frequencies, jacobian = solves.slopes(rows, step)
     if check_flag(relative, "relative"):
         jacobian = jacobian * rows[:, np.newaxis] / frequencies[:, :, np.newaxis]
-    warn_each(findings)
+    warn_each(solves.findings)
     return frequencies, jacobian
-
-
-def solve_slopes(
-    model: FEModel, theta: Array, step: float | None, n_jobs: int | None
-) -> tuple[list[Array], list[SkthermoWarning]]:
-    """Frequencies of rows of theta and their derivatives, and the findings about them."""
-    if step is None and (hasattr(model, "linearised") or hasattr(model, "jacobian")):
-        expected = {"frequencies": (model.n_modes,), "derivatives": (model.n_modes, theta.shape[1])}
-        return solve_rows(model, theta, "linearised", expected, n_jobs)
-    frequencies, findings = solve_frequencies(model, theta, n_jobs)
-
-    def moved(rows: Array) -> Array:
-        there, found = solve_frequencies(model, rows, n_jobs)
-        findings.extend(found)
-        return there
-
-    return [frequencies, central_differences(moved, theta, frequencies, _step_size(step))], findings
 
 
 def _step_size(step: float | None) -> float:
@@ -371,30 +360,21 @@ def linearise_modes(
     >>> [array.shape for array in linearise_modes(make_truss(), [[1.0, 1.0, 1.0, 1.0]], dofs=[0, 3, 8])]
     [(1, 6), (1, 6, 4), (1, 3, 6), (1, 3, 6, 4)]
     """
-    rows = _read_rows(model, theta, n_jobs)
+    solves = Solves(model, n_jobs, dofs)
+    rows = solves.rows(theta)
     if step is None and (hasattr(model, "linearised_modes") or hasattr(model, "local_modes")):
-        places = _positions(model, dofs)
-        n_modes, n_parameters, n_dofs = model.n_modes, rows.shape[1], len(places)
-        expected = {
-            "frequencies": (n_modes,),
-            "derivatives": (n_modes, n_parameters),
-            "shapes": (n_dofs, n_modes),
-            "derivatives of shapes": (n_dofs, n_modes, n_parameters),
-        }
-        results, findings = solve_rows(model, rows, "linearised_modes", expected, n_jobs, dofs=places)
+        results = solves.results("linearised_modes", rows)
     else:
-        (frequencies, jacobian), findings = solve_slopes(model, rows, step, n_jobs)
-        shapes = solve_modes(model, rows, dofs, n_jobs)[0][1]
+        results = solves.slopes(rows, step)
+        shapes = solves.results("modes", rows)[1]
 
         def with_the_same_signs(moved: Array) -> Array:
-            (_, there), found = solve_modes(model, moved, dofs, n_jobs)
-            findings.extend(found)
+            there = solves.results("modes", moved)[1]
             reference = np.tile(np.repeat(shapes, rows.shape[1], axis=0), (2, 1, 1))  # both sides of every parameter
             return there * np.sign(np.einsum("sdm,sdm->sm", there, reference))[:, np.newaxis]
 
-        slopes = central_differences(with_the_same_signs, rows, shapes, _step_size(step))
-        results = [frequencies, jacobian, shapes, slopes]
-    warn_each(findings)
+        results += [shapes, central_differences(with_the_same_signs, rows, shapes, _step_size(step))]
+    warn_each(solves.findings)
     return tuple(results)  # type: ignore[return-value]
 
 
@@ -504,7 +484,7 @@ def sample(
     """
     from skthermo.fem._samples import Samples  # imported here because scikit-learn imports pandas
 
-    check_model(model)
+    solves = Solves(model, n_jobs, dofs)
     lowest, highest = check_bounds(bounds, model.parameter_names).T
     n_samples = positive_integer(n_samples, "n_samples")
     if progress is not None:
@@ -512,14 +492,12 @@ def sample(
     theta = _unit_cube(method, n_samples, len(lowest), as_random_state(random_state))
     theta *= highest - lowest
     theta += lowest
-    check_jobs(n_jobs)
     if dofs is None:
-        frequencies, findings = solve_frequencies(model, theta, n_jobs, progress)
-        drawn = Samples(theta=theta, frequencies=frequencies)
+        drawn = Samples(theta=theta, frequencies=solves.results("frequencies", theta, progress)[0])
     else:
-        (frequencies, shapes), findings = solve_modes(model, theta, dofs, n_jobs)
+        frequencies, shapes = solves.results("modes", theta)
         drawn = Samples(theta=theta, frequencies=frequencies, shapes=shapes)
-    warn_each(findings)
+    warn_each(solves.findings)
     return drawn
 
 
