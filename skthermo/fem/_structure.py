@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import scipy.sparse
 
-from skthermo._core.arrays import Array, Label, Matrix, MatrixLike, real_array
+from skthermo._core.arrays import Array, Label, Matrix, MatrixLike, mapping_of, real_array
 from skthermo.fem._terms import Key, PartsOfMass
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.elements import (
@@ -146,29 +146,18 @@ class Structure:
         supports: Mapping[Hashable, Collection[str]],
         groups: Mapping[str, Collection[Hashable]] | None = None,
     ):
-        arguments = (
-            ("nodes", nodes, "a mapping of node to coordinates"),
-            ("members", members, "a mapping of member to element"),
-            (
-                "supports",
-                supports,
-                "a mapping of node to directions, such as {'left': 'xy'}, or {} where springs hold the structure",
-            ),
-            ("groups", groups or {}, "a mapping of group to members"),
-        )
-        for what, argument, expected in arguments:
-            if not isinstance(argument, Mapping):
-                raise ValueError(f"{what} is {argument!r:.200}; expected {expected}")
-        self._coordinates = read_coordinates(nodes)
-        self._members = dict(members)
+        either = "a mapping of node to directions, such as {'left': 'xy'}, or {} where springs hold the structure"
+        self._coordinates = read_coordinates(mapping_of(nodes, "nodes", "a mapping of node to coordinates"))
+        self._members = dict(mapping_of(members, "members", "a mapping of member to element"))
         places = np.array(list(self._coordinates.values()))
         extent = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
         for name, element in self._members.items():
             check_element(name, element, self._coordinates, extent)
         self._check_places()
-        self._groups = {group: self._read_group(group, names) for group, names in (groups or {}).items()}
-        self.dofs: list[Label] = list(self._free_dofs(supports))
-        self._supports = {node: tuple(_read_directions(along, node)) for node, along in supports.items()}
+        named = mapping_of(groups or {}, "groups", "a mapping of group to members")
+        self._groups = {group: self._read_group(group, names) for group, names in named.items()}
+        self._supports = self._read_supports(mapping_of(supports, "supports", either))
+        self.dofs: list[Label] = list(self._free_dofs())
 
     @property
     def dimension(self) -> int:
@@ -422,7 +411,7 @@ class Structure:
             raise ValueError(f"group {group!r} holds {list(unknown) or 'no member'}; expected names of members")
         return members
 
-    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> Sequence[Label]:
+    def _free_dofs(self) -> Sequence[Label]:
         directions = self._directions
         used: set[Dof] = set()
         for name, element in self._members.items():
@@ -436,22 +425,22 @@ class Structure:
         for node in self._coordinates:
             if node not in connected:
                 raise ValueError(f"node {node!r} is disconnected: no member ends there")
-        used -= self._fixed_dofs(supports)
+        used -= {(node, direction) for node, along in self._supports.items() for direction in along}
         free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
         if not free:
             raise ValueError("the supports fix every node in every direction; expected a structure that can move")
         return free
 
-    def _fixed_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> set[Dof]:
-        directions, fixed = self._directions, set()
+    def _read_supports(self, supports: Mapping[Hashable, Collection[str]]) -> dict[Hashable, tuple[str, ...]]:
+        found = {}
         for node, along in supports.items():
             if node not in self._coordinates:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
-            for direction in _read_directions(along, node):
-                if direction not in directions:
-                    raise ValueError(f"support of node {node!r} along {direction!r}; expected some of {directions}")
-                fixed.add((node, direction))
-        return fixed
+            found[node] = tuple(_read_directions(along, node))
+            wrong = [direction for direction in found[node] if direction not in self._directions]
+            if wrong:
+                raise ValueError(f"support of node {node!r} along {wrong[0]!r}; expected some of {self._directions}")
+        return found
 
     @property
     def _directions(self) -> tuple[str, ...]:
@@ -594,13 +583,11 @@ class ImportedStructure(Structure):
     ):
         if not isinstance(model, AffineModel):
             raise ValueError(f"model is {model!r:.200}; expected an AffineModel with a parameter for each member")
-        for what, argument in {"nodes": nodes, "members": members}.items():
-            if not isinstance(argument, Mapping) or not argument:
-                raise ValueError(f"{what} is {argument!r:.200}; expected a mapping that is not empty")
+        nodes, members = (mapping_of(one, "nodes and members", "mappings") for one in (nodes, members))
         self._matrices, self._rest = matrices_by_member(model, list(members))
-        if not isinstance(supports, Mapping | None):
-            raise ValueError(f"supports is {supports!r:.200}; expected a mapping of node to directions")
-        coordinates, ends = placed(nodes, members, supports or {})
+        coordinates, ends = placed(
+            nodes, members, mapping_of(supports or {}, "supports", "a mapping of node to directions")
+        )
         self._labels = model.dofs
         super().__init__(coordinates, {name: ImportedMember(ends[name]) for name in members}, supports or {}, groups)
         self._mass = model.matrices(np.ones(len(model.parameter_names)))[1]
@@ -629,8 +616,7 @@ class ImportedStructure(Structure):
         parts = PartsOfMass(masses if known else [], {name: tuple(scaled[name]) for name in known}, contents)
         return Assembled(terms, self._mass, scaled, contents, parts)
 
-    def _free_dofs(self, supports: Mapping[Hashable, Collection[str]]) -> Sequence[Label]:
-        self._fixed_dofs(supports)
+    def _free_dofs(self) -> Sequence[Label]:
         return self._labels
 
     def _sum_by_part(

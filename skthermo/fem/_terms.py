@@ -4,8 +4,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -14,7 +12,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array, Matrix, as_dense, is_real, mapping_of, real_array
 from skthermo.exceptions import ModelWarning, SkthermoWarning
-from skthermo.fem._factors import Factorise, elimination
+from skthermo.fem._factors import elimination
 
 Key = tuple[str, ...]
 Content = tuple[Hashable, tuple[str, ...]]
@@ -74,16 +72,16 @@ def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
     return names
 
 
-def check_severities(damage: Mapping[str, float], groups, *, lowest: float = -10.0) -> Mapping[str, float]:
+def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:
     """Check that groups are known, and severities leave some stiffness and are no percentages."""
     damage = mapping_of(damage, "damage", "a mapping of group to severity")
     for group, severity in damage.items():
         if group not in groups:
             raise ValueError(f"unknown damage group {group!r}; expected one of {sorted(groups)}")
-        if not (is_real(severity) and lowest <= float(severity) < 1):
+        if not (is_real(severity) and -10 <= float(severity) < 1):
             raise ValueError(
-                f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below "
-                f"{lowest:g} (0.5 halves the stiffness, -0.15 adds 15 %)"
+                f"damage of group {group!r} has severity {severity!r}; expected a number below 1, and not below -10 "
+                "(0.5 halves the stiffness, -0.15 adds 15 %)"
             )
     return damage
 
@@ -260,33 +258,6 @@ class DenseTerms(AffineTerms):
         return DenseTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
 
 
-@dataclass(frozen=True, eq=False)
-class SparsityPattern:
-    """Places of the entries of a sparse matrix, as compressed sparse columns."""
-
-    rows: NDArray[np.int32]
-    pointers: NDArray[np.int32]
-
-    def __post_init__(self) -> None:
-        self.rows.flags.writeable = self.pointers.flags.writeable = False
-
-    @property
-    def n_dof(self) -> int:
-        return len(self.pointers) - 1
-
-    @property
-    def columns(self) -> NDArray[np.int32]:
-        return np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
-
-    @cached_property
-    def factorise(self) -> Factorise:
-        """What factorises matrices of this pattern."""
-        return elimination(self.rows, self.pointers)
-
-    def matrix(self, data: Array) -> scipy.sparse.csc_array:
-        return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
-
-
 class SparseTerms(AffineTerms):
     """Terms on the union of their sparsity patterns: ``entries`` is (n_union, n_terms), one column for each matrix.
 
@@ -296,13 +267,28 @@ class SparseTerms(AffineTerms):
 
     is_dense, max_rows = False, 16  # sparse samples are solved one by one; a few of them are enough work for one task
 
-    def __init__(self, entries: scipy.sparse.csc_array, pattern: SparsityPattern, exponents: NDArray[np.int64]):
+    def __init__(
+        self,
+        entries: scipy.sparse.csc_array,
+        rows: NDArray[np.int32],
+        pointers: NDArray[np.int32],
+        exponents: NDArray[np.int64],
+    ):
         super().__init__(exponents)
-        self.entries = entries
-        self.pattern = pattern
-        self.n_dof, self.n_entries = pattern.n_dof, len(pattern.rows)
-        for array in (entries.data, entries.indices, entries.indptr):
+        self.entries, self.rows, self.pointers = entries, rows, pointers
+        self.n_dof, self.n_entries = len(pointers) - 1, len(rows)
+        self.factorise = elimination(rows, pointers)
+        for array in (entries.data, entries.indices, entries.indptr, rows, pointers):
             array.flags.writeable = False
+
+    @property
+    def columns(self) -> NDArray[np.int32]:
+        """Column of each entry of the union."""
+        return np.repeat(np.arange(self.n_dof, dtype=np.int32), np.diff(self.pointers))
+
+    def matrix(self, data: Array) -> scipy.sparse.csc_array:
+        """The matrix of these values in the places of the union."""
+        return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
 
     @classmethod
     def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "SparseTerms":
@@ -314,32 +300,32 @@ class SparseTerms(AffineTerms):
         values = np.concatenate([part.data for part in parts])
         entries = scipy.sparse.csc_array((values, (position, term)), shape=(len(union), len(parts)))
         pointers = np.searchsorted(union, np.arange(n_dof + 1) * n_dof)
-        return cls(entries, SparsityPattern((union % n_dof).astype(np.int32), pointers.astype(np.int32)), exponents)
+        return cls(entries, (union % n_dof).astype(np.int32), pointers.astype(np.int32), exponents)
 
     def assemble(self, theta: Array) -> list[scipy.sparse.csc_array]:
         sums = self.entries @ self.coefficients(theta).T
-        return [self.pattern.matrix(data) for data in sums.T.copy()]
+        return [self.matrix(data) for data in sums.T.copy()]
 
     def derivatives(self, theta: Array, vectors: Array) -> Array:
         slopes = np.empty((*vectors.shape, theta.shape[1]))
         for row, gradient in enumerate(self.coefficient_gradients(theta)):
             for parameter, weights in enumerate(gradient.T):
                 used = np.flatnonzero(weights)
-                matrix = self.pattern.matrix(self.entries[:, used] @ weights[used])
+                matrix = self.matrix(self.entries[:, used] @ weights[used])
                 slopes[row, :, :, parameter] = matrix @ vectors[row]
         return slopes
 
     def quadratic_forms(self, shapes: Array) -> Array:
-        columns = self.pattern.columns
-        forms = [self.entries.T @ (shape[self.pattern.rows] * shape[columns]) for shape in shapes]
+        columns = self.columns
+        forms = [self.entries.T @ (shape[self.rows] * shape[columns]) for shape in shapes]
         return np.array(forms).reshape(len(shapes), -1, shapes.shape[2]).swapaxes(1, 2)
 
     @property
     def each_matrix(self) -> list[scipy.sparse.csc_array]:
         ends = self.entries.indptr[1:-1]
         parts = zip(np.split(self.entries.data, ends), np.split(self.entries.indices, ends), strict=True)
-        rows, columns = self.pattern.rows, self.pattern.columns
-        places = ((data, (rows[union], columns[union])) for data, union in parts)
+        columns = self.columns
+        places = ((data, (self.rows[union], columns[union])) for data, union in parts)
         return [scipy.sparse.csc_array(place, shape=(self.n_dof, self.n_dof)) for place in places]
 
     def projected(self, basis: Array) -> DenseTerms:

@@ -233,13 +233,8 @@ def local_axes(x: Array, orientation: Sequence[float] | None) -> Array:
     if orientation is None:
         vertical = np.hypot(x[0], x[1]) < 1e-6
         orientation = (1.0, 0.0, 0.0) if vertical else (0.0, 0.0, 1.0)
-    y = cross(np.asarray(orientation, dtype=float), x)
+    y = np.cross(np.asarray(orientation, dtype=float), x)
     if not np.linalg.norm(y) > 1e-9 * np.linalg.norm(orientation):
         raise ValueError(f"orientation {tuple(orientation)} is along the beam; expected a vector across it")
     y /= np.linalg.norm(y)
-    return np.array([x, y, cross(x, y)])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Product of two vectors; `numpy.cross` takes ten times as long for one pair."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.array([x, y, np.cross(x, y)])

@@ -265,7 +265,7 @@ def mac(phi_a: ArrayLike, phi_b: ArrayLike) -> NDArray[np.float64]:
 
 
 def _columns(phi: ArrayLike, name: str) -> NDArray:
-    """Shapes times powers of two, which change no digit, so that squares neither overflow nor vanish."""
+    """Shapes of a largest component of 1, so that squares neither overflow nor vanish."""
     array = shape_array(phi, name, any_size=True)
     array = array[:, np.newaxis] if array.ndim == 1 else array
     if array.ndim != 2:
@@ -275,10 +275,7 @@ def _columns(phi: ArrayLike, name: str) -> NDArray:
     empty = np.flatnonzero(~array.any(axis=0))
     if empty.size:
         raise ValueError(f"{name}: shape {empty[0]} is zero at every degree of freedom")
-    largest = np.maximum(abs(array.real), abs(array.imag)).max(axis=0)
-    exponents = np.where(np.isfinite(largest), np.frexp(largest)[1], 0)
-    half = exponents // 2
-    return array * np.ldexp(1.0, -half) * np.ldexp(1.0, half - exponents)
+    return array / np.abs(array).max(axis=0)
 
 
 def match_modes(

@@ -25,7 +25,7 @@ class ShiftInvertSolver:
         self._stiffness = stiffness
         self._mass = mass
         self._start = seeded_start(stiffness.n_dof)
-        self._factorise = stiffness.pattern.factorise
+        self._factorise = stiffness.factorise
 
     def eigenvalues(self, theta: Array, n_modes: int) -> Array:
         solved = (lowest_modes(*matrices, n_modes, self._start)[0] for matrices in self._matrices(theta))
