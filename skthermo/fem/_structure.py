@@ -583,13 +583,13 @@ class ImportedStructure(Structure):
     ):
         if not isinstance(model, AffineModel):
             raise ValueError(f"model is {model!r:.200}; expected an AffineModel with a parameter for each member")
-        nodes, members = (mapping_of(one, "nodes and members", "mappings") for one in (nodes, members))
+        nodes = mapping_of(nodes, "nodes", "a mapping of node to coordinates")
+        members = mapping_of(members, "members", "a mapping of parameter to nodes")
+        supports = mapping_of(supports or {}, "supports", "a mapping of node to directions")
         self._matrices, self._rest = matrices_by_member(model, list(members))
-        coordinates, ends = placed(
-            nodes, members, mapping_of(supports or {}, "supports", "a mapping of node to directions")
-        )
+        coordinates, ends = placed(nodes, members, supports)
         self._labels = model.dofs
-        super().__init__(coordinates, {name: ImportedMember(ends[name]) for name in members}, supports or {}, groups)
+        super().__init__(coordinates, {name: ImportedMember(ends[name]) for name in members}, supports, groups)
         self._mass = model.matrices(np.ones(len(model.parameter_names)))[1]
         self._masses: dict[Hashable, Matrix] = dict(model.group_mass.items())
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import Array, Matrix, as_dense, is_real, mapping_of, real_array
+from skthermo._core.arrays import Array, Matrix, as_dense, check_names, is_real, mapping_of, real_array
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._factors import elimination
 
@@ -62,14 +62,14 @@ def failures_named(rows: Array, parameter_names: Sequence[str]) -> Iterator[None
         ) from error
 
 
-def check_different(parameter_names: Sequence[str] | str) -> tuple[str, ...]:
-    """Names of parameters, all different."""
-    if not isinstance(parameter_names, Iterable) or isinstance(parameter_names, bytes | type):
-        raise ValueError(f"parameter_names is {parameter_names!r}; expected one or more different names")
-    names = (parameter_names,) if isinstance(parameter_names, str) else tuple(parameter_names)
-    if not names or not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
-        raise ValueError(f"parameter_names is {names}; expected one or more different names")
-    return names
+def check_different(
+    names: Sequence[str] | str, what: str = "parameter_names", known: Iterable[str] | None = None
+) -> tuple[str, ...]:
+    """One or more different names, all of them known; a text is one."""
+    found = tuple(check_names([names] if isinstance(names, str) else names, what, known))
+    if not found:
+        raise ValueError(f"{what} is {names!r}; expected one or more different names")
+    return found
 
 
 def check_severities(damage: Mapping[str, float], groups) -> Mapping[str, float]:

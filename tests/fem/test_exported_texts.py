@@ -214,7 +214,7 @@ def test_stiffness_and_mass_of_one_job_have_one_name(tmp_path):
     ],
 )
 def test_errors_of_lines_of_entries_name_the_file(tmp_path, text, message):
-    with pytest.raises(FileNotFoundError, match=r"bridge\.sti does not exist; expected a text"):
+    with pytest.raises(FileNotFoundError, match=r"bridge\.sti does not exist as a file; expected a text"):
         read_triplets(tmp_path / "bridge.sti")
     (tmp_path / "bridge.sti").write_text(text)
     with pytest.raises(ValueError, match=rf"bridge\.sti: not readable as lines of entries .*{message}"):

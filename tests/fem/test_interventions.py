@@ -47,9 +47,9 @@ def test_damage_parameters_of_a_changed_model():
 
 
 def test_damage_parameters_refuse_unknown_groups_and_taken_names():
-    with pytest.raises(ValueError, match=r"unknown damage groups \['deck'\]"):
+    with pytest.raises(ValueError, match=r"damage groups names \['deck'\]"):
         make_truss().with_damage_parameters(["deck"])
-    with pytest.raises(ValueError, match="different names"):
+    with pytest.raises(ValueError, match="each name once"):
         make_truss().with_damage_parameters(["top"]).with_damage_parameters(["top"])
 
 

@@ -526,10 +526,7 @@ class AffineModel:
         ValueError
             If a name is unknown or repeated, or ``names`` is empty.
         """
-        kept = check_different(names)
-        unknown = [name for name in kept if name not in self.parameter_names]
-        if unknown:
-            raise ValueError(f"parameters {unknown} are unknown; expected some of {list(self.parameter_names)}")
+        kept = check_different(names, "parameters", self.parameter_names)
         columns = np.array([self.parameter_names.index(name) for name in kept])
         return self._with_core(self._whole.with_parameters(columns), kept)
 
@@ -572,10 +569,7 @@ class AffineModel:
         >>> truss.frequencies([[1, 1, 1, 1, 1.0], [1, 1, 1, 1, 0.5]])[:, 0].round(3)
         array([7.485, 6.359])
         """
-        chosen = check_different(list(self.groups) if groups is None else groups)
-        unknown = [group for group in chosen if group not in self.groups]
-        if unknown:
-            raise ValueError(f"unknown damage groups {unknown}; expected some of {sorted(self.groups)}")
+        chosen = check_different(list(self.groups) if groups is None else groups, "damage groups", self.groups)
         parts = self._lost_parts(chosen, kind)
         names = check_different([*self.parameter_names, *(f"1 - {direction_name(group, kind)}" for group in chosen)])
         scaled = np.zeros((len(self._whole.stiffness.factors), len(chosen)), dtype=np.int64)

@@ -155,12 +155,9 @@ def check_element(name: Hashable, element: Element, coordinates: Mapping[Hashabl
     if not isinstance(lumped, bool):
         raise ValueError(f"member {name!r} has lumped = {lumped!r:.100}; expected True or False")
     ends = element.ends(np.array([coordinates[node] for node in element.nodes]))
-    if len(ends) == 2 and np.array_equal(*ends):
-        first, last = element.nodes
-        raise ValueError(f"member {name!r} from node {first!r} to node {last!r} has zero length")
     sides = np.linalg.norm(ends - np.roll(ends, 1, axis=0), axis=1)
     shortest = 1e-6 * extent
-    if len(ends) > 1 and sides.min() < shortest:
+    if len(ends) > 1 and sides.min() <= shortest:
         raise ValueError(
             f"member {name!r} has a length of {sides.min():.3g} m; expected at least {shortest:.3g} m, "
             f"a millionth of the structure's extent of {extent:.6g} m: are two of its nodes the same?"

@@ -30,12 +30,7 @@ def read_parameter_groups(
     if groups is None:
         return {name: (name,) for name in parameter_names}
     groups = mapping_of(groups, "groups", "a mapping of group to the parameters that it scales")
-    found = {group: check_different(names) for group, names in groups.items()}
-    for group, names in found.items():
-        unknown = [name for name in names if name not in parameter_names]
-        if unknown:
-            raise ValueError(f"group {group!r} names {unknown}; expected some of {list(parameter_names)}")
-    return found
+    return {group: check_different(names, f"group {group!r}", parameter_names) for group, names in groups.items()}
 
 
 def frequencies_of_row(

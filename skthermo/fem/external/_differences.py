@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import reduce
 from numbers import Integral
 from operator import add
@@ -236,17 +236,24 @@ def _check_sum(
     if unknown:
         raise ValueError(f"check has the multipliers {dict(multipliers)!r:.200}; expected numbers for some of {names}")
     whole = _read(matrix, "the matrix of check", base.shape[0])
-    changes = ((multipliers[name] - 1) * terms[name,] for name in multipliers)
-    entries = (whole - reduce(add, changes, base)).tocoo()
-    share = relative(entries, base.diagonal())
-    if share.size and share.max() > SAME_ENTRIES:
-        row = int(entries.row[np.argmax(share)])
+    share, row = largest_difference(whole, terms.items(), dict.fromkeys(names, 1.0) | {**multipliers})
+    if share > SAME_ENTRIES:
         involved = [name for name in multipliers if terms[name,].diagonal()[row] > 0]
         raise ValueError(
             f"at {dict(multipliers)} the stiffness differs from the sum of the terms, most in row {row}, by "
-            f"{share.max():.2%} of the diagonal; expected a stiffness that is linear in "
+            f"{share:.2%} of the diagonal; expected a stiffness that is linear in "
             f"{involved or list(multipliers)}, each of which acts alone"
         )
+
+
+def largest_difference(
+    matrix: scipy.sparse.csc_array, pairs: Iterable[tuple[Key, scipy.sparse.csc_array]], theta: Mapping[str, float]
+) -> tuple[float, int]:
+    """Largest difference of a matrix from the sum of terms at multipliers, relative to the diagonal, and its row."""
+    affine = reduce(add, (np.prod([theta[name] for name in key]) * term for key, term in pairs))
+    entries = (matrix - affine).tocoo()
+    share = relative(entries, matrix.diagonal())
+    return (float(share.max()), int(entries.row[share.argmax()])) if share.size else (0.0, 0)
 
 
 class Program:
@@ -274,43 +281,33 @@ class Program:
         return matrices
 
 
-def check_affine(program: Program, terms: tuple[TermPairs, TermPairs], row: Array) -> None:
+def check_affine(program: Program, terms: Sequence[TermPairs], row: Array) -> None:
     """Raise an error if the matrices of a program at a row of multipliers are not the sum of its terms."""
-    if _difference(program, terms, row) is None:
+    names, columns = program.parameter_names, range(len(row))
+
+    def difference(moved: Sequence[int]) -> tuple[str, float] | None:
+        """Which matrix differs where only some parameters have multipliers, and by which share of the diagonal."""
+        theta = np.where(np.isin(columns, moved), row, 1.0)
+        for what, matrix, pairs in zip(("stiffness", "mass"), program(theta), terms, strict=True):
+            share, _ = largest_difference(matrix, pairs, by_name(theta, names))
+            if share > SAME_ENTRIES:
+                return what, share
+        return None
+
+    if difference(columns) is None:
         return
-    names = program.parameter_names
-    ones, columns = np.ones(len(row)), np.arange(len(row))
-    for j, name in enumerate(names):
-        if _difference(program, terms, np.where(columns <= j, row, ones)) is None:
-            continue
-        if found := _difference(program, terms, np.where(columns == j, row, ones)):
-            _refuse(repr(name), found, f"{name} = {row[j]:.3g}")
-        for i in range(j):
-            if found := _difference(program, terms, np.where(np.isin(columns, (i, j)), row, ones)):
-                both = f"{names[i]!r} and {name!r} together"
-                _refuse(both, found, f"{names[i]} = {row[i]:.3g}, {name} = {row[j]:.3g}: it may hold their product")
-        raise ValueError(f"the program is not affine: {name!r} acts together with two or more of {list(names[:j])}")
-
-
-def _difference(program: Program, terms: tuple[TermPairs, TermPairs], row: Array) -> tuple[str, float] | None:
-    """Which matrix of a program differs from the affine one, and by which share of the diagonal."""
-    theta = by_name(row, program.parameter_names)
-    for what, matrix, pairs in zip(("stiffness", "mass"), program(row), terms, strict=True):
-        affine = reduce(add, (np.prod([theta[name] for name in key]) * term for key, term in pairs))
-        entries = (matrix - affine).tocoo()
-        share = relative(entries, matrix.diagonal())
-        if share.size and share.max() > SAME_ENTRIES:
-            return what, float(share.max())
-    return None
-
-
-def _refuse(names: str, found: tuple[str, float], where: str) -> None:
-    matrix, share = found
-    raise ValueError(
-        f"the program is not affine in {names}: its {matrix} differs by {share:.2%} of the diagonal from "
-        f"K_0 + sum of theta_j K_j at {where}; expected each parameter to act alone and to the first power (let one "
-        "stand for the power or product), or CallableModel for what is not affine"
-    )
+    last = next(j for j in columns if difference(columns[: j + 1]))
+    for moved in ([last], *([i, last] for i in columns[:last])):
+        if found := difference(moved):
+            together, product = (" together", ": it may hold their product") if len(moved) > 1 else ("", "")
+            raise ValueError(
+                f"the program is not affine in {' and '.join(repr(names[j]) for j in moved)}{together}: its {found[0]} "
+                f"differs by {found[1]:.2%} of the diagonal from K_0 + sum of theta_j K_j at "
+                f"{', '.join(f'{names[j]} = {row[j]:.3g}' for j in moved)}{product}; expected each parameter to act "
+                "alone and to the first power (let one stand for the power or product), or CallableModel for what is "
+                "not affine"
+            )
+    raise ValueError(f"the program is not affine: {names[last]!r} acts together with two or more of {[*names[:last]]}")
 
 
 def probe(

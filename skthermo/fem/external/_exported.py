@@ -67,10 +67,10 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
            [-400.,  400.]])
     """
     file = check_path(path)
-    if not file.exists():
-        raise FileNotFoundError(f"{file} does not exist; expected a text of row, column and value in each line")
     if not file.is_file():
-        raise ValueError(f"{file} is a folder or a device; expected a text of row, column and value in each line")
+        raise FileNotFoundError(
+            f"{file} does not exist as a file; expected a text of row, column and value in each line"
+        )
     matrix = read_file(file, "lines of entries")
     if isinstance(matrix, Labelled):
         raise ValueError(f"{file} holds labels of nodes; expected row, column and value in each line, or load_affine")
@@ -259,7 +259,12 @@ def _roles(
         raise ValueError(f"no stiffness matrix beside the mass {mass!r}; found {list(exports.matrices)}")
     terms = {name: exports.matrix(name, mass_matrix.shape) for name in keys}
     if factor is not None:
-        differences, doubts = read_differences(exports.nominal(found, mass_matrix.shape), terms, factor)
+        if not found:
+            raise ValueError(
+                f"factor is given, but no matrix is called {', '.join(TOTAL_NAMES)}; expected the stiffness as built, "
+                f"or total=..., one of {list(exports.matrices)}"
+            )
+        differences, doubts = read_differences(exports.matrix(found, mass_matrix.shape), terms, factor)
         return [(keys[name[0]] if name else (), term) for name, term in differences.items()], mass_matrix, doubts
     pairs = [(keys[name], term) for name, term in terms.items()]
     if found and (rest := exports.rest(found, terms)) is not None:
@@ -340,19 +345,11 @@ class Exports:
 
     def total_name(self, mass: str, keys: Collection[str] | None, *, has_factor: bool) -> str | None:
         """The whole stiffness: a matrix with a usual name that is no term, beside others."""
+        others = [name for name in self.square if name not in (*(keys or ()), mass) and not name.endswith(MASS_OF)]
         shape = self.matrix(mass).shape
-        if keys:
-            others = [name for name in self.square if name not in (*keys, mass)]
-            candidates = [name for name in others if self._is_finite_of(name, shape)]
-        else:
-            candidates = list(self.beside(mass, shape)) if keys is None else []
-            candidates = candidates if len(candidates) > 1 else []
-        found = self.usual(candidates, TOTAL_NAMES, "total")
+        candidates = [name for name in others if (one := self.matrices[name]).shape == shape and _is_finite(one)]
+        found = self.usual(candidates, TOTAL_NAMES, "total") if keys or len(candidates) > 1 else None
         return self.usual(self.square, TOTAL_NAMES, "total") if found is None and has_factor else found
-
-    def _is_finite_of(self, name: str, shape: tuple[int, ...]) -> bool:
-        matrix = self.matrices[name]
-        return matrix is not None and matrix.shape == shape and _is_finite(matrix)
 
     def beside(self, mass: str, shape: tuple[int, ...]) -> dict[str, Matrix]:
         """All square matrices except masses."""
@@ -360,8 +357,8 @@ class Exports:
             name: self.matrix(name, shape)
             for name, one in self.matrices.items()
             if name != mass
-            and not (name in self.square and name.endswith(MASS_OF))
-            and (name in self.square or (one is not None and np.iscomplexobj(one) and one.shape == shape))
+            and not name.endswith(MASS_OF)
+            and (name in self.square or (np.iscomplexobj(one) and np.shape(one) == shape))
         }
 
     def terms_beside(
@@ -398,15 +395,6 @@ class Exports:
             for name, what in similar.items()
         ]
         return found, doubts
-
-    def nominal(self, total: Total, shape: tuple[int, ...]) -> Matrix:
-        """The stiffness as built, beside those with one parameter multiplied."""
-        if not total:
-            raise ValueError(
-                f"factor is given, but no matrix is called {', '.join(TOTAL_NAMES)}; expected the stiffness as built, "
-                f"or total=..., one of {list(self.matrices)}"
-            )
-        return self.matrix(total, shape)
 
     def rest(self, total: str, terms: Mapping[str, Matrix]) -> Matrix | None:
         """The total minus all terms; None if nothing is left."""
