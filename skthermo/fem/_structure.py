@@ -31,8 +31,7 @@ class TermAssembler:
 
     def __init__(self, dofs: Sequence[Label]):
         self._index = {dof: i for i, dof in enumerate(dofs)}
-        self._entries: dict[tuple[Key, frozenset[str]], list] = {}
-        self._contents: dict[tuple[Key, frozenset[str]], list[tuple[Hashable, Key]]] = {}
+        self._entries: dict[tuple[Key, frozenset[str]], list[tuple[tuple[Hashable, Key], tuple[Array, ...]]]] = {}
 
     def add(
         self,
@@ -55,13 +54,15 @@ class TermAssembler:
             )
             groups = frozenset(g for g, prop in (damage or {}).items() if prop in ("stiffness", *properties))
             block = matrix[square].ravel()
-            self._entries.setdefault((key, groups), []).append((block, *grid))
-            self._contents.setdefault((key, groups), []).append((member, properties))
+            self._entries.setdefault((key, groups), []).append(((member, properties), (block, *grid)))
 
     def terms(self) -> list[tuple[Key, scipy.sparse.csr_array]]:
         """Parameters and matrix of every term."""
-        terms = [(key, self._matrix(blocks)) for (key, _), blocks in self._entries.items()]
-        return terms or [((), self._matrix([]))]
+        shape, terms = (len(self._index), len(self._index)), list[tuple[Key, scipy.sparse.csr_array]]()
+        for (key, _), entries in self._entries.items():
+            values, rows, columns = map(np.concatenate, zip(*(block for _, block in entries), strict=True))
+            terms.append((key, scipy.sparse.csr_array((values, (rows, columns)), shape=shape)))
+        return terms or [((), scipy.sparse.csr_array(shape))]
 
     def positions(self, group: str) -> list[int]:
         """Positions of the terms that a damage group scales."""
@@ -70,14 +71,7 @@ class TermAssembler:
     @property
     def contents(self) -> list[list[tuple[Hashable, Key]]]:
         """Members and properties whose matrices each term sums."""
-        return list(self._contents.values())
-
-    def _matrix(self, blocks: Sequence[tuple[np.ndarray, ...]]) -> scipy.sparse.csr_array:
-        shape = (len(self._index), len(self._index))
-        if not blocks:
-            return scipy.sparse.csr_array(shape)
-        values, rows, columns = (np.concatenate([b[i] for b in blocks]) for i in range(3))
-        return scipy.sparse.csr_array((values, (rows, columns)), shape=shape)
+        return [[content for content, _ in entries] for entries in self._entries.values()]
 
 
 Binding = tuple[str, str] | tuple[str, str, str]

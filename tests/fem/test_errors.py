@@ -91,8 +91,8 @@ I2 = np.eye(2)
         ({"stiffness": {("k",): np.diag([1.0, 0.0])}}, "mechanism: degree of freedom 1 can move"),
         ({"stiffness": {("k",): [[1, 1], [1, 1.0]]}}, "mechanism: degree of freedom 0, degree of freedom 1|1, degree"),
         ({"mass": np.diag([1.0, 0.0]), "n_modes": 2}, "1 of them massless, have only 1 modes"),
-        ({"parameter_names": ["E"]}, r"terms name \['k'\]; expected only the parameters \['E'\]"),
-        ({"parameter_names": ["k", "E"]}, r"no term names the parameters \['E'\]"),
+        ({"parameter_names": ["E"]}, r"terms name \['k'\]; expected all of the parameters \['E'\]"),
+        ({"parameter_names": ["k", "E"]}, r"terms name \['k'\]; expected all of the parameters \['k', 'E'\]"),
         ({"groups": {"deck": [("E",)]}}, r"group 'deck' names the term \('E',\)"),
     ],
 )

@@ -988,19 +988,12 @@ class ReducedModel(AffineModel):
 
 def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> tuple[str, ...]:
     """Names of the parameters, checked: each occurs in some term, and the terms contain no other names."""
-    mentioned = dict.fromkeys(name for key in keys for name in key)
-    if parameter_names is None:
-        names = tuple(mentioned)
-        if not names:
-            raise ValueError("no term names a parameter; expected at least one, such as ('E_deck',)")
-        return names
-    names = check_different(parameter_names)
-    unknown = [name for name in mentioned if name not in names]
-    if unknown:
-        raise ValueError(f"terms name {unknown}; expected only the parameters {list(names)}")
-    unused = [name for name in names if name not in mentioned]
-    if unused:
-        raise ValueError(f"no term names the parameters {unused}; expected some of {list(mentioned)}")
+    mentioned = list(dict.fromkeys(name for key in keys for name in key))
+    if parameter_names is None and not mentioned:
+        raise ValueError("no term names a parameter; expected at least one, such as ('E_deck',)")
+    names = tuple(mentioned) if parameter_names is None else check_different(parameter_names)
+    if set(names) != set(mentioned):
+        raise ValueError(f"terms name {mentioned}; expected all of the parameters {list(names)}, and no other names")
     return names
 
 
@@ -1075,10 +1068,10 @@ def check_labels(dofs: Sequence[Label], n_dof: int) -> tuple[Label, ...]:
         raise ValueError(
             f"dofs is {dofs!r:.200}; expected a tuple of node and direction for each row, such as (12, 'x')"
         )
-    if dofs and len(dofs) != n_dof:
-        raise ValueError(f"dofs holds {len(dofs)} labels; expected {n_dof}, one for each row")
-    if len(set(dofs)) < len(dofs):
-        raise ValueError(f"dofs is {dofs!r:.200}; expected different labels")
+    if dofs and not len(dofs) == len(set(dofs)) == n_dof:
+        raise ValueError(
+            f"dofs holds {len(dofs)} labels, {len(set(dofs))} of them different; expected {n_dof} different"
+        )
     return tuple(dofs)
 
 

@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 from skthermo._core.arrays import Array, RandomState, as_random_state
 from skthermo._core.parallel import map_on_blas_threads
 from skthermo.fem._factors import Solve, factorise
-from skthermo.fem.modal import AffineCore, may_be_missed, pair_modes
+from skthermo.fem.modal import AffineCore
 
 
 class Basis(NamedTuple):
@@ -93,9 +93,7 @@ def snapshots_at(full: AffineCore, theta: Array) -> Array:
         shapes += [*candidates]
         if not full.track or n_candidates == full.max_candidates:
             break
-        mac, repeated = full.nominal_mac(candidates), full.nominal.repeated
-        spread = full.nominal.mass_spread(rows, full.mass)
-        rows = rows[may_be_missed(mac, pair_modes(mac, repeated), repeated, spread)]
+        rows = rows[full.paired(rows, candidates)[2]]
         n_candidates = min(2 * n_candidates, full.max_candidates)
     side_by_side = np.hstack(shapes)
     return side_by_side[:, np.isfinite(side_by_side).all(axis=0)]

@@ -231,16 +231,19 @@ class AffineCore:
         masses = self.mass.quadratic_forms(shapes) @ self.nominal.mass_coefficients
         return (self.nominal.weighted_shapes.T @ shapes) ** 2 / masses[:, np.newaxis]
 
+    def paired(self, theta: Array, candidates: Array) -> tuple[Array, NDArray[np.intp], NDArray[np.bool_]]:
+        """MAC of nominal modes with candidates, which candidate is which mode, and rows in which one may be missed."""
+        mac, repeated = self.nominal_mac(candidates), self.nominal.repeated
+        order = pair_modes(mac, repeated)
+        return mac, order, may_be_missed(mac, order, repeated, self.nominal.mass_spread(theta, self.mass))
+
     def local_modes(self, row: Array, *, follow: bool, basis: Array | None = None) -> LocalModes:
         """The lowest modes at one row of theta; with ``follow``, enough of them to hold every nominal mode."""
         n_candidates = self.first_candidates
         while True:
             eigenvalues, shapes, solve = self.solver.local_modes(row, n_candidates)
-            mac = self.nominal_mac(shapes[np.newaxis])
-            ranks = pair_modes(mac, self.nominal.repeated)
-            if not follow or n_candidates == self.max_candidates:
-                break
-            if not may_be_missed(mac, ranks, self.nominal.repeated, self.nominal.mass_spread(row, self.mass))[0]:
+            mac, ranks, missed = self.paired(row, shapes[np.newaxis])
+            if not follow or n_candidates == self.max_candidates or not missed[0]:
                 break
             n_candidates = min(2 * n_candidates, self.max_candidates)
         return LocalModes(
@@ -258,30 +261,28 @@ class AffineCore:
     def _tracked(self, theta: Array, n_candidates: int) -> tuple[Array, Array]:
         """Nominal modes found among the lowest candidates, or among more candidates where the match is uncertain."""
         eigenvalues, candidates = self.solver.modes(theta, n_candidates)
-        mac = self.nominal_mac(candidates)
-        order, spread = pair_modes(mac, self.nominal.repeated), self.nominal.mass_spread(theta, self.mass)
+        _, order, missed = self.paired(theta, candidates)
         frequencies = np.take_along_axis(np.sqrt(eigenvalues) / (2 * np.pi), order, axis=1)
         shapes = np.take_along_axis(candidates, order[:, np.newaxis], axis=2)
-        missed = may_be_missed(mac, order, self.nominal.repeated, spread)
         if n_candidates < self.max_candidates and missed.any():
             more = min(2 * n_candidates, self.max_candidates)
             frequencies[missed], shapes[missed] = self._tracked(theta[missed], more)
         return frequencies, shapes
 
 
-def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
+def pair_modes(mac: NDArray[np.float64], repeated: NDArray[np.bool_]) -> NDArray[np.intp]:
     """The candidate of each reference mode, (n_samples, n_modes), so that the sum of MACs is highest.
 
     ``mac`` is (n_samples, n_modes, n_candidates). Reference modes that share a ``repeated`` frequency, (n_modes,
     n_modes), have an arbitrary basis of the space they span as their shapes: candidates are compared with that space,
     and those assigned to it are sorted by frequency.
     """
-    spans = np.nan_to_num(mac if repeated is None else repeated @ mac)
+    spans = np.nan_to_num(repeated @ mac)
     best = spans.argmax(axis=2)
     distinct = (np.diff(np.sort(best, axis=1), axis=1) > 0).all(axis=1)
     for sample in np.flatnonzero(~distinct):
         best[sample] = linear_sum_assignment(spans[sample], maximize=True)[1]
-    for cluster in () if repeated is None else np.unique(repeated, axis=0):
+    for cluster in np.unique(repeated, axis=0):
         best[:, cluster] = np.sort(best[:, cluster], axis=1)
     return best
 
