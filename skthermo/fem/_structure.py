@@ -107,6 +107,10 @@ class Structure:
     ----------
     dofs : list of (node, direction)
         Free degrees of freedom in the order of the matrices' rows.
+    nodes, members : dict
+        Coordinates of every node in m, and elements by name.
+    groups, supports : dict
+        Members of every named group, and fixed directions of every supported node.
 
     Raises
     ------
@@ -141,47 +145,27 @@ class Structure:
         groups: Mapping[str, Collection[Hashable]] | None = None,
     ):
         either = "a mapping of node to directions, such as {'left': 'xy'}, or {} where springs hold the structure"
-        self._coordinates = read_coordinates(mapping_of(nodes, "nodes", "a mapping of node to coordinates"))
-        self._members = dict(mapping_of(members, "members", "a mapping of member to element"))
-        places = np.array(list(self._coordinates.values()))
+        self.nodes = read_coordinates(mapping_of(nodes, "nodes", "a mapping of node to coordinates"))
+        self.members = dict(mapping_of(members, "members", "a mapping of member to element"))
+        places = np.array(list(self.nodes.values()))
         extent = float(np.linalg.norm(places.max(axis=0) - places.min(axis=0)))
-        for name, element in self._members.items():
-            check_element(name, element, self._coordinates, extent)
+        for name, element in self.members.items():
+            check_element(name, element, self.nodes, extent)
         self._check_places()
         named = mapping_of(groups or {}, "groups", "a mapping of group to members")
-        self._groups = {group: self._read_group(group, names) for group, names in named.items()}
-        self._supports = self._read_supports(mapping_of(supports, "supports", either))
+        self.groups = {group: self._read_group(group, names) for group, names in named.items()}
+        self.supports = self._read_supports(mapping_of(supports, "supports", either))
         self.dofs: list[Label] = list(self._free_dofs())
 
     @property
     def dimension(self) -> int:
         """2 or 3."""
-        return len(next(iter(self._coordinates.values())))
+        return len(next(iter(self.nodes.values())))
 
     @property
     def n_dof(self) -> int:
         """Number of free degrees of freedom."""
         return len(self.dofs)
-
-    @property
-    def nodes(self) -> dict[Hashable, Array]:
-        """Coordinates of every node in m."""
-        return dict(self._coordinates)
-
-    @property
-    def members(self) -> dict[Hashable, Element]:
-        """Elements by name."""
-        return dict(self._members)
-
-    @property
-    def groups(self) -> dict[str, frozenset]:
-        """Members of every named group."""
-        return dict(self._groups)
-
-    @property
-    def supports(self) -> dict[Hashable, tuple[str, ...]]:
-        """Fixed directions of every supported node."""
-        return dict(self._supports)
 
     def assemble(
         self,
@@ -221,7 +205,7 @@ class Structure:
             is a mechanism.
         """
         bindings = self._read_bindings(parameters, "parameter")
-        damageable = self._read_bindings(list(self._groups) if groups is None else groups, "damage group")
+        damageable = self._read_bindings(list(self.groups) if groups is None else groups, "damage group")
         stiffness, mass, scaled, contents, parts = self._assembled(bindings, damageable)
         scaled = {name: terms for name, terms in scaled.items() if terms or groups is not None}
         known = {name: places for name, places in parts.groups.items() if name in scaled}
@@ -239,8 +223,8 @@ class Structure:
 
     def _assembled(self, bindings: Mapping[str, Target], damageable: Mapping[str, Target]) -> Assembled:
         stiffness, mass, parts = (TermAssembler(self.dofs) for _ in range(3))
-        for name, element in self._members.items():
-            coordinates = np.array([self._coordinates[node] for node in element.nodes])
+        for name, element in self.members.items():
+            coordinates = np.array([self.nodes[node] for node in element.nodes])
             dofs = element.dofs(self.dimension)
             damage = self._bound(name, damageable, "stiffness")
             matrices = check_matrices(name, element, element.stiffness(coordinates), len(dofs), "stiffness")
@@ -334,8 +318,8 @@ class Structure:
         """Summed matrices of the members of every part of a term, after a check that all members make up the term."""
         assembler = TermAssembler(self.dofs)
         for member, properties in contents:
-            element = self._members.get(member)
-            nodes = [] if element is None else [self._coordinates[node] for node in element.nodes]
+            element = self.members.get(member)
+            nodes = [] if element is None else [self.nodes[node] for node in element.nodes]
             matrices = {} if element is None else getattr(element, what)(np.array(nodes))
             if element is None or properties not in matrices:
                 raise ValueError(
@@ -353,7 +337,7 @@ class Structure:
         return {
             name: prop
             for name, (prop, group, matrices) in bindings.items()
-            if member in self._groups[group] and matrix in matrices
+            if member in self.groups[group] and matrix in matrices
         }
 
     def _read_bindings(self, targets, what: str) -> dict[str, Target]:
@@ -372,10 +356,10 @@ class Structure:
             matrices = (prop,) if prop in ("stiffness", "mass") else ("stiffness", "mass")
             if not set(where) <= set(matrices):
                 raise ValueError(f"{what} {name!r} is {target!r}; expected {' or '.join(matrices)} as its matrix")
-            if group not in self._groups:
-                raise ValueError(f"{what} {name!r}: unknown group {group!r}; expected one of {sorted(self._groups)}")
-            members = self._groups[group]
-            known = {symbol for member in members for symbol, _, _ in self._members[member].properties()}
+            if group not in self.groups:
+                raise ValueError(f"{what} {name!r}: unknown group {group!r}; expected one of {sorted(self.groups)}")
+            members = self.groups[group]
+            known = {symbol for member in members for symbol, _, _ in self.members[member].properties()}
             if prop not in known | {"stiffness", "mass"}:
                 raise ValueError(
                     f"{what} {name!r} is the property {prop!r} of group {group!r}; "
@@ -386,9 +370,9 @@ class Structure:
 
     def _check_places(self) -> None:
         """Refuse two nodes at one place that no member connects: a joint has a spring."""
-        connected = [set(element.nodes) for element in self._members.values()]
+        connected = [set(element.nodes) for element in self.members.values()]
         first: dict[tuple[float, ...], Hashable] = {}
-        for node, xyz in self._coordinates.items():
+        for node, xyz in self.nodes.items():
             twin = first.setdefault(tuple(xyz.tolist()), node)
             if twin != node and not any({twin, node} <= nodes for nodes in connected):
                 raise ValueError(
@@ -400,7 +384,7 @@ class Structure:
         if not isinstance(names, Collection):
             raise ValueError(f"group {group!r} is {names!r}; expected names of members")
         members = frozenset([names] if isinstance(names, str) else names)
-        unknown = members - self._members.keys()
+        unknown = members - self.members.keys()
         if unknown or not members:
             raise ValueError(f"group {group!r} holds {list(unknown) or 'no member'}; expected names of members")
         return members
@@ -408,19 +392,19 @@ class Structure:
     def _free_dofs(self) -> Sequence[Label]:
         directions = self._directions
         used: set[Dof] = set()
-        for name, element in self._members.items():
+        for name, element in self.members.items():
             for node, direction in element.dofs(self.dimension):
                 if direction not in directions:
                     raise ValueError(
                         f"member {name!r} acts along {direction!r} of node {node!r}; expected one of {directions}"
                     )
                 used.add((node, direction))
-        connected = {node for element in self._members.values() for node in element.nodes}
-        for node in self._coordinates:
+        connected = {node for element in self.members.values() for node in element.nodes}
+        for node in self.nodes:
             if node not in connected:
                 raise ValueError(f"node {node!r} is disconnected: no member ends there")
-        used -= {(node, direction) for node, along in self._supports.items() for direction in along}
-        free = [dof for node in self._coordinates for d in directions if (dof := (node, d)) in used]
+        used -= {(node, direction) for node, along in self.supports.items() for direction in along}
+        free = [dof for node in self.nodes for d in directions if (dof := (node, d)) in used]
         if not free:
             raise ValueError("the supports fix every node in every direction; expected a structure that can move")
         return free
@@ -428,7 +412,7 @@ class Structure:
     def _read_supports(self, supports: Mapping[Hashable, Collection[str]]) -> dict[Hashable, tuple[str, ...]]:
         found = {}
         for node, along in supports.items():
-            if node not in self._coordinates:
+            if node not in self.nodes:
                 raise ValueError(f"the supports name node {node!r}, which is not among the nodes")
             found[node] = tuple(_read_directions(along, node))
             wrong = [direction for direction in found[node] if direction not in self._directions]
@@ -442,8 +426,8 @@ class Structure:
 
     def __repr__(self) -> str:
         return (
-            f"{type(self).__name__}({len(self._coordinates)} nodes, {len(self._members)} members, "
-            f"{self.n_dof} degrees of freedom, groups {sorted(self._groups)})"
+            f"{type(self).__name__}({len(self.nodes)} nodes, {len(self.members)} members, "
+            f"{self.n_dof} degrees of freedom, groups {sorted(self.groups)})"
         )
 
 
@@ -596,7 +580,7 @@ class ImportedStructure(Structure):
             if what == "mass":
                 raise ValueError(f"{name!r} multiplies mass, which is not known by member; expected groups")
         members_of: dict[tuple[Key, Key], list[Hashable]] = {}
-        for member in self._members:
+        for member in self.members:
             key, damage = (tuple(self._bound(member, bound, "stiffness")) for bound in (bindings, damageable))
             members_of.setdefault((key, damage), []).append(member)
         terms = [(key, self._sum_of(members, self._matrices)) for (key, _), members in members_of.items()]
@@ -605,7 +589,7 @@ class ImportedStructure(Structure):
             terms.append(((), self._rest))
             contents.append([])
         scaled = {name: [i for i, (_, damage) in enumerate(members_of) if name in damage] for name in damageable}
-        known = [name for name, (_, group, _) in damageable.items() if self._groups[group] <= self._masses.keys()]
+        known = [name for name, (_, group, _) in damageable.items() if self.groups[group] <= self._masses.keys()]
         masses = [((), self._sum_of(members, self._masses)) for members in members_of.values()]
         parts = PartsOfMass(masses if known else [], {name: tuple(scaled[name]) for name in known}, contents)
         return Assembled(terms, self._mass, scaled, contents, parts)

@@ -384,13 +384,10 @@ def probe(
     names = check_different(parameter_names)
     program = Program(assemble, names)
     base = program(np.ones(len(names)))
-    doubled = [program(row) for row in 1 + np.eye(len(names))]
+    doubled = {name: program(row) for name, row in zip(names, 1 + np.eye(len(names)), strict=True)}
     factors = dict.fromkeys(names, 2.0)
     stiffness, mass = (
-        list(
-            split(base[i], {name: matrices[i] for name, matrices in zip(names, doubled, strict=True)}, factors).items()
-        )
-        for i in range(2)
+        list(split(base[i], {name: doubled[name][i] for name in names}, factors).items()) for i in range(2)
     )
     for name in names:
         if (name,) not in [key for key, _ in stiffness + mass]:

@@ -9,7 +9,8 @@ import csv
 import io
 import re
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -360,15 +361,25 @@ class Head(NamedTuple):
         return symmetric(*entries, in_order=True) if self.form == 6 else square(*entries)
 
 
+Announced = tuple[str, Head, Callable[[], scipy.sparse.csc_array | None]]
+"""Where a matrix begins, its head, and what reads it."""
+
+
 def read_op4(content: bytes) -> dict[str, scipy.sparse.csc_array | None]:
     """Matrices of Nastran's OUTPUT4 by name, dense or sparse; None for complex or rectangular ones.
 
     MSC Nastran DMAP Programmer's Guide, module OUTPUT4. Rows have no labels.
     """
-    return dict(_in_records(content) if 0 in content[:4] else _in_lines(lines_ended(content)))
+    found = {}
+    for where, head, read in _in_records(content) if 0 in content[:4] else _in_lines(lines_ended(content)):
+        try:
+            found[head.name] = read()
+        except ValueError as error:
+            raise ValueError(f"matrix {head.name!r} of {where}: {error}") from error
+    return found
 
 
-def _in_lines(text: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | None]]:
+def _in_lines(text: bytes) -> Iterator[Announced]:
     """Matrices of a text: a heading, then a line for each column or string, and its values."""
     lines = enumerate(io.BytesIO(text), start=1)
     for number, line in lines:
@@ -381,15 +392,12 @@ def _in_lines(text: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | None]
         n_columns, n_rows, form, kind = map(int, heading.groups()[:4])
         head = Head(n_columns, n_rows, form, kind, heading[5].decode("ascii"))
         n, width = map(int, heading.group(6, 7)) if heading[6] else (5, 16)
-        try:
-            yield head.name, _of_text(lines, head, n, width)
-        except ValueError as error:
-            raise ValueError(f"matrix {head.name!r} of line {number}: {error}") from error
+        yield f"line {number}", head, partial(_of_text, lines, head, n, width)
 
 
 def _of_text(lines: Iterator[tuple[int, bytes]], head: Head, n: int, width: int) -> scipy.sparse.csc_array | None:
     """The matrix whose columns are the next lines; values stand n in a line, in fields of a width."""
-    strings, stated, values, column = list[list[int]](), list[tuple[int, int, bool]](), array("d"), 0
+    strings, values, column = list[list[int]](), array("d"), 0
     for number, line in lines:
         if b"." in line:
             length = line.count(b".")
@@ -402,12 +410,15 @@ def _of_text(lines: Iterator[tuple[int, bytes]], head: Head, n: int, width: int)
                 line = line.translate(FORTRAN)
                 values.extend(reals([line[i : i + width] for i in range(0, length * width, width)], number))
             continue
-        words = _integers(line, number)
+        words = [whole_word(word, number, "a column, row or length") for word in line.split()]
         if len(words) == 3:
             column, row, n_words = words
             if column == head.n_columns + 1:
                 next(lines, None)  # a number without meaning
-                return _of_strings(head, strings, stated, values)
+                for *_, length, at, stated, is_column in strings if head.is_real else ():
+                    if stated != length * (1 if head.kind % 2 else 2) and not (is_column and stated == length):
+                        raise ValueError(f"line {at} states {stated} words; {length} values follow")  # or values
+                return head.matrix([string[:3] for string in strings if string[2]], np.array(values))
             n_words = n_words if row else 0  # the strings of the column follow
         elif column and len(words) == 2 and head.is_big:
             n_words, row = words[0] - 1, words[1]
@@ -417,31 +428,11 @@ def _of_text(lines: Iterator[tuple[int, bytes]], head: Head, n: int, width: int)
             raise ValueError(f"line {number} starts neither a column nor a string")
         else:
             continue
-        strings.append([column, row, 0])
-        stated.append((number, n_words, len(words) == 3))
+        strings.append([column, row, 0, number, n_words, len(words) == 3])
     raise ValueError(f"no end after {head.n_columns} columns: the file seems to be cut off")
 
 
-def _of_strings(
-    head: Head, strings: list[list[int]], stated: list[tuple[int, int, bool]], values: array
-) -> scipy.sparse.csc_array | None:
-    """The matrix of strings that have as many values as their lines state."""
-    for (number, n_words, is_column), (*_, length) in zip(stated, strings, strict=True):
-        is_right = n_words == length * (1 if head.kind % 2 else 2) or (is_column and n_words == length)
-        if head.is_real and not is_right:  # some count values in place of words
-            raise ValueError(f"line {number} states {n_words} words; {length} values follow")
-    return head.matrix([string for string in strings if string[2]], np.array(values))
-
-
-def _integers(line: bytes, number: int) -> list[int]:
-    words = line.split()
-    if not all(word.isdigit() and len(word) < 20 and int(word) <= MOST_INTEGER for word in words):
-        got = line[:40].decode("latin-1").strip()
-        raise ValueError(f"line {number} is {got!r}; expected whole numbers up to {MOST_INTEGER}")
-    return [int(word) for word in words]
-
-
-def _in_records(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | None]]:
+def _in_records(content: bytes) -> Iterator[Announced]:
     """Matrices of a binary file: a record for the head, one for each column that is not zero, and one beyond the last.
 
     A record has its length before and after it, in four bytes; all other integers may have eight.
@@ -457,10 +448,7 @@ def _in_records(content: bytes) -> Iterator[tuple[str, scipy.sparse.csc_array | 
         n_columns, n_rows, form, kind = numbers
         head = Head(n_columns, n_rows, form, kind, name.decode("latin-1"))
         real = f"{order}f{8 if head.kind % 2 == 0 else word}"
-        try:
-            yield head.name, _of_columns(records, head, integer, real)
-        except ValueError as error:
-            raise ValueError(f"matrix {head.name!r} of byte {at}: {error}") from error
+        yield f"byte {at}", head, partial(_of_columns, records, head, integer, real)
 
 
 def _records(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
