@@ -6,13 +6,13 @@ from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import add
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import scipy.sparse
 
 from skthermo._core.arrays import Array, Label, Matrix, MatrixLike, mapping_of, real_array
-from skthermo.fem._terms import Key, PartsOfMass
+from skthermo.fem._terms import Content, Key, PartsOfMass
 from skthermo.fem.affine import AffineModel, ReducedModel
 from skthermo.fem.elements import (
     ROTATIONS,
@@ -78,15 +78,11 @@ Binding = tuple[str, str] | tuple[str, str, str]
 Target = tuple[str, str, tuple[str, ...]]
 
 
-class Assembled(NamedTuple):
-    """Terms of stiffness and mass, stiffness terms of each damage group, members and properties of each, and the
-    masses of damage groups."""
-
-    stiffness: list[tuple[Key, Matrix]]
-    mass: list[tuple[Key, Matrix]] | Matrix
-    scaled: dict[str, list[int]]
-    contents: list[list[tuple[Hashable, Key]]]
-    parts: PartsOfMass
+Assembled = tuple[
+    list[tuple[Key, Matrix]], list[tuple[Key, Matrix]] | Matrix, dict[str, list[int]], list[list[Content]], PartsOfMass
+]
+"""Terms of stiffness and mass, stiffness terms of each damage group, members and properties of each, and the masses of
+damage groups."""
 
 
 class Structure:
@@ -237,7 +233,7 @@ class Structure:
         scaled = {name: stiffness.positions(name) for name in damageable}
         lost = {name: tuple(parts.positions(name)) for name in damageable}
         groups_mass = PartsOfMass(parts.terms() if parts.contents else [], lost, parts.contents)
-        return Assembled(stiffness.terms(), mass.terms(), scaled, stiffness.contents, groups_mass)
+        return stiffness.terms(), mass.terms(), scaled, stiffness.contents, groups_mass
 
     def divide(
         self, model: AffineModel | ReducedModel, groups: Mapping[str, Mapping[str, Collection[Hashable]]]
@@ -592,7 +588,7 @@ class ImportedStructure(Structure):
         known = [name for name, (_, group, _) in damageable.items() if self.groups[group] <= self._masses.keys()]
         masses = [((), self._sum_of(members, self._masses)) for members in members_of.values()]
         parts = PartsOfMass(masses if known else [], {name: tuple(scaled[name]) for name in known}, contents)
-        return Assembled(terms, self._mass, scaled, contents, parts)
+        return terms, self._mass, scaled, contents, parts
 
     def _free_dofs(self) -> Sequence[Label]:
         return self._labels

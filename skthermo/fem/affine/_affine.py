@@ -432,15 +432,12 @@ class AffineModel:
             not know the mass.
         """
         core, damage = self._whole, check_severities(damage, self._groups)
+        lost = np.array([*damage.values()], dtype=float)
         if parts := self._lost_parts(damage, kind):
-            factors = parts.factors.copy()
-            for group, severity in damage.items():
-                factors[list(self._mass_groups[group])] *= 1 - severity
-            core = core.with_scaled_parts(parts.with_factors(factors))
-        factors = np.ones(len(core.stiffness.factors))
-        for group, severity in damage.items():
-            factors[list(self._groups[group])] *= 1 - severity
-        return self._with_core(core.with_scaled_stiffness(factors))
+            left = np.prod(1 - lost * scaled_terms(self._mass_groups, damage, len(parts.factors)), axis=1)
+            core = core.with_scaled_parts(parts.with_factors(parts.factors * left))
+        left = np.prod(1 - lost * scaled_terms(self._groups, damage, len(core.stiffness.factors)), axis=1)
+        return self._with_core(core.with_scaled_stiffness(left))
 
     def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
         """Relative change of each frequency per loss of each damage group, for small losses.
@@ -572,14 +569,10 @@ class AffineModel:
         chosen = check_different(list(self.groups) if groups is None else groups, "damage groups", self.groups)
         parts = self._lost_parts(chosen, kind)
         names = check_different([*self.parameter_names, *(f"1 - {direction_name(group, kind)}" for group in chosen)])
-        scaled = np.zeros((len(self._whole.stiffness.factors), len(chosen)), dtype=np.int64)
-        for column, group in enumerate(chosen):
-            scaled[list(self.groups[group]), column] = 1
+        scaled = scaled_terms(self._groups, chosen, len(self._whole.stiffness.factors))
         core = self._whole.with_group_factors(scaled)
         if parts:
-            further = np.zeros((len(parts.factors), len(chosen)), dtype=np.int64)
-            for column, group in enumerate(chosen):
-                further[list(self._mass_groups[group]), column] = 1
+            further = scaled_terms(self._mass_groups, chosen, len(parts.factors))
             core = core.with_scaled_parts(parts.with_factors(parts.factors, np.hstack([parts.exponents, further])))
         lowest, highest = _range_of(severities, "severities", -np.inf, 1)
         bounds = np.tile([1 - highest, 1 - lowest], (len(chosen), 1))
@@ -970,8 +963,7 @@ class ReducedModel(AffineModel):
         return twin
 
     def _use(self, basis: Basis) -> None:
-        self._core, self._basis = basis.core, basis.vectors
-        self.error_, self.check_points_, self.snapshot_points_ = basis.error, basis.check_points, basis.snapshot_points
+        self._basis, self._core, self.error_, self.check_points_, self.snapshot_points_ = basis
 
     def _beyond_bounds(self, theta: Array) -> list[SkthermoWarning]:
         lowest, highest = self._bounds.T * [[1 - 1e-9], [1 + 1e-9]]
@@ -1000,6 +992,12 @@ def check_names(parameter_names: Sequence[str] | None, keys: Sequence[Key]) -> t
 def exponents_of(keys: Sequence[Key], names: Sequence[str]) -> NDArray[np.int64]:
     """How often each parameter multiplies each term, (n_terms, n_parameters)."""
     return np.array([[key.count(name) for name in names] for key in keys], dtype=np.int64)
+
+
+def scaled_terms(groups: Groups, chosen: Iterable[str], n_terms: int) -> NDArray[np.int64]:
+    """How often each of some damage groups multiplies each term, (n_terms, n_groups)."""
+    each = [np.bincount(np.array(groups[group], dtype=np.int64), minlength=n_terms) for group in chosen]
+    return np.array(each, dtype=np.int64).reshape(-1, n_terms).T
 
 
 def read_group_mass(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -14,15 +14,9 @@ from skthermo._core.parallel import map_on_blas_threads
 from skthermo.fem._factors import Solve, factorise
 from skthermo.fem.modal import AffineCore
 
-
-class Basis(NamedTuple):
-    """Basis vectors (n_dof, n), the core on them, and its largest relative error of a frequency at the check points."""
-
-    vectors: Array
-    core: AffineCore
-    error: float
-    check_points: Array
-    snapshot_points: Array
+Basis = tuple[Array, AffineCore, float, Array, Array]
+"""Basis vectors (n_dof, n), the core on them, its largest relative error of a frequency at the check points, these
+points, and those of the snapshots."""
 
 
 def grow_basis(
@@ -57,7 +51,7 @@ def grow_basis(
             candidates = candidates[~(candidates[:, np.newaxis] == used).all(axis=2).any(axis=1)]
             errors = true_errors(full, core, candidates)
             if errors.max() < tol / 2:
-                return Basis(vectors, core, float(errors.max()), candidates, used)
+                return vectors, core, float(errors.max()), candidates, used
         largest.append(float(errors.max()))
         before = largest[-4] if len(largest) > 3 else np.inf
         if largest[-1] > max(before / 2, 1000 * tol):  # modes that are followed have dissolved among others

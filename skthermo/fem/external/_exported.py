@@ -285,11 +285,11 @@ class Exports:
     matrices: Mapping[str, Matrix | None]
 
     @cached_property
-    def square(self) -> list[str]:
-        """Names of the real square matrices; single numbers count only if there is nothing larger."""
+    def square(self) -> dict[str, Matrix]:
+        """The real square matrices; single numbers count only if there is nothing larger."""
         real = {name: one for name, one in self.matrices.items() if one is not None and not np.iscomplexobj(one)}
-        sizes = {name: one.shape[0] for name, one in real.items() if one.shape[0] == one.shape[1] > 0}
-        return [name for name, size in sizes.items() if size > 1] or list(sizes)
+        square = {name: one for name, one in real.items() if one.shape[0] == one.shape[1] > 0}
+        return {name: one for name, one in square.items() if one.shape[0] > 1} or square
 
     def matrix(self, name: str, shape: tuple[int, ...] = ()) -> Matrix:
         """A matrix of finite real numbers, of a shape if one is given."""
@@ -324,7 +324,7 @@ class Exports:
             return found
         masses = [name for name in self.square if name.endswith(MASS_OF)]
         if not masses:
-            raise ValueError(f"{self._no_mass()}; say mass=..., one of {self.square or [*self.matrices]}")
+            raise ValueError(f"{self._no_mass()}; say mass=..., one of {[*self.square] or [*self.matrices]}")
         nominal = [name for name in masses if name.removesuffix(MASS_OF).lower() in TOTAL_NAMES]
         chosen = (nominal or masses)[0]
         reference = self.matrix(chosen)
@@ -345,20 +345,19 @@ class Exports:
 
     def total_name(self, mass: str, keys: Collection[str] | None, *, has_factor: bool) -> str | None:
         """The whole stiffness: a matrix with a usual name that is no term, beside others."""
-        others = [name for name in self.square if name not in (*(keys or ()), mass) and not name.endswith(MASS_OF)]
-        shape = self.matrix(mass).shape
-        candidates = [name for name in others if (one := self.matrices[name]).shape == shape and _is_finite(one)]
+        taken, shape = (*(keys or ()), mass), self.matrix(mass).shape
+        others = {name: one for name, one in self.square.items() if name not in taken and not name.endswith(MASS_OF)}
+        candidates = [name for name, one in others.items() if one.shape == shape and _is_finite(one)]
         found = self.usual(candidates, TOTAL_NAMES, "total") if keys or len(candidates) > 1 else None
         return self.usual(self.square, TOTAL_NAMES, "total") if found is None and has_factor else found
 
     def beside(self, mass: str, shape: tuple[int, ...]) -> dict[str, Matrix]:
-        """All square matrices except masses."""
+        """All square matrices except masses; complex ones of the right shape are an error."""
         return {
             name: self.matrix(name, shape)
             for name, one in self.matrices.items()
-            if name != mass
-            and not name.endswith(MASS_OF)
-            and (name in self.square or (np.iscomplexobj(one) and np.shape(one) == shape))
+            if one is not None and (name in self.square or one.shape == shape)
+            if name != mass and not name.endswith(MASS_OF)
         }
 
     def terms_beside(
