@@ -1,10 +1,12 @@
 """Rows of theta, and matrices that are affine in products of its parameters: how they are read, and summed."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import scipy.sparse
@@ -13,6 +15,10 @@ from numpy.typing import NDArray
 from skthermo._core.arrays import Array, Matrix, as_dense, check_names, is_real, mapping_of, real_array
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem._factors import elimination
+from skthermo.fem.damage import LossKind, damage_directions
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Key = tuple[str, ...]
 Content = tuple[Hashable, tuple[str, ...]]
@@ -42,6 +48,80 @@ def failures(theta: Array, frequencies: Array) -> list[SkthermoWarning]:
         "definite, or the solver failed. Narrow the bounds, or correct the model there"
     )
     return [ModelWarning(text, "no-solution")]
+
+
+class ImmutableModel:
+    """A model that never changes, of which clones are the same and a twin may be silent."""
+
+    _is_quiet = False
+
+    def quiet(self) -> Self:
+        """The same model without warnings and without errors of a function, in place of which it gives NaN.
+
+        Returns
+        -------
+        FE model
+            For searches that may pass through theta without a solution.
+        """
+        return self._twin(_is_quiet=True)
+
+    def findings(self, theta: Array, frequencies: Array) -> list[SkthermoWarning]:
+        """Warnings about a whole table of theta and its solution, for the caller to give.
+
+        Parameters
+        ----------
+        theta, frequencies : ndarray of shape (n_samples, n_parameters) and (n_samples, n_modes)
+            The table, and its solution in Hz.
+
+        Returns
+        -------
+        list of SkthermoWarning
+            Empty for a model that is `quiet`.
+        """
+        return [] if self._is_quiet else failures(theta, frequencies)
+
+    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
+        """Relative change of each frequency per loss of each damage group, for small losses.
+
+        Parameters
+        ----------
+        groups : sequence of str, optional
+            Damage groups. By default all but those that other groups make up.
+        kind : {"stiffness", "section"}, optional
+            What is lost, as in `damaged`. By default stiffness and, of the groups whose mass is known, section.
+
+        Returns
+        -------
+        DataFrame of shape (n_directions, n_modes)
+            Derivatives of ln f by the severity, at the model's nominal state, by central differences where it gives no
+            exact ones: in a row named as the group for its stiffness, in a row "GROUP, section" for its section. Losses
+            that move no frequency are left out.
+
+        Raises
+        ------
+        ValueError
+            If a group is unknown, none moves a frequency, or the mass of a group is not known.
+
+        Examples
+        --------
+        >>> from skthermo.datasets import make_truss
+        >>> make_truss().damage_directions(["bottom", "top"]).round(3)
+                             0      1      2      3      4      5
+        bottom          -0.233 -0.225 -0.159 -0.070 -0.022 -0.031
+        top             -0.212 -0.127 -0.098 -0.053 -0.140 -0.029
+        bottom, section -0.129 -0.119 -0.060  0.022 -0.004  0.059
+        top, section    -0.108 -0.019  0.008  0.042 -0.116  0.065
+        """
+        return damage_directions(self, groups, kind)
+
+    def __sklearn_clone__(self) -> Self:
+        return self
+
+    def _twin(self, **changes: Any) -> Self:
+        """A model like this one, with some attributes changed."""
+        twin = copy(self)
+        vars(twin).update(changes)
+        return twin
 
 
 def by_name(row: Array, parameter_names: Sequence[str]) -> dict[str, float]:
@@ -163,7 +243,7 @@ class AffineTerms(ABC):
 
     @classmethod
     @abstractmethod
-    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "AffineTerms":
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> AffineTerms:
         """Terms with a factor of one."""
 
     @abstractmethod
@@ -202,12 +282,12 @@ class AffineTerms(ABC):
 
     def with_terms(
         self, matrices: Sequence[Matrix], exponents: NDArray[np.int64], factors: Array | None = None
-    ) -> "AffineTerms":
+    ) -> AffineTerms:
         """These terms and further ones; a row of zeros among the exponents makes a constant one."""
         terms = type(self).from_matrices([*self.each_matrix, *matrices], np.vstack([self.exponents, exponents]))
         return terms.with_factors(np.append(self.factors, np.ones(len(matrices)) if factors is None else factors))
 
-    def divided(self, parts: Sequence[tuple[int, Matrix]]) -> "AffineTerms":
+    def divided(self, parts: Sequence[tuple[int, Matrix]]) -> AffineTerms:
         """These terms and parts of them, each with its term's position, as further terms."""
         matrices = self.each_matrix
         for position, part in parts:
@@ -217,7 +297,7 @@ class AffineTerms(ABC):
         return terms.with_factors(self.factors[origin])
 
     @abstractmethod
-    def projected(self, basis: Array) -> "DenseTerms":
+    def projected(self, basis: Array) -> DenseTerms:
         """Terms basis' A_t basis with the same coefficients."""
 
 
@@ -233,7 +313,7 @@ class DenseTerms(AffineTerms):
         self.n_dof, self.n_entries = matrices.shape[1], matrices.shape[1] ** 2
 
     @classmethod
-    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "DenseTerms":
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> DenseTerms:
         return cls(np.ascontiguousarray(np.stack([as_dense(matrix) for matrix in matrices])), exponents)
 
     def assemble(self, theta: Array) -> Array:
@@ -254,7 +334,7 @@ class DenseTerms(AffineTerms):
     def each_matrix(self) -> list[Matrix]:
         return list(self.matrices)
 
-    def projected(self, basis: Array) -> "DenseTerms":
+    def projected(self, basis: Array) -> DenseTerms:
         return DenseTerms(basis.T @ self.matrices @ basis, self.exponents, self.factors)
 
 
@@ -291,7 +371,7 @@ class SparseTerms(AffineTerms):
         return scipy.sparse.csc_array((data, self.rows, self.pointers), shape=(self.n_dof, self.n_dof))
 
     @classmethod
-    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> "SparseTerms":
+    def from_matrices(cls, matrices: Sequence[Matrix], exponents: NDArray[np.int64]) -> SparseTerms:
         n_dof = matrices[0].shape[0]
         parts = [scipy.sparse.coo_array(matrix) for matrix in matrices]
         places = np.concatenate([part.col.astype(np.int64) * n_dof + part.row for part in parts])

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse
@@ -37,28 +36,25 @@ from skthermo.fem._terms import (
     AffineTerms,
     Content,
     DenseTerms,
+    ImmutableModel,
     Key,
     PartsOfMass,
     SparseTerms,
     check_different,
     check_severities,
-    failures,
     read_matrix,
     read_terms,
 )
 from skthermo.fem.affine._basis import Basis, grow_basis
-from skthermo.fem.damage import LossKind, check_kind, damage_directions, direction_name
+from skthermo.fem.damage import LossKind, check_kind, direction_name
 from skthermo.fem.modal import AffineCore, LocalModes, check_supported, count_modes
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Terms = Mapping[tuple[str, ...], MatrixLike] | Sequence[tuple[tuple[str, ...], MatrixLike]]
 Names = tuple[str, ...] | None
 Groups = dict[str, tuple[int, ...]]
 
 
-class AffineModel:
+class AffineModel(ImmutableModel):
     """FE model K(theta) phi = (2 pi f)^2 M(theta) phi with affine stiffness and mass.
 
     K(theta) = sum over the terms of (product of the named theta) * matrix, and M likewise.
@@ -145,7 +141,6 @@ class AffineModel:
     _basis: Array | None = None  # the columns are the coordinates in which a reduced model is solved
     _mass_groups: Groups = {}  # whose mass is known, with the positions of its parts
     _mass_contents: tuple[tuple[Content, ...], ...] = ()
-    _is_quiet = False
 
     def __init__(
         self,
@@ -439,39 +434,6 @@ class AffineModel:
         left = np.prod(1 - lost * scaled_terms(self._groups, damage, len(core.stiffness.factors)), axis=1)
         return self._with_core(core.with_scaled_stiffness(left))
 
-    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
-        """Relative change of each frequency per loss of each damage group, for small losses.
-
-        Parameters
-        ----------
-        groups : sequence of str, optional
-            Damage groups. By default all but those that other groups make up.
-        kind : {"stiffness", "section"}, optional
-            What is lost, as in `damaged`. By default stiffness and, of the groups whose mass is known, section.
-
-        Returns
-        -------
-        DataFrame of shape (n_directions, n_modes)
-            Derivatives of ln f by the severity, at the model's nominal state: in a row named as the group for its
-            stiffness, in a row "GROUP, section" for its section. Losses that move no frequency are left out.
-
-        Raises
-        ------
-        ValueError
-            If a group is unknown, none moves a frequency, or the mass of a group is not known.
-
-        Examples
-        --------
-        >>> from skthermo.datasets import make_truss
-        >>> make_truss().damage_directions(["bottom", "top"]).round(3)
-                             0      1      2      3      4      5
-        bottom          -0.233 -0.225 -0.159 -0.070 -0.022 -0.031
-        top             -0.212 -0.127 -0.098 -0.053 -0.140 -0.029
-        bottom, section -0.129 -0.119 -0.060  0.022 -0.004  0.059
-        top, section    -0.108 -0.019  0.008  0.042 -0.116  0.065
-        """
-        return damage_directions(self, groups, kind)
-
     def with_modes(self, modes: Sequence[int]) -> Self:
         """A new model with other modes as its columns.
 
@@ -691,34 +653,6 @@ class AffineModel:
         changes: dict[str, Any] = {"_groups": groups, "_mass_groups": mass_groups}
         return self._with_core(whole, **changes, contents=(), _mass_contents=())
 
-    def quiet(self) -> Self:
-        """The same model without warnings.
-
-        Returns
-        -------
-        FE model
-            For searches that may pass through theta without a solution.
-        """
-        return self._twin(_is_quiet=True)
-
-    def findings(self, theta: Array, frequencies: Array) -> list[SkthermoWarning]:
-        """Warnings about a whole table of theta and its solution, for the caller to give.
-
-        Parameters
-        ----------
-        theta, frequencies : ndarray of shape (n_samples, n_parameters) and (n_samples, n_modes)
-            The table, and its solution in Hz.
-
-        Returns
-        -------
-        list of SkthermoWarning
-            Empty for a model that is `quiet`.
-        """
-        return [] if self._is_quiet else failures(theta, frequencies)
-
-    def __sklearn_clone__(self) -> Self:
-        return self
-
     def rescaled(self, theta: ArrayLike) -> Self:
         """A new model whose nominal state, theta = 1, is this model at a given theta.
 
@@ -824,12 +758,6 @@ class AffineModel:
         for name, own in self.group_mass.items():
             if (own.diagonal() < 0).any() or (own.diagonal() > (1 + 1e-6) * mass + 1e-9 * mass.max()).any():
                 raise ValueError(f"group_mass of {name!r} is below 0, or more than the model's mass; expected kg of it")
-
-    def _twin(self, **changes: Any) -> Self:
-        """A model like this one, with some attributes changed."""
-        twin = copy(self)
-        vars(twin).update(changes)
-        return twin
 
     def _in_chunks(self, solve: Callable[[Array], tuple[Array, ...]], theta: ArrayLike) -> tuple[Array, ...]:
         rows = check_theta(theta, self.parameter_names)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from joblib import Memory
@@ -15,12 +13,16 @@ from numpy.typing import ArrayLike
 
 from skthermo._core.arrays import Array, check_flag, check_path, check_theta, mapping_of, positive_integer, real_array
 from skthermo._core.warnings import warn_each
-from skthermo.exceptions import ModelWarning, SkthermoWarning
-from skthermo.fem._terms import ROWS_PER_CHUNK, by_name, check_different, check_severities, failures, failures_named
-from skthermo.fem.damage import LossKind, damage_directions, kind_option
-
-if TYPE_CHECKING:
-    import pandas as pd
+from skthermo.exceptions import ModelWarning
+from skthermo.fem._terms import (
+    ROWS_PER_CHUNK,
+    ImmutableModel,
+    by_name,
+    check_different,
+    check_severities,
+    failures_named,
+)
+from skthermo.fem.damage import LossKind, kind_option
 
 
 def read_parameter_groups(
@@ -40,7 +42,7 @@ def frequencies_of_row(
     return solve()
 
 
-class CallableModel:
+class CallableModel(ImmutableModel):
     """An FE model from any function that turns parameters into frequencies.
 
     Parameters
@@ -114,7 +116,6 @@ class CallableModel:
         self.vectorized = check_flag(vectorized, "vectorized")
         self.groups = read_parameter_groups(groups, self.parameter_names)
         self._factors = np.ones(len(self.parameter_names))
-        self._is_quiet = False
         folder = None if cache is None else check_path(cache, "cache").absolute()  # wherever the process goes
         if folder is not None and folder.is_file():
             raise ValueError(f"{folder}: the cache is a file; expected a folder")
@@ -227,64 +228,10 @@ class CallableModel:
             If a group is unknown, a severity is 1 or more or not finite, or the kind is another.
         """
         kind_option(self, kind)
-        twin = copy.copy(self)
-        twin._factors = self._factors.copy()
+        factors = self._factors.copy()
         for group, severity in check_severities(damage, self.groups).items():
-            twin._factors[[self.parameter_names.index(name) for name in self.groups[group]]] *= 1 - severity
-        return twin
-
-    def damage_directions(self, groups: Sequence[str] | None = None, *, kind: LossKind | None = None) -> pd.DataFrame:
-        """Relative change of each frequency per loss of each damage group, for small losses.
-
-        Parameters
-        ----------
-        groups : sequence of str, optional
-            Damage groups. By default all but those that other groups make up.
-        kind : {"stiffness"}, optional
-            As in `damaged`.
-
-        Returns
-        -------
-        DataFrame of shape (n_groups, n_modes)
-            Central differences of ln f by the severity, at the model's nominal state. Groups that move no frequency
-            are left out.
-
-        Raises
-        ------
-        ValueError
-            If a group is unknown, none moves a frequency, or the kind is another.
-        """
-        return damage_directions(self, groups, kind)
-
-    def quiet(self) -> CallableModel:
-        """The same model, but without warnings and errors: it gives NaN where the function fails.
-
-        Returns
-        -------
-        CallableModel
-            For searches.
-        """
-        twin = copy.copy(self)
-        twin._is_quiet = True
-        return twin
-
-    def findings(self, theta: Array, frequencies: Array) -> list[SkthermoWarning]:
-        """Warnings about a whole table of theta and its solution, for the caller to give.
-
-        Parameters
-        ----------
-        theta, frequencies : ndarray of shape (n_samples, n_parameters) and (n_samples, n_modes)
-            A table and its solution.
-
-        Returns
-        -------
-        list of SkthermoWarning
-            Empty for a model that is `quiet`.
-        """
-        return [] if self._is_quiet else failures(theta, frequencies)
-
-    def __sklearn_clone__(self) -> CallableModel:
-        return self
+            factors[[self.parameter_names.index(name) for name in self.groups[group]]] *= 1 - severity
+        return self._twin(_factors=factors)
 
     def __repr__(self) -> str:
         name = getattr(self.function, "__name__", type(self.function).__name__)
