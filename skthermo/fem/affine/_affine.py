@@ -789,6 +789,8 @@ class ReducedModel(AffineModel):
 
     Attributes
     ----------
+    full : AffineModel
+        The model that was reduced.
     basis_size_ : int
         Number of basis vectors.
     error_ : float
@@ -835,15 +837,10 @@ class ReducedModel(AffineModel):
             raise ValueError(f"tol is {tol!r}; expected a relative error between 0 and 1, such as 1e-5")
         self.parameter_names, self._groups, self.contents = full.parameter_names, full._groups, full.contents
         self.dofs, self._mass_groups, self._mass_contents = full.dofs, full._mass_groups, full._mass_contents
-        self._full, self._whole = full, full._whole
+        self.full, self._whole = full, full._whole
         self._bounds = check_bounds(bounds, full.parameter_names)
         self._tol = tol
         self._use(grow_basis(self._whole, self._bounds, tol, random_state))
-
-    @property
-    def full(self) -> AffineModel:
-        """The model that was reduced."""
-        return self._full
 
     @property
     def basis_size_(self) -> int:
@@ -852,9 +849,9 @@ class ReducedModel(AffineModel):
 
     def rescaled(self, theta: ArrayLike) -> Self:
         row = check_theta(theta, self.parameter_names, one_row=True)
-        full = self._full.rescaled(row)
+        full = self.full.rescaled(row)
         return self._twin(
-            _full=full,
+            full=full,
             _whole=full._whole,
             _bounds=self._bounds / row.T,
             _core=full._whole.projected(self._basis, self._tol),
@@ -863,13 +860,13 @@ class ReducedModel(AffineModel):
         )
 
     def reduced(self, bounds: Bounds = 0.3, *, tol: float = 1e-5, random_state: RandomState = None) -> ReducedModel:
-        return ReducedModel(self._full, bounds, tol=tol, random_state=random_state)
+        return ReducedModel(self.full, bounds, tol=tol, random_state=random_state)
 
     def reduction_pays(self, n_solves: int) -> bool:
         return False  # it is reduced already
 
     def __repr__(self) -> str:
-        return f"ReducedModel({self._full!r}, {self.basis_size_} basis vectors, error {self.error_:.1e})"
+        return f"ReducedModel({self.full!r}, {self.basis_size_} basis vectors, error {self.error_:.1e})"
 
     def local_modes(self, theta: ArrayLike, *, follow: bool = False) -> LocalModes:
         modes = super().local_modes(theta, follow=follow)
@@ -880,12 +877,12 @@ class ReducedModel(AffineModel):
         return [*self._beyond_bounds(theta), *super().findings(theta, frequencies)]
 
     def _with_core(self, core: AffineCore, names: Names = None, bounds: Array | None = None, **changes: Any) -> Self:
-        full = self._full._with_core(core, names, **changes)
+        full = self.full._with_core(core, names, **changes)
         known = dict(zip(self.parameter_names, self._bounds, strict=True))
         new = () if bounds is None else bounds
         known |= dict(zip([name for name in full.parameter_names if name not in known], new, strict=True))
         bounds = np.array([known[name] for name in full.parameter_names])
-        changes |= {"_full": full, "_whole": core, "_bounds": bounds, "parameter_names": full.parameter_names}
+        changes |= {"full": full, "_whole": core, "_bounds": bounds, "parameter_names": full.parameter_names}
         twin = self._twin(**changes)
         twin._use(grow_basis(core, bounds, self._tol, 0, start=self._basis))
         return twin

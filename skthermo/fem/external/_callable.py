@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from joblib import Memory
@@ -116,15 +115,10 @@ class CallableModel(ImmutableModel):
         self.vectorized = check_flag(vectorized, "vectorized")
         self.groups = read_parameter_groups(groups, self.parameter_names)
         self._factors = np.ones(len(self.parameter_names))
-        folder = None if cache is None else check_path(cache, "cache").absolute()  # wherever the process goes
-        if folder is not None and folder.is_file():
-            raise ValueError(f"{folder}: the cache is a file; expected a folder")
-        self._memory = Memory(folder, verbose=0)
-
-    @property
-    def cache(self) -> Path | None:
-        """The folder that keeps solved rows."""
-        return self._memory.location and Path(self._memory.location)
+        self.cache = None if cache is None else check_path(cache, "cache").absolute()  # wherever the process goes
+        if self.cache is not None and self.cache.is_file():
+            raise ValueError(f"{self.cache}: the cache is a file; expected a folder")
+        self._memory = Memory(self.cache, verbose=0)
 
     @property
     def rows_per_chunk(self) -> int:

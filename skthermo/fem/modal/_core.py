@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -324,14 +324,12 @@ class DenseSolver(ABC):
 
     def local_modes(self, theta: Array, n_modes: int) -> tuple[Array, Array, Callable[[Array], Array]]:
         eigenvalues, shapes = self.modes(theta, n_modes)
-        factors: list = []
 
-        def solve(columns: Array) -> Array:
-            if not factors:
-                factors.append(scipy.linalg.cho_factor(self._stiffness.assemble(theta)[0]))
-            return scipy.linalg.cho_solve(factors[0], columns)
+        @cache
+        def factors() -> tuple[Array, bool]:
+            return scipy.linalg.cho_factor(self._stiffness.assemble(theta)[0])
 
-        return eigenvalues[0], shapes[0], solve
+        return eigenvalues[0], shapes[0], lambda columns: scipy.linalg.cho_solve(factors(), columns)
 
 
 class StandardSolver(DenseSolver):
