@@ -42,7 +42,7 @@ def read_triplets(path: str | PathLike) -> scipy.sparse.csc_array:
     Raises
     ------
     FileNotFoundError
-        If the path does not exist.
+        If the path does not exist, or is a folder.
     ValueError
         Names the file, and the line that does not hold three finite numbers; if rows or columns are not positive
         integers, an entry is given twice, entries are on both sides of the diagonal but not in pairs, or rows are more
