@@ -26,7 +26,6 @@ from skthermo.preprocessing._poles import (
     fitting_pairs,
     read_poles,
     read_reference,
-    shape_agreement,
 )
 
 
@@ -231,7 +230,7 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         result = tracked_modes(poles, pairs.at(chosen), pairs.at(near), followed, modes)
         if poles.shapes is not None:
             found = result.frequencies.notna().to_numpy()
-            warn_each(doubts_of_assignment(poles, pairs, chosen, followed, found, modes))
+            warn_each(doubts_of_assignment(poles, pairs, chosen, followed, found, modes.names))
         return result
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> NDArray[np.object_]:
@@ -256,12 +255,11 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
         order = np.arange(len(index)) if stamps is None else np.argsort(stamps.asi8, kind="stable")
         if isinstance(self.follow, Real):
             return order, float(self.follow)
-        if stamps is None:
+        if stamps is None or stamps.hasnans or len(stamps) < 2:
+            has = "no DatetimeIndex" if stamps is None else f"{len(stamps)} stamps, some of them missing or alone"
             raise ValueError(
-                f"follow is {self.follow!r}, but X has no DatetimeIndex; expected one, or a number of records"
+                f"follow is {self.follow!r}, but X has {has}; expected two or more, or a number of records"
             )
-        if stamps.hasnans or len(stamps) < 2:
-            raise ValueError(f"X has {len(stamps)} stamps, some of them missing or alone; expected two or more")
         duration = check_duration(self.follow, "follow", may_be_zero=False).to_timedelta64()
         step = np.median(np.diff(stamps.as_unit("ns").asi8[order]))
         n_records = duration.astype(np.int64) / max(step, 1)
@@ -356,83 +354,46 @@ def aligned(shapes: NDArray, reference: NDArray) -> NDArray:
 
 
 def doubts_of_assignment(
-    poles: Poles,
-    pairs: Pairs,
-    chosen: NDArray[np.intp],
-    followed: Array,
-    found: NDArray[np.bool_],
-    modes: ReferenceModes,
+    poles: Poles, pairs: Pairs, chosen: NDArray[np.intp], followed: Array, found: NDArray[np.bool_], names: list[str]
 ) -> list[UnevaluatedRowsWarning]:
-    """One finding of modes that are not found, modes of other shapes, and poles without a shape."""
+    """One finding of modes that are not found, of poles of their shapes at other frequencies or of other shapes at
+    their frequencies, each in more than a few records, and of poles without a shape. Poles that are 2 pi times as high
+    or as low as the reference are an error."""
     is_free = ~np.isin(np.arange(len(poles.record)), pairs.pole[chosen])
-    left = pairs.at(is_free[pairs.pole])
-    n_present = (~np.isnan(poles.shapes)).sum(axis=1)
-    is_zero = ~np.nan_to_num(poles.shapes).any(axis=1)
-    problems = [
-        *_lost_modes(left, left.frequency / followed[left.record, left.mode], found, modes.names),
-        *_other_shapes(poles, is_free, followed, found, modes),
-    ]
-    if (is_zero | (n_present < min(2, poles.shapes.shape[1]))).any():
+    left = pairs.at(is_free[pairs.pole] & ~found[pairs.record, pairs.mode])
+    ratio = left.frequency / followed[left.record, left.mode]
+    n_in_rad = (np.abs(np.maximum(ratio, 1 / ratio) / (2 * np.pi) - 1) < 0.15).sum()
+    if n_in_rad > max(10, 10 * found.sum(), len(ratio) / 2):
+        raise ValueError(
+            f"{n_in_rad} poles have the shapes of reference modes and about {np.median(ratio):.3g} times their "
+            f"frequencies, and {found.sum()} have their frequencies: rad/s? expected Hz in both"
+        )
+    has_shape = np.nan_to_num(poles.shapes).any(axis=1)
+    has_shape &= (~np.isnan(poles.shapes)).sum(axis=1) >= min(2, poles.shapes.shape[1])
+    is_near = np.abs(poles.frequencies[:, np.newaxis] / followed[poles.record] - 1) < 0.02
+    is_near &= is_free[:, np.newaxis] & ~found[poles.record]
+    never = [name for name, some in zip(names, found.any(axis=0), strict=True) if not some]
+    lost = [f"the modes {never} are found in no record"] if never and len(found) >= 20 else []
+    others = []
+    for j, name in enumerate(names):
+        n_missing, records, ratios = (~found[:, j]).sum(), left.record[left.mode == j], ratio[left.mode == j]
+        middle = np.median(ratios) if ratios.size else np.nan
+        is_similar = np.abs(ratios / middle - 1) < 0.1
+        n_similar = len(np.unique(records[is_similar]))
+        if n_similar >= 10 and n_similar > 0.1 * n_missing and is_similar.mean() > 0.5:
+            lost.append(f"records without {name!r} have a pole of its shape at about {middle:.2g} times its frequency")
+        n_near = len(np.unique(poles.record[is_near[:, j]]))
+        if n_near >= 10 and n_near > n_missing / 2 and has_shape[is_near[:, j]].any():
+            others.append(name)
+    problems = [f"{', and '.join(lost)}: widen max_shift, or correct the reference"] if lost else []
+    if others:
+        problems.append(
+            f"most records without {others} have a pole of another shape at the frequency: give the sensors in the "
+            "order of the reference, with its signs and gains, or a lower min_mac for noisy shapes"
+        )
+    if not has_shape.all():
         problems.append(
             "poles have no shape, zero or NaN at all sensors but one, and no mode takes them: give shapes at two "
             "sensors or more"
         )
     return [UnevaluatedRowsWarning("; ".join(problems), "modes-not-found")] if problems else []
-
-
-def _lost_modes(pairs: Pairs, ratio: Array, found: NDArray[np.bool_], names: list[str], few: int = 20) -> list[str]:
-    """A sentence on modes that no record has, and modes whose shapes are found, among poles that were left over, at
-    frequencies too far away, in more than a few records. Poles that are 2 pi times as high or as low as the reference
-    are an error."""
-    lost = ~found[pairs.record, pairs.mode]
-    mode, record, ratio = pairs.mode[lost], pairs.record[lost], ratio[lost]
-    in_rad = np.maximum(ratio, 1 / ratio) / (2 * np.pi)
-    n_in_rad = (np.abs(in_rad - 1) < 0.15).sum()
-    if n_in_rad > max(few / 2, 10 * found.sum(), len(ratio) / 2):
-        raise ValueError(
-            f"{n_in_rad} poles have the shapes of reference modes and about {np.median(ratio):.3g} times their "
-            f"frequencies, and {found.sum()} have their frequencies: rad/s? expected Hz in both"
-        )
-    problems = []
-    never = [name for name, some in zip(names, found.any(axis=0), strict=True) if not some]
-    if never and len(found) >= few:
-        problems.append(f"the modes {never} are found in no record")
-    for j, name in enumerate(names):
-        n_missing, ratios = (~found[:, j]).sum(), ratio[mode == j]
-        if not ratios.size:
-            continue
-        is_similar = np.abs(ratios / np.median(ratios) - 1) < 0.1
-        n_similar = len(np.unique(record[mode == j][is_similar]))
-        if n_similar >= few / 2 and n_similar > 0.1 * n_missing and is_similar.mean() > 0.5:
-            ratio_text = f"{np.median(ratios):.2g}"
-            problems.append(
-                f"records without {name!r} have a pole of its shape at about {ratio_text} times its frequency"
-            )
-    return [f"{', and '.join(problems)}: widen max_shift, or correct the reference"] if problems else []
-
-
-def _other_shapes(
-    poles: Poles,
-    is_free: NDArray[np.bool_],
-    followed: Array,
-    found: NDArray[np.bool_],
-    modes: ReferenceModes,
-    few: int = 20,
-) -> list[str]:
-    """A sentence on modes that most records lack although they have a pole of another shape at the frequency."""
-    free = np.flatnonzero(is_free)
-    record = poles.record[free]
-    is_near = np.abs(poles.frequencies[free, np.newaxis] / followed[record] - 1) < 0.02
-    names = []
-    for j, name in enumerate(modes.names):
-        near, n_missing = free[is_near[:, j] & ~found[record, j]], (~found[:, j]).sum()
-        n_near = len(np.unique(poles.record[near]))
-        mac = shape_agreement(poles.shapes[near], modes.shapes[:, [j]], [])[0]
-        if n_near >= few / 2 and n_near > n_missing / 2 and np.isfinite(mac).any():
-            names.append(name)
-    if not names:
-        return []
-    return [
-        f"most records without {names} have a pole of another shape at the frequency: give the sensors in the order of "
-        "the reference, with its signs and gains, or a lower min_mac for noisy shapes"
-    ]

@@ -10,7 +10,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from skthermo._core.arrays import Array, as_floats, real_array, rows_by_pattern, shape_array
+from skthermo._core.arrays import Array, real_array, rows_by_pattern, shape_array
 from skthermo._core.frames import check_same_rows
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 
@@ -32,133 +32,94 @@ class Poles(NamedTuple):
 
 def read_poles(X: Any, sensors: list | None, n_sensors: int | None) -> Poles:
     """The poles of records as `ModeTracker.transform` takes them; without ``n_sensors`` shapes are not read."""
-    fields, given_sensors = _fields(X)
-    if n_sensors is not None and fields["shapes"] is None:
+    frequencies, damping, shapes, index, given_sensors = _fields(X)
+    if n_sensors is not None and shapes is None:
         raise ValueError("X has no 'shapes'; expected mode shapes, as in the reference, or a reference without shapes")
-    if n_sensors is None:
-        fields["shapes"] = None
-    poles = (_from_arrays if is_table(fields["frequencies"]) else _from_lists)(**fields)
-    wrong = ~(np.isfinite(poles.frequencies) & (poles.frequencies > 0))
-    if wrong.any():
-        pole = np.flatnonzero(wrong)[0]
-        raise ValueError(
-            f"frequency {poles.column[pole]} of record {poles.record[pole]} is {poles.frequencies[pole]:g}; expected "
-            "positive values in Hz, and NaN where there is no pole"
-        )
-    if poles.shapes is None:
-        return poles
-    shapes = _chosen_sensors(poles.shapes, given_sensors, sensors)
-    if not len(shapes):
-        shapes = np.empty((0, n_sensors or 0), dtype=shapes.dtype)
-    if shapes.shape[1] != n_sensors:
-        raise ValueError(f"shapes of X have {shapes.shape[1]} sensors; expected {n_sensors}, as in the reference")
-    if np.isinf(shapes).any():
-        raise ValueError("shapes of X have infinite components; expected NaN where a component is missing")
-    return poles._replace(shapes=shapes)
-
-
-def is_table(values: Any) -> bool:
-    """Whether values are a frame or a two-dimensional array, not a list of arrays."""
-    return isinstance(values, pd.DataFrame) or (
-        isinstance(values, np.ndarray) and values.dtype != object and values.ndim == 2
-    )
-
-
-def _fields(X: Any) -> tuple[dict[str, Any], Any]:
-    """Frequencies, damping ratios, shapes and index of all records, and the names of their sensors."""
-    sensors = None
-    if isinstance(X, Mapping):
-        fields, sensors = {name: X.get(name) for name in POLE_FIELDS}, X.get("sensors")
-        if fields["frequencies"] is None:
-            raise ValueError(f"X has the fields {list(X)}; expected 'frequencies', and mostly 'shapes' and 'damping'")
-    elif is_table(X):
-        fields = {"frequencies": X, "damping": None, "shapes": None}
-    elif isinstance(X, Sequence | pd.Series) and len(X) and all(isinstance(record, Mapping) for record in X):
-        fields = {}
-        for name in POLE_FIELDS:
-            has = [record.get(name) is not None for record in X]
-            if any(has) and not all(has):
-                raise ValueError(f"record {has.index(False)} has no {name!r}, others have; expected all or none")
-            fields[name] = [record[name] for record in X] if any(has) else None
-        if fields["frequencies"] is None:
-            raise ValueError(f"record 0 has the fields {list(next(iter(X)))}; expected 'frequencies'")
-        names = {None if record.get("sensors") is None else tuple(record["sensors"]) for record in X}
-        if len(names) > 1:
-            raise ValueError(f"records name different sensors, such as {list(names)[:2]}; expected the same in all")
-        sensors = names.pop()
-    else:
-        raise ValueError(
-            f"X is of type {type(X).__name__}; expected a mapping with 'frequencies', 'shapes' and 'damping' of all "
-            "records, or a sequence of such mappings, one for each record"
-        )
-    index = X.get("index") if isinstance(X, Mapping) else None
-    frequencies = X if isinstance(X, pd.Series) else fields["frequencies"]
-    if isinstance(frequencies, pd.DataFrame | pd.Series):
-        index = frequencies.index
-    if not isinstance(frequencies, Sequence | np.ndarray | pd.DataFrame | pd.Series):
-        raise ValueError(f"frequencies are {frequencies!r:.200}; expected a table, or a vector for each record")
-    fields["index"] = pd.RangeIndex(len(frequencies)) if index is None else pd.Index(index)
-    if len(fields["index"]) != len(frequencies):
-        raise ValueError(f"the index has {len(fields['index'])} entries; expected {len(frequencies)}, one a record")
-    return fields, sensors
-
-
-def _from_arrays(frequencies: Any, damping: Any, shapes: Any, index: pd.Index) -> Poles:
-    F = as_floats(frequencies)
-    record, column = np.nonzero(~np.isnan(F))
-    if damping is not None:
-        check_same_rows(frequencies, damping, ("frequencies", "damping"))
-        damping = as_floats(damping)
-        if damping.shape != F.shape:
-            raise ValueError(f"damping has shape {damping.shape}; expected {F.shape}, as frequencies")
-        damping = damping[record, column]
-    if shapes is not None:
-        shapes = shape_array(shapes, "shapes of X", any_size=True)
-        if shapes.ndim != 3 or shapes.shape[:2] != F.shape:
-            raise ValueError(f"shapes have shape {shapes.shape}; expected {F.shape + ('n_sensors',)}")
-        shapes = shapes[record, column]
-    return Poles(record, column, F[record, column], damping, shapes, index)
-
-
-def _from_lists(frequencies: Any, damping: Any, shapes: Any, index: pd.Index) -> Poles:
-    rows = [real_array(row, f"frequencies of record {i}") for i, row in enumerate(frequencies)]
-    for i, row in enumerate(rows):
-        if row.ndim != 1:
-            raise ValueError(f"frequencies of record {i} have shape {row.shape}; expected a vector for each record")
+    rows = _each_record(frequencies, "frequencies")
+    index = pd.RangeIndex(len(rows)) if index is None else pd.Index(index)
+    if len(index) != len(rows):
+        raise ValueError(f"the index has {len(index)} entries; expected {len(rows)}, one a record")
     lengths = np.array([len(row) for row in rows], dtype=int)
     record = np.repeat(np.arange(len(rows)), lengths)
     column = np.arange(len(record)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     F = np.concatenate([np.empty(0), *rows])
     is_pole = ~np.isnan(F)
+    wrong = np.flatnonzero(is_pole & ~(np.isfinite(F) & (F > 0)))
+    if wrong.size:
+        raise ValueError(
+            f"frequency {column[wrong[0]]} of record {record[wrong[0]]} is {F[wrong[0]]:g}; expected positive values "
+            "in Hz, and NaN where there is no pole"
+        )
     if damping is not None:
-        damping = np.concatenate([np.empty(0), *_each(damping, lengths, "damping", 1)])[is_pole]
-    if shapes is not None:
-        parts = _each(shapes, lengths, "shapes", 2)
-        widths = {part.shape[1] for part in parts if part.shape[0]}
+        check_same_rows(frequencies, damping, ("frequencies", "damping"))
+        damping = np.concatenate([np.empty(0), *_each_record(damping, "damping", lengths)])[is_pole]
+    if n_sensors is not None:
+        check_same_rows(frequencies, shapes, ("frequencies", "shapes"))
+        parts = [part for part in _each_record(shapes, "shapes", lengths, 2) if part.size]
+        widths = {part.shape[1] for part in parts} or {n_sensors}
         if len(widths) > 1:
             raise ValueError(f"shapes of X have {sorted(widths)} sensors in different records; expected one number")
-        parts = [part for part in parts if part.shape[0]]
-        shapes = np.concatenate(parts)[is_pole] if parts else np.empty((0, 0))
-    return Poles(record[is_pole], column[is_pole], F[is_pole], damping, shapes, index)
+        shapes = np.concatenate(parts)[is_pole] if parts else np.empty((0, n_sensors))
+        shapes = _chosen_sensors(shapes, given_sensors, sensors) if parts else shapes
+        if shapes.shape[1] != n_sensors:
+            raise ValueError(f"shapes of X have {shapes.shape[1]} sensors; expected {n_sensors}, as in the reference")
+        if np.isinf(shapes).any():
+            raise ValueError("shapes of X have infinite components; expected NaN where a component is missing")
+    return Poles(record[is_pole], column[is_pole], F[is_pole], damping, None if n_sensors is None else shapes, index)
 
 
-def _each(values: Any, lengths: NDArray, what: str, ndim: int) -> list[NDArray]:
-    """One array for each record, of as many entries as the record has frequencies."""
-    if len(values) != len(lengths):
-        raise ValueError(f"{what} has {len(values)} records and frequencies {len(lengths)}; expected the same number")
-    rows = [as_floats(row) if what == "damping" else shape_array(row, f"{what} of X", any_size=True) for row in values]
-    for i, (row, length) in enumerate(zip(rows, lengths, strict=True)):
-        if length == 0 and row.size == 0:
-            rows[i] = np.empty((0,) * ndim)
-        elif row.ndim != ndim or len(row) != length:
-            expected = (int(length),) if ndim == 1 else (int(length), "n_sensors")
+def is_table(values: Any) -> bool:
+    """Whether values are a frame or an array of numbers, not a list of arrays."""
+    return isinstance(values, pd.DataFrame) or (isinstance(values, np.ndarray) and values.dtype != object)
+
+
+def _fields(X: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Frequencies, damping ratios, shapes, index and names of sensors of all records; None for those that X lacks."""
+    index = getattr(X, "index", None) if isinstance(X, pd.DataFrame | pd.Series) else None
+    if is_table(X):
+        X = {"frequencies": X}
+    elif isinstance(X, Sequence | pd.Series) and len(X) and all(isinstance(record, Mapping) for record in X):
+        records, X = list(X), {}
+        for name in (*POLE_FIELDS, "sensors"):
+            has = [record.get(name) is not None for record in records]
+            if any(has) and not all(has):
+                raise ValueError(f"record {has.index(False)} has no {name!r}, others have; expected all or none")
+            X[name] = [record[name] for record in records] if any(has) else None
+        names = set(map(tuple, X["sensors"] or ()))
+        if len(names) > 1:
+            raise ValueError(f"records name different sensors, such as {list(names)[:2]}; expected the same in all")
+        X["sensors"] = next(iter(names), None)
+    if not isinstance(X, Mapping) or X.get("frequencies") is None:
+        got = f"the fields {list(X)}" if isinstance(X, Mapping) else f"the type {type(X).__name__}"
+        raise ValueError(
+            f"X has {got}; expected a mapping with 'frequencies', 'shapes' and 'damping' of all records, or a sequence "
+            "of such mappings, one for each record"
+        )
+    frequencies = X["frequencies"]
+    if not isinstance(frequencies, Sequence | np.ndarray | pd.DataFrame | pd.Series):
+        raise ValueError(f"frequencies are {frequencies!r:.200}; expected a table, or a vector for each record")
+    index = frequencies.index if isinstance(frequencies, pd.DataFrame | pd.Series) else X.get("index", index)
+    return frequencies, X.get("damping"), X.get("shapes"), index, X.get("sensors")
+
+
+def _each_record(values: Any, what: str, lengths: NDArray | None = None, n_dims: int = 1) -> list[NDArray]:
+    """An array for each record: of as many entries as the record has frequencies, if these are known."""
+    read = shape_array if n_dims == 2 else real_array
+    if is_table(values):
+        rows = list(read(values, f"{what} of X", any_size=True))
+    else:
+        rows = [read(row, f"{what} of record {i}", any_size=True) for i, row in enumerate(values)]
+    for i, row in enumerate(rows):
+        n_poles = row.size if lengths is None else lengths[i]
+        if (row.size or n_poles) and (row.ndim != n_dims or len(row) != n_poles):
+            expected = (int(n_poles), "n_sensors")[:n_dims]
             raise ValueError(f"{what} of record {i} have shape {row.shape}; expected {expected}")
     return rows
 
 
 def _chosen_sensors(shapes: NDArray, given: Any, wanted: list | None) -> NDArray:
     """Shapes at the reference's sensors, by name where both have names."""
-    if not shapes.shape[0] or given is None or wanted is None:
+    if given is None or wanted is None:
         return shapes
     given = list(given)
     if len(given) != shapes.shape[1]:
@@ -290,23 +251,16 @@ class Pairs(NamedTuple):
 def fitting_pairs(poles: Poles, modes: ReferenceModes, min_mac: float, close: float) -> Pairs:
     """All pairs of a pole and a mode with similar shapes, within a factor of 8 in frequency: those in rad/s are 6.3
     times those in Hz."""
-    groups = modes.close_groups(close)
-    blocks = []
-    at_a_time = 65_536  # poles whose products with all modes are in memory
-    for start in range(0, max(len(poles.frequencies), 1), at_a_time):
-        block = slice(start, start + at_a_time)
-        ratios = poles.frequencies[block, np.newaxis] / modes.frequencies
-        fits = (ratios < 8) & (ratios > 1 / 8)
-        if poles.shapes is None or modes.shapes is None:
-            mac = span = np.ones(ratios.shape)
-        else:
-            mac, span = shape_agreement(poles.shapes[block], modes.shapes, groups)
-            fits &= span >= min_mac
-        pole, mode = np.nonzero(fits)
-        cost = (1 - span[fits]) / (1 - min_mac) + (span - mac)[fits]
-        pole += start
-        blocks.append(Pairs(pole, mode, mac[fits], cost, poles.record[pole], poles.frequencies[pole]))
-    return Pairs(*(np.concatenate(values) for values in zip(*blocks, strict=True)))
+    ratios = poles.frequencies[:, np.newaxis] / modes.frequencies
+    fits = (ratios < 8) & (ratios > 1 / 8)
+    if poles.shapes is None or modes.shapes is None:
+        mac = span = np.ones(ratios.shape)
+    else:
+        mac, span = shape_agreement(poles.shapes, modes.shapes, modes.close_groups(close))
+        fits &= span >= min_mac
+    pole, mode = np.nonzero(fits)
+    cost = (1 - span[fits]) / (1 - min_mac) + (span - mac)[fits]
+    return Pairs(pole, mode, mac[fits], cost, poles.record[pole], poles.frequencies[pole])
 
 
 def assign(record: Positions, pole: Positions, mode: Positions, cost: Array) -> Positions:
