@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import Interval, StrOptions
-from skthermo._core.frames import DAY, Table, as_stamps, check_duration, frame_like
+from skthermo._core.frames import DAY, YEAR, Table, as_stamps, check_duration, frame_like
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning
@@ -53,26 +53,22 @@ class PastFeatures(RecordTransformer):
         """Stamps of new records, of the same kind as those of `fit`."""
         stamps = stamps_of(X)
         if (stamps is None) != (self.stamps_ is None):
-            kinds = ["a DatetimeIndex", "rows without a DatetimeIndex"]
-            had, has = kinds if stamps is None else kinds[::-1]
-            raise ValueError(f"X has {has}; expected {had}, as in fit")
+            has, had = ("no" if one is None else "a" for one in (stamps, self.stamps_))
+            raise ValueError(f"X has {has} DatetimeIndex; expected {had} DatetimeIndex, as in fit")
         if stamps is not None and (self.time_zone_ is None) != (stamps.tz is None):
             raise ValueError(f"X has stamps in time zone {stamps.tz}; expected {self.time_zone_}, as in fit")
         return stamps
 
-    def _found(self, own: NDArray[np.int64], reach: int) -> NDArray[np.bool_]:
-        """Which records of `fit` are so many nanoseconds before some stamps, or between them."""
-        old = self.stamps_.view(np.int64)
-        return (old >= max(int(own.min()) - reach, np.iinfo(np.int64).min)) & (old <= own.max())
-
-    def _joined(
-        self, found: NDArray[np.bool_], own: NDArray[np.int64], values: NDArray
+    def _with_history(
+        self, own: NDArray[np.int64], values: NDArray, reach: int, *, and_first: bool = False
     ) -> tuple[NDArray[np.int64], NDArray]:
-        """Stamps and values of some records of `fit`, then of new records, which replace those of the same stamp."""
+        """Stamps and values of records of `fit` up to so many nanoseconds before new records, and of the first of all
+        if asked for, then of the new ones, which replace those of the same stamp."""
         old = self.stamps_.view(np.int64)
-        only_old = np.flatnonzero(found)
-        only_old = only_old[~np.isin(old[only_old], own)]
-        return np.concatenate([old[only_old], own]), np.concatenate([self.history_[only_old], values])
+        is_near = (old >= max(int(own.min()) - reach, np.iinfo(np.int64).min)) & (old <= own.max())
+        is_near[old.argmin()] |= and_first
+        is_near &= ~np.isin(old, own)
+        return np.concatenate([old[is_near], own]), np.concatenate([self.history_[is_near], values])
 
 
 def stamps_of(X: Table) -> pd.DatetimeIndex | None:
@@ -180,22 +176,18 @@ class LagFeatures(PastFeatures):
         self.lags_ = _read_lags(self.lags, len(values))
         self.freq_ = self.tolerance_ = None
         stamps = self._remember(X, values)
-        if stamps is None:
-            for name in ("freq", "tolerance"):
-                if getattr(self, name) is not None:
-                    raise ValueError(
-                        f"{name} is {getattr(self, name)!r}, but X has no DatetimeIndex; "
-                        f"expected a frame on one, or {name}=None"
-                    )
-        else:
-            self.freq_ = (
-                _most_frequent_step(stamps)
-                if self.freq is None or self._calendar() is not None
-                else check_duration(self.freq, "freq", may_be_zero=False).to_timedelta64()
-            )
-            self.tolerance_ = 6 * self.freq_
-            if self.tolerance is not None:
-                self.tolerance_ = check_duration(self.tolerance, "tolerance").to_timedelta64()
+        for name in ("freq", "tolerance") if stamps is None else ():
+            if (given := getattr(self, name)) is not None:
+                raise ValueError(
+                    f"{name} is {given!r}, but X has no DatetimeIndex; expected a frame on one, or {name}=None"
+                )
+        if stamps is not None:
+            if self.freq is None or self._calendar() is not None:
+                self.freq_ = _most_frequent_step(stamps)
+            else:
+                self.freq_ = check_duration(self.freq, "freq", may_be_zero=False).to_timedelta64()
+            given = 6 * pd.Timedelta(self.freq_) if self.tolerance is None else self.tolerance
+            self.tolerance_ = check_duration(given, "tolerance").to_timedelta64()
             if max(self.lags_) > np.timedelta64(100 * 365, "D") / self.freq_:  # stamps in nanoseconds span 292 years
                 raise ValueError(
                     f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
@@ -207,7 +199,13 @@ class LagFeatures(PastFeatures):
             return self._by_time(stamps, values)
         rows, first = np.arange(len(values)), 0 if self.padding == "edge" else -1
         sources = [np.where(rows < lag, first, rows - lag) for lag in self.lags_]
-        return _rows_by_lag(values, sources), self._doubts_of_first_rows(values)
+        begins, reach = values[: max(self.lags_) + 1], f"{max(self.lags_)} rows"
+        if not max(self.lags_) or np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True):
+            return _rows_by_lag(values, sources), []
+        done = "are padded with the first record" if self.padding == "edge" else "lack lags"
+        return _rows_by_lag(values, sources), no_earlier_records(
+            f"lags reach {reach} back, and the first rows {done}", reach
+        )
 
     @property
     def lookback_(self) -> int | np.timedelta64:
@@ -217,22 +215,6 @@ class LagFeatures(PastFeatures):
 
     def _names(self, sensors: Sequence[Hashable]) -> list[Hashable]:
         return [f"{sensor}_lag{lag}" for sensor in sensors for lag in self.lags_]
-
-    def _doubts_of_first_rows(self, values: Array) -> list[FewRecordsWarning]:
-        """A finding where lags of the first rows are not known, unless these are the first rows of `fit`."""
-        reach = max(self.lags_)
-        begins = values[: reach + 1]
-        if not reach or np.array_equal(begins, self.first_rows_[: len(begins)], equal_nan=True):
-            return []
-        done = "are padded with the first record" if self.padding == "edge" else "lack lags"
-        return no_earlier_records(f"lags reach {reach} rows back, and the first rows {done}", f"{reach} rows")
-
-    def _doubts_of_history(self, unknown: NDArray[np.bool_]) -> list[FewRecordsWarning]:
-        """A finding where more than half of the rows have lags that reach before the first of them and find nothing."""
-        if 2 * unknown.sum() <= len(unknown):
-            return []
-        reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
-        return no_earlier_records(f"lags reach {reach} back, and most rows lack lags", reach)
 
     def _calendar(self) -> pd.offsets.BaseOffset | None:
         """The step of the calendar by which records of `fit` follow each other; None where steps are times."""
@@ -261,12 +243,10 @@ class LagFeatures(PastFeatures):
         return earlier.as_unit("ns").asi8
 
     def _by_time(self, stamps: pd.DatetimeIndex, values: Array) -> tuple[Array, list[FewRecordsWarning]]:
-        own, old = stamps.as_unit("ns").asi8, self.stamps_.view(np.int64)
+        own = stamps.as_unit("ns").asi8
         freq, tolerance = (int(duration.astype(np.int64)) for duration in (self.freq_, self.tolerance_))
         calendar = self._calendar()
-        found = self._found(own, max(self.lags_) * freq + tolerance)
-        found[old.argmin()] = True  # the padding of what is before the first record of all
-        known, records = self._joined(found, own, values)
+        known, records = self._with_history(own, values, max(self.lags_) * freq + tolerance, and_first=True)
         order = np.argsort(known)
         ascending, first = pd.Index(known[order]), order[0] if self.padding == "edge" else -1
         sources, unknown = [], np.zeros(len(own), dtype=bool)
@@ -276,8 +256,11 @@ class LagFeatures(PastFeatures):
             unknown |= (at < 0) & (wanted < own.min())
             source = np.where(at < 0, -1, order[at])
             sources.append(np.where(wanted < ascending[0], first, source))
-        are_of_fit = np.isin(own, old[found]).all()
-        return _rows_by_lag(records, sources), [] if are_of_fit else self._doubts_of_history(unknown)
+        if 2 * unknown.sum() <= len(own) or np.isin(own, self.stamps_.view(np.int64)).all():
+            return _rows_by_lag(records, sources), []
+        reach = duration_text(pd.Timedelta(max(self.lags_) * self.freq_))
+        found = no_earlier_records(f"lags reach {reach} back, and most rows lack lags", reach)
+        return _rows_by_lag(records, sources), found
 
 
 def _step_of_calendar(freq: Any) -> pd.offsets.BaseOffset | None:
@@ -299,13 +282,11 @@ def _read_lags(lags: Any, n_rows: int) -> list[int]:
     count = lags if isinstance(lags, Integral) else len(lags)
     if count > max(10_000, n_rows):  # a list of 10^9 lags would end the interpreter
         raise ValueError(f"lags are {count} for {n_rows} rows; expected at most 10000, or as many as there are rows")
-    if isinstance(lags, Integral):
-        return list(range(lags))
-    explicit = list(lags)
-    whole = all(isinstance(lag, Integral) and not isinstance(lag, bool) and lag >= 0 for lag in explicit)
-    if not explicit or not whole or len(set(explicit)) < len(explicit):
+    found = list(range(lags) if isinstance(lags, Integral) else lags)
+    are_whole = all(isinstance(lag, Integral) and not isinstance(lag, bool) and lag >= 0 for lag in found)
+    if not found or not are_whole or len(set(found)) < len(found):
         raise ValueError(f"lags is {lags!r}; expected a positive number or different non-negative integers")
-    return [int(lag) for lag in explicit]
+    return list(map(int, found))
 
 
 def _most_frequent_step(stamps: pd.DatetimeIndex) -> np.timedelta64:
@@ -386,7 +367,7 @@ class ExponentialMeans(PastFeatures):
     >>> ExponentialMeans(half_lives=["2D"]).fit(T.to_numpy())
     Traceback (most recent call last):
     ...
-    ValueError: half-life '2D' is a duration, but X has no DatetimeIndex; expected a number of rows
+    ValueError: half-life is '2D', but X has no DatetimeIndex; expected a positive number of rows
     """
 
     _parameter_constraints: dict = {
@@ -425,7 +406,7 @@ class ExponentialMeans(PastFeatures):
         times = own
         if stamps is not None:
             own = stamps.as_unit("ns").asi8
-            times, records = self._joined(self._found(own, MEAN_REACH * self._longest), own, values)
+            times, records = self._with_history(own, values, MEAN_REACH * self._longest)
         order = np.argsort(times, kind="stable")
         times, records = times[order], records[np.ix_(order, self.sensors_)]
         rows = np.argsort(order)[len(order) - len(own) :]
@@ -476,7 +457,7 @@ def no_earlier_records(found: str, needed: str) -> list[FewRecordsWarning]:
 
 def trailing_means(
     times: NDArray[np.int64], values: NDArray, half_life: int, step: int, begun: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Exponentially weighted means of columns in order of time, NaN left out, over `MEAN_REACH` half-lives, and the
     share of the weight since records have ``begun`` that lies on recorded time."""
     known = ~np.isnan(values)
@@ -511,22 +492,14 @@ def _decayed_sums(ages: NDArray[np.float64], table: NDArray[np.float64]) -> NDAr
 
 
 def _read_half_lives(given: Any, is_timed: bool) -> NDArray[np.int64]:
-    if not len(given):
-        raise ValueError(f"half_lives is {given!r}; expected a sequence, such as ['30D']")
     found = []
     for one in given:
-        is_count = isinstance(one, Integral) and not isinstance(one, bool | np.bool_ | np.timedelta64)
         if is_timed:
-            duration = check_duration(one, "half-life", may_be_zero=False)
-            if duration > np.timedelta64(10 * 365, "D"):
-                raise ValueError(f"half-life is {one!r}; expected at most ten years")
-            found.append(duration.value)
-        elif not is_count:
-            raise ValueError(f"half-life {one!r} is a duration, but X has no DatetimeIndex; expected a number of rows")
-        elif not 1 <= one <= np.iinfo(np.int32).max:
-            raise ValueError(f"half-life is {one!r}; expected a positive number of rows")
-        else:
+            found.append(check_duration(one, "half-life", may_be_zero=False).value)
+        elif isinstance(one, Integral) and not isinstance(one, bool | np.bool_ | np.timedelta64) and one > 0:
             found.append(int(one))
-    if len(set(found)) < len(found):
-        raise ValueError(f"half_lives is {given!r}; expected different ones")
+        else:
+            raise ValueError(f"half-life is {one!r}, but X has no DatetimeIndex; expected a positive number of rows")
+    if not found or len(set(found)) < len(found) or max(found) > 10 * YEAR.value:
+        raise ValueError(f"half_lives is {given!r}; expected different ones of at most ten years, such as ['30D']")
     return np.array(found, dtype=np.int64)

@@ -86,7 +86,7 @@ def test_rows_may_come_in_any_order_and_means_may_be_given():
     np.testing.assert_allclose(given.predict(T), first.predict(T), rtol=1e-9)
     by_hand = make_pipeline(clone(first.means_), TemperatureMapper(means=None)).fit(T, F)
     np.testing.assert_allclose(by_hand.predict(T), first.predict(T), rtol=1e-9)
-    with pytest.raises(ValueError, match="half-life '3D' is a duration, but X has no DatetimeIndex"):
+    with pytest.raises(ValueError, match="half-life is '3D', but X has no DatetimeIndex"):
         TemperatureMapper(means=["3D"]).fit(T.to_numpy(), F.to_numpy())
 
 
