@@ -21,7 +21,7 @@ from skthermo._core.frames import (
     positions_of,
     row_times,
 )
-from skthermo.preprocessing._transformers import RecordTransformer
+from skthermo.preprocessing._transformers import DURATION, RecordTransformer
 from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, ridge, without_far
 
 
@@ -81,13 +81,7 @@ class HampelFilter(RecordTransformer):
     """
 
     _parameter_constraints: dict = {
-        "window": [
-            Interval(Integral, 3, None, closed="left"),
-            str,
-            timedelta,
-            np.timedelta64,
-            pd.offsets.BaseOffset,
-        ],
+        "window": [Interval(Integral, 3, None, closed="left"), *DURATION],
         "n_deviations": [Interval(Real, 0, None, closed="neither")],
         "targets": "no_validation",
     }

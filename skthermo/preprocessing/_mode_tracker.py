@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import timedelta
 from numbers import Real
 from typing import Any
@@ -257,9 +258,7 @@ class ModeTracker(TransformerMixin, Estimator, auto_wrap_output_keys=None):
             return order, float(self.follow)
         if stamps is None or stamps.hasnans or len(stamps) < 2:
             has = "no DatetimeIndex" if stamps is None else f"{len(stamps)} stamps, some of them missing or alone"
-            raise ValueError(
-                f"follow is {self.follow!r}, but X has {has}; expected two or more, or a number of records"
-            )
+            raise ValueError(f"follow is {self.follow!r}, but X has {has}; expected two, or a number of records")
         duration = check_duration(self.follow, "follow", may_be_zero=False).to_timedelta64()
         step = np.median(np.diff(stamps.as_unit("ns").asi8[order]))
         n_records = duration.astype(np.int64) / max(step, 1)
@@ -300,7 +299,8 @@ def tracked_modes(
 
     damping = shapes = mac = None
     if poles.damping is not None:
-        damping = table(poles.damping[chosen.pole], columns=[damping_name(name) for name in names])
+        ratios = [f"xi{name[1:]}" if re.fullmatch(r"f\d+", name) else f"xi_{name}" for name in names]
+        damping = table(poles.damping[chosen.pole], columns=ratios)
     if poles.shapes is not None and reference.shapes is not None:
         mac = table(chosen.mac)
         in_phase = aligned(poles.shapes[chosen.pole], reference.shapes.T[mode])
@@ -339,11 +339,6 @@ def is_ambiguous(poles: Poles, chosen: Pairs, near: Pairs, n_modes: int) -> NDAr
     fitting_poles = np.bincount(near.record * n_modes + near.mode, minlength=n_cells)
     fitting_modes = np.bincount(near.pole, minlength=len(poles.record))
     return (fitting_poles[chosen.record * n_modes + chosen.mode] > 1) | (fitting_modes[chosen.pole] > 1)
-
-
-def damping_name(mode: str) -> str:
-    """Name of a mode's damping ratio: xi3 for f3, xi_sway for sway."""
-    return f"xi{mode[1:]}" if mode[:1] == "f" and mode[1:].isdigit() else f"xi_{mode}"
 
 
 def aligned(shapes: NDArray, reference: NDArray) -> NDArray:

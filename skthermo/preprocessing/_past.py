@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import Interval, StrOptions
-from skthermo._core.frames import DAY, YEAR, Table, as_stamps, check_duration, frame_like
+from skthermo._core.frames import DAY, YEAR, Table, as_index, as_stamps, check_duration, frame_like
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning
-from skthermo.preprocessing._transformers import RecordTransformer
+from skthermo.preprocessing._transformers import DURATION, RecordTransformer
 
 MEAN_REACH = 6  # half-lives beyond which records have no weight: they would have 2 % of it
 
@@ -79,11 +79,8 @@ def stamps_of(X: Table) -> pd.DatetimeIndex | None:
     if index.hasnans:
         raise ValueError(f"X has a missing stamp (NaT) in row {np.flatnonzero(index.isna())[0]}")
     if index.has_duplicates:
-        repeated = index[index.duplicated()]
-        raise ValueError(
-            f"X has {len(repeated)} duplicate stamps, the first {repeated[0]} in row "
-            f"{np.flatnonzero(index.duplicated())[0]}; expected each stamp once"
-        )
+        row = int(index.duplicated().argmax())
+        raise ValueError(f"X has the stamp {index[row]} of row {row} more than once; expected each stamp once")
     return index
 
 
@@ -154,8 +151,8 @@ class LagFeatures(PastFeatures):
 
     _parameter_constraints: dict = {
         "lags": [Interval(Integral, 1, None, closed="left"), "array-like"],
-        "freq": [str, timedelta, np.timedelta64, pd.offsets.BaseOffset, None],
-        "tolerance": [str, timedelta, np.timedelta64, pd.offsets.BaseOffset, None],
+        "freq": [*DURATION, None],
+        "tolerance": [*DURATION, None],
         "padding": [StrOptions({"edge", "nan"})],
     }
 
@@ -189,9 +186,8 @@ class LagFeatures(PastFeatures):
             given = 6 * pd.Timedelta(self.freq_) if self.tolerance is None else self.tolerance
             self.tolerance_ = check_duration(given, "tolerance").to_timedelta64()
             if max(self.lags_) > np.timedelta64(100 * 365, "D") / self.freq_:  # stamps in nanoseconds span 292 years
-                raise ValueError(
-                    f"lags reach back {max(self.lags_)} times {pd.Timedelta(self.freq_)}; expected at most 100 years"
-                )
+                reach = f"{max(self.lags_)} times {pd.Timedelta(self.freq_)}"
+                raise ValueError(f"lags reach back {reach}; expected at most 100 years")
         self.first_rows_ = values[: max(self.lags_) + 1].copy()
 
     def _features(self, values: Array, stamps: pd.DatetimeIndex | None) -> tuple[Array, list[FewRecordsWarning]]:
@@ -218,9 +214,7 @@ class LagFeatures(PastFeatures):
 
     def _calendar(self) -> pd.offsets.BaseOffset | None:
         """The step of the calendar by which records of `fit` follow each other; None where steps are times."""
-        stamps = pd.DatetimeIndex(self.stamps_).unique()
-        if self.time_zone_ is not None:
-            stamps = stamps.tz_localize("UTC").tz_convert(self.time_zone_).tz_localize(None)
+        stamps = as_index(self.stamps_.view(np.int64), self.time_zone_).tz_localize(None).unique()
         if (stamps - stamps.normalize()).nunique() > 1:
             return None
         given = _step_of_calendar(self.freq)
@@ -235,12 +229,10 @@ class LagFeatures(PastFeatures):
 
     def _steps_back(self, stamps: pd.DatetimeIndex, lag: int, step: pd.offsets.BaseOffset) -> NDArray[np.int64]:
         """Times that are so many steps of the calendar earlier, by local clocks, in UTC."""
-        local = stamps if self.time_zone_ is None else stamps.tz_convert(self.time_zone_).tz_localize(None)
+        zone, is_summer = self.time_zone_, np.ones(len(stamps), dtype=bool)
+        local = stamps if zone is None else stamps.tz_convert(zone).tz_localize(None)
         earlier = local - lag * step if lag else local
-        if self.time_zone_ is not None:
-            is_summer = np.ones(len(earlier), dtype=bool)
-            earlier = earlier.tz_localize(self.time_zone_, ambiguous=is_summer, nonexistent="shift_forward")
-        return earlier.as_unit("ns").asi8
+        return earlier.tz_localize(zone, ambiguous=is_summer, nonexistent="shift_forward").as_unit("ns").asi8
 
     def _by_time(self, stamps: pd.DatetimeIndex, values: Array) -> tuple[Array, list[FewRecordsWarning]]:
         own = stamps.as_unit("ns").asi8

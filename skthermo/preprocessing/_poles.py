@@ -46,10 +46,8 @@ def read_poles(X: Any, sensors: list | None, n_sensors: int | None) -> Poles:
     is_pole = ~np.isnan(F)
     wrong = np.flatnonzero(is_pole & ~(np.isfinite(F) & (F > 0)))
     if wrong.size:
-        raise ValueError(
-            f"frequency {column[wrong[0]]} of record {record[wrong[0]]} is {F[wrong[0]]:g}; expected positive values "
-            "in Hz, and NaN where there is no pole"
-        )
+        place = f"frequency {column[wrong[0]]} of record {record[wrong[0]]}"
+        raise ValueError(f"{place} is {F[wrong[0]]:g}; expected positive values in Hz, and NaN where there is no pole")
     if damping is not None:
         check_same_rows(frequencies, damping, ("frequencies", "damping"))
         damping = np.concatenate([np.empty(0), *_each_record(damping, "damping", lengths)])[is_pole]
@@ -91,10 +89,8 @@ def _fields(X: Any) -> tuple[Any, Any, Any, Any, Any]:
         X["sensors"] = next(iter(names), None)
     if not isinstance(X, Mapping) or X.get("frequencies") is None:
         got = f"the fields {list(X)}" if isinstance(X, Mapping) else f"the type {type(X).__name__}"
-        raise ValueError(
-            f"X has {got}; expected a mapping with 'frequencies', 'shapes' and 'damping' of all records, or a sequence "
-            "of such mappings, one for each record"
-        )
+        expected = f"a mapping with {', '.join(map(repr, POLE_FIELDS))} of all records, or a sequence of one for each"
+        raise ValueError(f"X has {got}; expected {expected}")
     frequencies = X["frequencies"]
     if not isinstance(frequencies, Sequence | np.ndarray | pd.DataFrame | pd.Series):
         raise ValueError(f"frequencies are {frequencies!r:.200}; expected a table, or a vector for each record")
@@ -156,32 +152,24 @@ class ReferenceModes(NamedTuple):
             return []
         named = ", ".join("/".join(self.names[mode] for mode in pair) for pair in pairs[similar])
         by = "no shapes are given" if self.shapes is None else f"their shapes have a MAC of {min_mac:g} or more"
-        return [
-            RecordsWarning(
-                f"reference modes cannot be distinguished: {named}. A frequency can lie within "
-                f"max_shift={max_shift:g} of both, and {by}. One may be taken for the other. Use a smaller max_shift, "
-                "or more sensors",
-                "mode-order",
-            )
-        ]
+        text = (
+            f"reference modes cannot be distinguished: {named}. A frequency can lie within max_shift={max_shift:g} of "
+            f"both, and {by}. One may be taken for the other. Use a smaller max_shift, or more sensors"
+        )
+        return [RecordsWarning(text, "mode-order")]
 
 
 def read_reference(reference: Any) -> ReferenceModes:
     """The reference modes, checked."""
-    if isinstance(reference, Mapping):
-        missing = [name for name in ("frequencies", "shapes") if name not in reference]
-        if missing:
-            raise ValueError(f"reference has the fields {list(reference)}; expected also {missing}")
-        given, shapes, sensors = reference["frequencies"], reference["shapes"], reference.get("sensors")
-    elif len(reference) == 2:
-        (given, shapes), sensors = reference, None
-    else:
-        raise ValueError(f"reference has {len(reference)} parts; expected two, frequencies and shapes")
+    is_mapping = isinstance(reference, Mapping)
+    parts = dict(reference if is_mapping else zip(("frequencies", "shapes"), reference, strict=False))
+    if not parts.keys() >= {"frequencies", "shapes"} or (not is_mapping and len(reference) != 2):
+        got = f"the fields {list(parts)}" if is_mapping else f"{len(reference)} parts"
+        raise ValueError(f"reference has {got}; expected frequencies and shapes")
+    given, shapes, sensors = parts["frequencies"], parts["shapes"], parts.get("sensors")
     frequencies = real_array(given, "reference frequencies")
-    if frequencies.ndim != 1 or not frequencies.size:
-        raise ValueError(f"reference frequencies have shape {frequencies.shape}; expected (n_modes,)")
-    if not (np.isfinite(frequencies) & (frequencies > 0)).all():
-        raise ValueError(f"reference frequencies are {frequencies}; expected positive values in Hz")
+    if frequencies.ndim != 1 or not frequencies.size or not (np.isfinite(frequencies) & (frequencies > 0)).all():
+        raise ValueError(f"reference frequencies are {frequencies}; expected positive values in Hz, (n_modes,)")
     n_modes = len(frequencies)
     names = [f"f{mode + 1}" for mode in range(n_modes)]
     if isinstance(given, pd.Series) and not isinstance(given.index, pd.RangeIndex):
@@ -201,9 +189,9 @@ def _read_shapes(shapes: Any, n_modes: int) -> NDArray:
         hint = ": transpose them" if shapes.ndim == 2 and shapes.shape[0] == n_modes else ""
         raise ValueError(f"reference shapes have shape {shapes.shape}; expected (n_sensors, {n_modes}){hint}")
     norms = np.linalg.norm(shapes, axis=0)
-    if not (np.isfinite(norms) & (norms > 0)).all():
-        mode = np.flatnonzero(~(np.isfinite(norms) & (norms > 0)))[0]
-        raise ValueError(f"shape {mode} of the reference is zero at all sensors, or not finite; expected other values")
+    wrong = np.flatnonzero(~(np.isfinite(norms) & (norms > 0)))
+    if wrong.size:
+        raise ValueError(f"shape {wrong[0]} of the reference is zero, or not finite; expected other values")
     return shapes
 
 
@@ -267,9 +255,8 @@ def assign(record: Positions, pole: Positions, mode: Positions, cost: Array) -> 
     """Positions of the pairs that assign poles to modes one-to-one in every record, at the lowest total cost. A mode
     may stay without a pole at the cost `MISSED_MODE`."""
     order = np.lexsort((cost, mode, record))
-    is_first = np.ones(len(order), dtype=bool)
-    is_first[1:] = (np.diff(record[order]) != 0) | (np.diff(mode[order]) != 0)
-    best = order[is_first]
+    cell = record * (mode.max(initial=0) + 1) + mode
+    best = order[np.unique(cell[order], return_index=True)[1]]  # the cheapest pole of each mode in each record
     _, inverse, counts = np.unique(pole[best], return_inverse=True, return_counts=True)
     contested = np.unique(record[best][counts[inverse] > 1])
     chosen = [best[~np.isin(record[best], contested)]]

@@ -9,9 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from skthermo._core.text import counted
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
+from skthermo.preprocessing.loggers.logger_files import lonely_stamps
 from skthermo.preprocessing.loggers.together import LoggerRecords
 
 
@@ -91,11 +91,7 @@ def read_records(
         text = f"{'; '.join(said)}. If that is wrong, name the columns, or the format of stamps"
         findings.append(RecordsWarning(text, "read-as"))
     if len(read.waiting):
-        text = (
-            f"{counted(len(read.waiting), 'stamp')} are not in all files, the first {read.waiting.min()}. They are "
-            f"left out; {len(read.table)} records have all columns. If they are many, compare the loggers' clocks"
-        )
-        findings.append(RecordsWarning(text, "different-rows"))
+        findings.append(lonely_stamps(read.waiting, "files", read.table))
     warn_each(findings)
     return read.table[read.roles["temperatures"]], read.table[read.roles["responses"]]
 

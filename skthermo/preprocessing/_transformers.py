@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
+from datetime import timedelta
 from numbers import Integral
 from typing import Any, Literal, Self, overload
 
@@ -25,6 +26,9 @@ from skthermo._core.estimators import (
 )
 from skthermo._core.frames import Table, frame_like, marker_findings, row_weights
 from skthermo._core.warnings import warn_each
+
+DURATION = (str, timedelta, np.timedelta64, pd.offsets.BaseOffset)
+"""Types of durations."""
 
 
 class RecordTransformer(TransformerMixin, Estimator):
@@ -293,10 +297,8 @@ class SensorMeans(RecordTransformer):
         if self.roles is None:
             return ["ambient"] * len(names)
         if set(self.roles) != set(names):
-            raise ValueError(
-                f"roles names the columns {sorted(map(str, self.roles))}; expected each of {list(map(str, names))}, "
-                "with None as the role of a column that is left out"
-            )
+            wanted = f"{list(map(str, names))}, with None as the role of a column that is left out"
+            raise ValueError(f"roles names the columns {sorted(map(str, self.roles))}; expected each of {wanted}")
         found = [self.roles[name] for name in names]
         if not all(role is None or isinstance(role, str) for role in found) or not any(found):
             raise ValueError(f"roles is {self.roles!r:.200}; expected names such as 'air', or None, and one at least")
@@ -370,9 +372,10 @@ class BiasAligner(RecordTransformer):
         warn_each(self.findings_)
 
     def _transformed(self, X: Table, values: NDArray) -> Table:
-        if self.method == "scale":
-            return frame_like(X, values / self.mean_ * self.reference_)
-        return frame_like(X, values - self.mean_ + self.reference_)
+        return frame_like(X, self._moved(values, self.mean_, self.reference_))
+
+    def _moved(self, values: NDArray, old: NDArray, new: NDArray) -> NDArray:
+        return values / old * new if self.method == "scale" else values - old + new
 
     @overload
     def inverse_transform(self, X: pd.DataFrame) -> pd.DataFrame: ...
@@ -398,18 +401,14 @@ class BiasAligner(RecordTransformer):
             F = check_array(X)
         if F.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {F.shape[1]} features; expected {self.n_features_in_} modes, as in fit")
-        if self.method == "scale":
-            return frame_like(X, F / self.reference_ * self.mean_)
-        return frame_like(X, F - self.reference_ + self.mean_)
+        return frame_like(X, self._moved(F, self.reference_, self.mean_))
 
     def _read_reference(self, n_modes: int) -> NDArray[np.float64]:
         if self.reference is None:
             return np.full(n_modes, 1.0 if self.method == "scale" else 0.0)
         if isinstance(self.reference, str):
-            raise ValueError(
-                "reference is 'simulations', but no InverseSurrogate has simulated any; expected the aligner of a "
-                "DataInformedFEM with one"
-            )
+            hint = "expected the aligner of a DataInformedFEM with one"
+            raise ValueError(f"reference is 'simulations', but no InverseSurrogate has simulated any; {hint}")
         if is_model(self.reference):
             reference = as_floats(self.reference.frequencies(np.ones((1, len(self.reference.parameter_names)))))[0]
         else:
@@ -417,8 +416,6 @@ class BiasAligner(RecordTransformer):
             means = np.mean(self.reference, axis=0) if np.ndim(self.reference) == 2 else self.reference
             reference = real_array(by_mode(means, n_modes, names, "reference"), "reference")
         if reference.shape != (n_modes,) or not np.isfinite(reference).all():
-            raise ValueError(
-                f"reference {reference} has shape {reference.shape}; expected a frequency for each of the "
-                f"{n_modes} modes of X"
-            )
+            expected = f"a frequency for each of the {n_modes} modes of X"
+            raise ValueError(f"reference {reference} has shape {reference.shape}; expected {expected}")
         return reference

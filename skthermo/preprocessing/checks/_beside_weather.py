@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, compress
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
 from skthermo._core.arrays import Array, as_floats, means_of_known, median, robust_deviation, spread_evenly
-from skthermo._core.frames import Table, column_names, columns_by_sensor
+from skthermo._core.frames import Table, column_names, columns_by_sensor, usual_step
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, predicted_by_weather
 from skthermo.preprocessing.checks._columns import Reading
@@ -25,21 +25,15 @@ def look_at_both(T: Reading, F: Reading, *, has_wrong_times: bool) -> NDArray[np
 
     Each sensor counts with its present value, without lags. Each search passes over the values of earlier findings.
     """
-    sensors = []
-    for places in columns_by_sensor(T).values():
-        if places[0] not in T.useless:
-            sensors.append(places[0])
+    sensors = [places[0] for places in columns_by_sensor(T).values() if places[0] not in T.useless]
     temperatures, values = T.values[:, sensors], F.values.copy()
     values[:, list(F.useless)] = np.nan
     if np.count_nonzero(~np.isnan(temperatures).all(axis=1) & ~np.isnan(values).all(axis=1)) < 50:
         return find_outliers(F, values, None)
     places, lines = WeatherLines.learned(temperatures).inputs(temperatures)
-    hours = None
-    if isinstance(T.index, pd.DatetimeIndex) and not has_wrong_times:
-        folds = BlockedKFold().fold_of(pd.DataFrame(index=T.index))
-        hours = max(float(np.median(np.diff(T.index.as_unit("ns").asi8))) / 3.6e12, 1e-6)
-    else:
-        folds = BlockedKFold().fold_of(temperatures)
+    is_timed = isinstance(T.index, pd.DatetimeIndex) and not has_wrong_times
+    folds = BlockedKFold().fold_of(pd.DataFrame(index=T.index) if is_timed else temperatures)
+    hours = max(usual_step(T.index) / pd.Timedelta("1h"), 1e-6) if is_timed else None
     exchange_modes(F, values, lines, folds)
     far = find_outliers(F, values, lines, folds)
     values[far] = np.nan
@@ -217,27 +211,29 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> list[RecordsWa
     steady = F.variation[F.variation <= 0.15]
     usual = np.median(steady) if len(steady) else np.min(T.variation, initial=0.15)
     is_temperature = (F.variation >= 5.0 * usual) & (len(steady) > 0 or (T.variation <= 0.15).any())
-    is_mode = (T.variation <= 3.0 * F.variation[~is_temperature].max(initial=0.0)) & F.reach(T)
-    is_mode &= T.variation <= 0.15
+    is_mode = T.variation <= np.minimum(3.0 * F.variation[~is_temperature].max(initial=0.0), 0.15)
+    is_mode &= (T.median >= np.nanmin(F.median) / 10) & (T.median <= np.nanmax(F.median) * 10)
     if not is_mode.any() and not is_temperature.any():
         return []
     ranks = pd.DataFrame(np.hstack([T.values, F.values])).corr("spearman", min_periods=30).fillna(0).to_numpy()
-    n_sensors = len(T.names)
-    among, across = ranks[:n_sensors, :n_sensors], ranks[:n_sensors, n_sensors:]
-    together = np.abs(across[:, ~is_temperature]).mean(axis=1) if not is_temperature.all() else np.zeros(n_sensors)
-    certain = max(0.1, 3 / np.sqrt(len(T.values)))
-    is_mode &= together > np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), certain)
-    is_temperature &= ((across > 0.6) & T.nearly(F))[~is_mode].any(axis=0)
+    among, across = np.hsplit(ranks[: len(T.names)], [len(T.names)])
+    together = means_of_known(np.abs(across[:, ~is_temperature]), axis=1)
+    least = np.maximum(among[:, ~is_mode].max(axis=1, initial=-1.0), max(0.1, 3 / np.sqrt(len(T.values))))
+    is_mode &= together > least
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = T.deviation[:, np.newaxis] / F.deviation
+    is_alike = (np.abs(T.median[:, np.newaxis] - F.median) <= 20) & (ratio >= 1 / 3) & (ratio <= 3)
+    is_temperature &= ((across > 0.6) & is_alike)[~is_mode].any(axis=0)
     found = []
     if is_mode.any():
         found.append(
-            f"the columns {T.named(is_mode)} behave like frequencies: they vary as little as the modes, and with them. "
-            "A mode that predicts the others hides damage"
+            f"the columns {[*compress(T.names, is_mode)]} behave like frequencies: they vary as little as the modes, "
+            "and with them. A mode that predicts the others hides damage"
         )
     if is_temperature.any():
         found.append(
-            f"the targets {F.named(is_temperature)} behave like temperatures: they vary by far more than the modes, "
-            "and are nearly equal to other temperatures. A detector would evaluate the weather"
+            f"the targets {[*compress(F.names, is_temperature)]} behave like temperatures: they vary by far more than "
+            "the modes, and are nearly equal to other temperatures. A detector would evaluate the weather"
         )
     text = f"{', and '.join(found)}. Put all modes, and nothing else, among the targets"
     return [RecordsWarning(text, "exchanged-tables")] if found else []
@@ -252,18 +248,3 @@ class TypicalColumns:
         self.median, self.deviation = median(values), robust_deviation(values)
         positive = (np.fmin.reduce(values) > 0) & (self.deviation > 0)
         self.variation = np.divide(self.deviation, self.median, out=np.full(values.shape[1], np.inf), where=positive)
-
-    def named(self, chosen: NDArray[np.bool_]) -> list:
-        return [name for name, is_chosen in zip(self.names, chosen, strict=True) if is_chosen]
-
-    def reach(self, others: TypicalColumns) -> NDArray[np.bool_]:
-        """Which others have about the magnitude of some of these."""
-        lowest, highest = np.nanmin(self.median) / 10, np.nanmax(self.median) * 10
-        return (others.median >= lowest) & (others.median <= highest)
-
-    def nearly(self, others: TypicalColumns) -> NDArray[np.bool_]:
-        """Which pairs with others could be temperatures of the same place, (n_columns, n_others)."""
-        difference = np.abs(self.median[:, np.newaxis] - others.median)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = self.deviation[:, np.newaxis] / others.deviation
-        return (difference <= 20) & (ratio >= 1 / 3) & (ratio <= 3)

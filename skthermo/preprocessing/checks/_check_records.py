@@ -4,23 +4,22 @@ records are named."""
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from skthermo._core.arrays import check_model
 from skthermo._core.frames import as_stamps, of_a_wrong_clock
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._beside_weather import look_at_both, looks_exchanged
 from skthermo.preprocessing.checks._columns import (
     Reading,
-    compare_with_model,
-    doubt_size,
-    look_at_inputs,
+    are_temperatures,
+    doubt_unit,
     look_at_responses,
+    look_at_temperatures,
     put_stuck_aside,
 )
 from skthermo.preprocessing.checks._record_findings import (
@@ -40,42 +39,35 @@ def examine(
     statistics of both make sense."""
     if not isinstance(unit, str):
         raise ValueError(f"unit is {unit!r:.100}; expected a text such as 'Hz', or ''")
-    readings, tables, findings, indexes = [], [], [], []
-    for table, what, beside in (
-        (temperatures, "temperatures", frequencies),
-        (frequencies, "frequencies", temperatures),
-    ):
-        if table is not None:
-            readings.append(Reading(table, what, unit, beside))
-    for reading in readings:
-        if reading.values.size:
-            tables.append(reading)
-            if reading.is_frame and not any(map(reading.given_index.equals, indexes)):
-                indexes.append(reading.given_index)
-                findings += times_found(reading.given_index)
-    is_pair = len(tables) == 2
-    findings = (rows_found(tables) if tables else []) + findings
-    copies = copies_found(tables)
+    pairs = (temperatures, "temperatures", frequencies), (frequencies, "frequencies", temperatures)
+    readings = [Reading(table, what, unit, beside) for table, what, beside in pairs if table is not None]
+    tables = [reading for reading in readings if reading.values.size]
+    findings = rows_found(tables) if tables else []
+    for number, reading in enumerate(tables):
+        if reading.is_frame and not (
+            number and tables[0].is_frame and reading.given_index.equals(tables[0].given_index)
+        ):
+            findings += times_found(reading.given_index)
+    is_pair, copies = len(tables) == 2, copies_found(tables)
     if is_pair and unit == "Hz" and not copies and looks_exchanged(*(reading.values for reading in tables)):
         detail = "the temperatures vary less, relative to their median, than the frequencies do"
-        index, everywhere = tables[0].index, np.arange(len(tables[0].values))
-        copies = [RecordFinding.in_rows(index, "exchanged-tables", "", everywhere, detail, meaningless=True)]
-    if "exchanged-tables" in map(itemgetter(0), copies):
+        copies = [RecordFinding.in_rows(tables[0].index, "exchanged-tables", "", None, detail, meaningless=True)]
+    if any(one.what == "exchanged-tables" for one in copies):
         return readings, [*findings, *copies], False
     for reading in tables:
         if len(reading.values) < 2:
             continue
-        if reading.what == "temperatures":
-            look_at_inputs(reading)
+        if reading.what == "temperatures":  # inputs that are none are like responses of any unit
+            are_thermal = are_temperatures(reading)
+            look_at_temperatures(reading, np.flatnonzero(are_thermal))
+            others = np.flatnonzero(~are_thermal)
+            look_at_responses(reading, in_hertz=False, beside_weather=True, places=others)
         else:
             look_at_responses(reading, in_hertz=unit == "Hz", beside_weather=is_pair)
-            if model is not None and unit == "Hz":
-                check_model(model)
-                compare_with_model(reading, model)
-            elif unit == "Hz":
-                doubt_size(reading)
+            if unit == "Hz":
+                doubt_unit(reading, model)
         put_stuck_aside(reading)
-    return readings, [*findings, *copies], is_pair and "different-rows" not in map(itemgetter(0), findings)
+    return readings, [*findings, *copies], is_pair and all(one.what != "different-rows" for one in findings)
 
 
 def check_records(
@@ -148,10 +140,8 @@ def check_records(
             if belong_together:
                 has_wrong_times = any(one.what == "wrong-stamps" and one.is_meaningless for one in findings)
                 far |= look_at_both(*readings, has_wrong_times=has_wrong_times)
-            index = reading.given_index if reading.is_frame else None
-            outliers = pd.DataFrame(
-                far[np.argsort(reading.order)], index, pd.Index(reading.columns, tupleize_cols=False)
-            )
+            columns = pd.Index(reading.columns, tupleize_cols=False)
+            outliers = pd.DataFrame(far[np.argsort(reading.order)], reading.given_index, columns)
         findings += reading.findings
     return RecordFindings(findings_table(findings), n_rows, outliers, **tables, left_out=left_out)
 
@@ -235,84 +225,81 @@ def set_aside(
     readings, findings, _ = examine(temperatures, frequencies, unit, model)
     reasons = (ASIDE_REASONS if is_baseline else {"placeholders"}).difference(exclude)
     needs_change = "useless-column" not in exclude
-    needs = {"needs_change": needs_change, "needs_values": needs_change or is_baseline}
-    tables, left_out = dict[str, Any](), dict[Hashable, str]()
-    n_rows = max((len(reading.values) for reading in readings), default=0)
     table = findings_table([*findings, *(one for reading in readings for one in reading.findings)])
     what, is_meaningless = table["what"], table["severity"] == "meaningless"
     is_useless = is_meaningless & (what == "useless-column")
     is_harmless = what.isin(ASIDE_REASONS) | (is_meaningless & what.isin(list(exclude)))
+    n_rows = max((len(reading.values) for reading in readings), default=0)
     others = RecordFindings(table[~(is_harmless if needs_all else is_harmless | is_useless)], n_rows)
     others.refuse_meaningless()
+    tables, left_out = dict[str, Any](), dict[Hashable, str]()
     for reading in readings:
         reading.use(ASIDE_REASONS - reasons)
-        tables[reading.what], useless = reading.cleaned(**needs)
+        options = {"needs_change": needs_change, "needs_values": needs_change or is_baseline}
+        tables[reading.what], useless = reading.cleaned(**options)
         left_out |= useless
         if reading.columns and set(reading.columns) == set(useless):
             raise ValueError(
                 f"no column of the {reading.what} can be used: {'; '.join(useless.values())}; expected measurements"
             )
-    RecordFindings(table[:0], n_rows, left_out=left_out).refuse_meaningless(needs_all=needs_all)
-    aside = table[is_useless | what.isin(reasons)]
-    found = RecordFindings(aside, n_rows, **tables, left_out=left_out)
+    found = RecordFindings(table[is_useless | what.isin(reasons)], n_rows, **tables, left_out=left_out)
+    found.refuse_meaningless(exclude={"useless-column"}, needs_all=needs_all)
     warn_each(found.warnings())
     return found, list(others.warnings())
 
 
 def times_found(index: pd.Index) -> list[RecordFinding]:
     """What is wrong with the times of rows."""
-    n_rows, everywhere = len(index), np.arange(len(index))
+
+    def found(rows: NDArray | None, detail: str, **options: bool) -> RecordFinding:
+        return RecordFinding.in_rows(index, "wrong-stamps", "", rows, detail, **options)
+
+    n_rows = len(index)
     if not isinstance(index, pd.DatetimeIndex):
-        return labels_found(index)
-    missing = np.flatnonzero(index.isna())
-    if len(missing):
+        detail = labels_found(index)
+        return [found(None, detail, period=False)] if detail else []
+    if index.hasnans:
+        missing = np.flatnonzero(index.isna())
         detail = f"{len(missing)} of {n_rows} rows have no time, the first row {missing[0]}"
-        return [RecordFinding.in_rows(index, "wrong-stamps", "", missing, detail, period=False, meaningless=True)]
+        return [found(missing, detail, period=False, meaningless=True)]
     try:
         stamps = index.as_unit("ns").asi8
     except ValueError:
-        detail = "beyond the years from 1678 to 2262, which nanoseconds reach"
-        return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail, meaningless=True)]
-    steps, detail = np.diff(stamps), ""
-    is_early = n_rows > 1 and 0 <= stamps.max() < pd.Timestamp("1970-03-01").value
+        return [found(None, "beyond the years from 1678 to 2262, which nanoseconds reach", meaningless=True)]
+    steps = np.diff(stamps)
     if n_rows > 1 and not steps.any():
-        detail = f"all {n_rows} rows have one time"
-    elif is_early and np.median(np.abs(steps)) < pd.Timedelta("1min").value:
+        return [found(None, f"all {n_rows} rows have one time", meaningless=True)]
+    is_early = n_rows > 1 and 0 <= stamps.max() < pd.Timestamp("1970-03-01").value
+    if is_early and np.median(np.abs(steps)) < pd.Timedelta("1min").value:
         detail = f"{n_rows} rows are at the beginning of 1970, as numbers are that count nanoseconds"
-    if detail:
-        return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail, meaningless=True)]
-    found, again, late = [], np.flatnonzero(index.duplicated()), 1 + np.flatnonzero(steps < 0)
+        return [found(None, detail, meaningless=True)]
+    findings, again, late = [], np.flatnonzero(index.duplicated()), 1 + np.flatnonzero(steps < 0)
     if len(again):
         again = again[np.argsort(stamps[again], kind="stable")]
-        detail = f"{len(again)} of {n_rows} rows have the time of another"
-        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", again, detail))
-    if len(wrong := np.flatnonzero(of_a_wrong_clock(index))):
-        detail = f"{len(wrong)} of {n_rows} rows are stamped far from the others, and count as missing"
-        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", wrong, detail))
-    years = index.year[[0, n_rows // 2, -1]] if n_rows else []
-    if n_rows and (max(years) < 1990 or min(years) > 2069):
-        detail = f"all {n_rows} rows are of {years[0]}, as of a clock that was not set"
-        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail))
+        findings.append(found(again, f"{len(again)} of {n_rows} rows have the time of another"))
+    if (wrong := of_a_wrong_clock(index)).any():
+        detail = f"{wrong.sum()} of {n_rows} rows are stamped far from the others, and count as missing"
+        findings.append(found(wrong, detail))
+    years = index.year[[0, n_rows // 2, -1]] if n_rows else [2000]
+    if max(years) < 1990 or min(years) > 2069:
+        findings.append(found(None, f"all {n_rows} rows are of {years[0]}, as of a clock that was not set"))
     if len(late):
         detail = f"{len(late)} of {n_rows} rows are earlier than the row before, the first row {late[0]}"
-        detail = f"{detail} ({period_of(index, late[:1])})"
-        found.append(RecordFinding.in_rows(index, "wrong-stamps", "", late, detail, period=False))
-    return found
+        findings.append(found(late, f"{detail} ({period_of(index, late[:1])})", period=False))
+    return findings
 
 
-def labels_found(index: pd.Index) -> list[RecordFinding]:
-    """Labels that look like times although they are none."""
-    detail = ""
-    if len(index) > 1 and pd.api.types.is_integer_dtype(index.dtype) and not isinstance(index, pd.MultiIndex):
-        months = index.to_numpy() // 100 % 100
-        if 19500101 <= index.min() < index.max() <= 21001231 and ((months >= 1) & (months <= 12)).all():
-            detail = f"the index holds dates as integers, such as {index[0]}"
+def labels_found(index: pd.Index) -> str:
+    """What is wrong with labels that look like times although they are none; an empty text for others."""
     try:
         as_stamps(index)
     except Exception as error:  # labels of users may be anything
-        detail = f"{str(error).partition(';')[0].replace('X has', 'the index has').replace('of X ', ''):.150}"
-    everywhere = np.arange(len(index))
-    return [RecordFinding.in_rows(index, "wrong-stamps", "", everywhere, detail, period=False)] if detail else []
+        return f"{str(error).partition(';')[0].replace('X has', 'the index has').replace('of X ', ''):.150}"
+    if len(index) > 1 and pd.api.types.is_integer_dtype(index.dtype) and not isinstance(index, pd.MultiIndex):
+        months = index.to_numpy() // 100 % 100
+        if 19500101 <= index.min() < index.max() <= 21001231 and ((months >= 1) & (months <= 12)).all():
+            return f"the index holds dates as integers, such as {index[0]}"
+    return ""
 
 
 def rows_found(tables: list[Reading]) -> list[RecordFinding]:
@@ -328,8 +315,7 @@ def rows_found(tables: list[Reading]) -> list[RecordFinding]:
         detail = f"{detail}: {here[rows[0]]} and {there[rows[0]]}"
         found.append(RecordFinding.in_rows(here, "different-rows", "", rows, detail, period=False, meaningless=True))
     n_rows = min(len(here), len(there))
-    is_known = ~np.isnan(first.values[:n_rows]).all(axis=1) & ~np.isnan(last.values[:n_rows]).all(axis=1)
-    known = np.flatnonzero(is_known)
+    known = np.flatnonzero(np.all([~np.isnan(one.values[:n_rows]).all(axis=1) for one in (first, last)], axis=0))
     if len(known) < 50 and (len(known) or not n_findings):
         detail, is_error = f"{len(known)} of {n_rows} rows have values", len(known) < 2
         found.append(RecordFinding.in_rows(first.index, "few-records", "", known, detail, meaningless=is_error))
@@ -340,16 +326,13 @@ def copies_found(tables: list[Reading]) -> list[RecordFinding]:
     """Columns that vary and are copies of another one, in their table or in both."""
     found, seen = [], {}
     for table in tables:
-        everywhere = np.arange(len(table.values))
         for place in np.flatnonzero(np.fmax.reduce(table.values) > np.fmin.reduce(table.values)):
-            name, content = table.columns[place], table.values[:, place].tobytes()
-            owner, other = seen.setdefault(content, (table, place))
+            name = table.columns[place]
+            owner, other = seen.setdefault(table.values[:, place].tobytes(), (table, place))
+            what, detail = "useless-column", f"{name!r} equals {owner.columns[other]!r} in {len(table.values)} rows"
             if owner is not table:
-                detail = f"{owner.columns[other]!r} of the temperatures equals {name!r}"
-                found.append(
-                    RecordFinding.in_rows(table.index, "exchanged-tables", name, everywhere, detail, meaningless=True)
-                )
-            elif other != place:
-                detail = f"{name!r} equals {owner.columns[other]!r} in {len(everywhere)} rows"
-                found.append(RecordFinding.in_rows(table.index, "useless-column", name, everywhere, detail))
+                what, detail = "exchanged-tables", f"{owner.columns[other]!r} of the temperatures equals {name!r}"
+            if (owner, other) != (table, place):
+                is_error = owner is not table
+                found.append(RecordFinding.in_rows(table.index, what, name, None, detail, meaningless=is_error))
     return found

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from skthermo._core.arrays import HUGE, Array, as_floats, median, spread_evenly
+from skthermo._core.arrays import HUGE, Array, as_floats, check_model, median, spread_evenly
 from skthermo._core.frames import MISSING_CODES, columns_by_sensor, named_frame, of_a_wrong_clock
 from skthermo.preprocessing._quantities import OPEN, TEMPERATURE, kind_of
 from skthermo.preprocessing.checks._record_findings import ASIDE_REASONS, RecordFinding
@@ -65,28 +65,22 @@ class Reading:
 
     def _read_frame(self, frame: pd.DataFrame) -> str:
         """Read a frame, NaN in columns that hold no numbers, and look at its names."""
-        names, everywhere = frame.columns, np.ones(len(frame), dtype=bool)
-        self.columns = list(names)
-        try:
-            self.values = np.array(as_floats(frame))
-        except Exception:  # some column is no numbers: the others may be
-            self.values = np.full(frame.shape, np.nan)
-            for place, name in enumerate(names):
-                try:
-                    self.values[:, place] = np.ravel(as_floats(frame.iloc[:, [place]]))
-                except Exception as error:  # objects of users may raise anything
-                    detail = f"{str(error).partition(';')[0]:.150}"
-                    self.found("no-table", name, everywhere, detail, period=False, meaningless=True)
+        names = frame.columns
+        self.columns, self.values = list(names), np.full(frame.shape, np.nan)
+        for place, name in enumerate(names):
+            try:
+                self.values[:, place] = np.ravel(as_floats(frame.iloc[:, [place]]))
+            except Exception as error:  # objects of users may raise anything
+                detail = f"{str(error).partition(';')[0]:.150}"
+                self.found("no-table", name, None, detail, period=False, meaningless=True)
         kinds = set(map(type, names))
-        if tuple in kinds or isinstance(names, pd.MultiIndex):
-            detail = f"the {self.what} have tuples such as {names[0]!r}"
-            self.found("no-table", "", everywhere, detail, period=False, meaningless=True)
+        problems = [("", f"the {self.what} have tuples such as {names[0]!r}")] if tuple in kinds else []
         if str in kinds and len(kinds) > 1:
-            detail = "some names of columns are text, others are not"
-            self.found("no-table", "", everywhere, detail, period=False, meaningless=True)
+            problems.append(("", "some names of columns are text, others are not"))
         for name in names[names.duplicated()].unique():
-            detail = f"{name!r} is the name of {np.sum(names == name)} columns"
-            self.found("no-table", name, everywhere, detail, period=False, meaningless=True)
+            problems.append((name, f"{name!r} is the name of {np.sum(names == name)} columns"))
+        for name, detail in problems:
+            self.found("no-table", name, None, detail, period=False, meaningless=True)
         return ""
 
     def _read_array(self, table: Any) -> str:
@@ -105,9 +99,9 @@ class Reading:
             return ""
         return f"are a {kind} of shape {values.shape}"
 
-    def found(self, what: str, column: Hashable, rows: NDArray[np.bool_], detail: str, **options: bool) -> None:
-        """Add a finding in the rows of a mask, with options of `RecordFinding.in_rows`."""
-        self.findings.append(RecordFinding.in_rows(self.index, what, column, np.flatnonzero(rows), detail, **options))
+    def found(self, what: str, column: Hashable, rows: NDArray | None, detail: str, **options: bool) -> None:
+        """Add a finding in some rows, with options of `RecordFinding.in_rows`."""
+        self.findings.append(RecordFinding.in_rows(self.index, what, column, rows, detail, **options))
 
     def found_in(
         self, what: str, place: int, detail: str, rows: NDArray[np.bool_] | None = None, *, meaningless: bool = False
@@ -149,18 +143,14 @@ class Reading:
         n_left = np.count_nonzero(~np.isnan(self.values), axis=0)
         reasons: dict[Hashable, str] = {}
         for place, name in enumerate(self.columns):
-            aside, useless, n_elsewhere = [], [], 0
-            is_needed = needs_change if n_known[place] else needs_values
-            for found in self.findings:
-                if found.column == name and found.what in ASIDE_REASONS:
-                    aside.append(found.detail)
-                    n_elsewhere += found.n_rows if found.what == "another-level" else 0
-                elif found.column == name and found.is_useless_column and is_needed:
-                    useless.append(found.detail)
+            own = [found for found in self.findings if found.column == name]
+            aside = [found for found in own if found.what in ASIDE_REASONS]
+            useless = [found.detail for found in own if found.is_useless_column]
+            n_elsewhere = sum(found.n_rows for found in aside if found.what == "another-level")
             # of two levels, it is not certain which one is right
             if n_left[place] < 0.5 * n_known[place] or n_elsewhere > 0.2 * n_known[place]:
-                reasons[name] = "; ".join(aside)
-            elif useless:
+                reasons[name] = "; ".join(found.detail for found in aside)
+            elif useless and (needs_change if n_known[place] else needs_values):
                 reasons[name] = useless[0]
         values = np.empty_like(self.values)
         values[self.order] = self.values
@@ -182,13 +172,6 @@ def are_temperatures(T: Reading) -> NDArray[np.bool_]:
             could_be = [((known > COLDEST + zero) & (known < HOTTEST + zero)).mean() for zero in (0.0, 273.15)]
             found[place] = kind == OPEN and max(could_be) > 0.8 and not np.isin(known, (0.0, 1.0)).all()
     return found
-
-
-def look_at_inputs(T: Reading) -> None:
-    """Look at temperatures as such, and at other inputs as at responses of any unit."""
-    are_thermal = are_temperatures(T)
-    look_at_temperatures(T, np.flatnonzero(are_thermal))
-    look_at_responses(T, in_hertz=False, beside_weather=True, places=np.flatnonzero(~are_thermal))
 
 
 def look_at_temperatures(T: Reading, thermal: NDArray[np.intp]) -> None:
@@ -258,14 +241,9 @@ def marker_levels(known: Array, jump: float, coldest: float = -np.inf, hottest: 
     for number in (1, 2, 3) if len(levels) > 8 else ():
         marked[:number] |= (gaps[number - 1] > jump) & (counts[:number] > 1).all()
         marked[-number:] |= (gaps[-number] > jump) & (counts[-number:] > 1).all()
-    above, below = (
-        np.flatnonzero((gaps > 50) & (levels[1:] > hottest)),
-        np.flatnonzero((gaps > 50) & (levels[:-1] < coldest)),
-    )
-    if above.size:
-        marked[above[0] + 1 :] = True
-    if below.size:
-        marked[: below[-1] + 1] = True
+    is_far = gaps > 50
+    marked[1:] |= np.logical_or.accumulate(is_far & (levels[1:] > hottest))
+    marked[:-1] |= np.logical_or.accumulate((is_far & (levels[:-1] < coldest))[::-1])[::-1]
     return levels[marked]
 
 
@@ -296,8 +274,8 @@ def has_levels(table: Reading, place: int, known: Array) -> bool:
     is_coarse = len(levels) <= 4 and n_known >= 50
     is_flag = np.array_equal(levels, [0.0, 1.0])  # of frost, or of a closed lane
     if not n_known and not any(found.column == name for found in table.findings):
-        rows = np.ones(len(table.values), dtype=bool)
-        table.found("useless-column", name, rows, f"{name!r} is NaN in all {len(rows)} rows", meaningless=True)
+        detail = f"{name!r} is NaN in all {len(table.values)} rows"
+        table.found("useless-column", name, None, detail, meaningless=True)
     elif len(levels) == 1 < n_known:
         table.found_in("useless-column", place, f"is {levels[0]:.6g}{table.unit}, constant,", meaningless=True)
     elif n_known and is_coarse and not is_flag:
@@ -395,44 +373,41 @@ def is_outstanding(levels: Array, lengths: NDArray[np.intp], run: np.intp) -> bo
     return bool(n_values * (share / n_values) ** (length - 1) <= 0.01)
 
 
-def compare_with_model(F: Reading, model: Any) -> None:
-    """Name frequencies in another unit than a model's nominal ones, and frequencies of another mode."""
+def doubt_unit(F: Reading, model: Any) -> None:
+    """Name frequencies in another unit than a model's nominal ones, and frequencies of another mode; without a model
+    those of which all are above 1000 Hz."""
+    middles = median(F.values)
+    if model is None:
+        if np.nanmin(middles, initial=np.inf) > 1000 and not np.isnan(middles).all():
+            detail = f"the medians {texts_of(middles)} Hz are about those of structures in mHz; {len(F.values)} rows"
+            F.found("wrong-unit", "", None, detail)
+        return
+    check_model(model)
     nominal = np.ravel(model.frequencies(np.ones((1, len(model.parameter_names)))))
-    everywhere = np.ones(len(F.values), dtype=bool)
     if len(nominal) != len(F.columns):
         detail = f"{len(F.columns)} columns for {len(nominal)} modes of the model"
-        F.found("mode-order", "", everywhere, detail, meaningless=True)
+        F.found("mode-order", "", None, detail, meaningless=True)
         return
-    middles = median(F.values)
-    units = {"rad/s": 2 * np.pi, "kHz": 1e-3, "mHz": 1e3, "cycles per minute": 60.0}  # how many of them are 1 Hz
     of_model = "Hz of a model with mass or stiffness in another unit, such as kg for t (1000 moves modes by 31.6)"
-    scales = [*units.values(), np.sqrt(1000.0), np.sqrt(1e-3)]
+    units = {"Hz": 1.0, "rad/s": 2 * np.pi, "kHz": 1e-3, "mHz": 1e3, "cycles per minute": 60.0}  # how many are 1 Hz
+    names = [*units, of_model, of_model, "seconds, the periods"]
     with np.errstate(divide="ignore", invalid="ignore"):
-        expected = np.array([nominal, *np.outer(scales, nominal), 1 / nominal])
+        expected = [*np.outer([*units.values(), np.sqrt(1000.0), np.sqrt(1e-3)], nominal), 1 / nominal]
         off = np.abs(np.log(middles / expected))
     if np.isnan(off[0]).all():
         return
-    names = ["Hz", *units, of_model, of_model, "seconds, the periods"]
     typical = np.nanmedian(off, axis=1)
     best = 1 + int(np.argmin(typical[1:]))
     if typical[best] < 0.2 and typical[0] > 0.5:
         detail = f"the medians {texts_of(middles)} beside {texts_of(nominal)} Hz of the model are about those in"
-        detail = f"{detail} {names[best]}; {len(everywhere)} rows"
-        F.found("wrong-unit", "", everywhere, detail, meaningless=names[best] != of_model)
+        detail = f"{detail} {names[best]}; {len(F.values)} rows"
+        F.found("wrong-unit", "", None, detail, meaningless=names[best] != of_model)
         return
     for place in np.flatnonzero(off[0] > 0.5):
         fits = np.flatnonzero(off[1:, place] < 0.2)
         hint = f", as in {names[1 + fits[0]]}," if len(fits) else ""
         detail = f"has the median {middles[place]:.4g}, the model {nominal[place]:.4g} Hz{hint}"
         F.found_in("wrong-unit", place, detail)
-
-
-def doubt_size(F: Reading) -> None:
-    """Name frequencies of which all are above 1000 Hz, where no model tells whether they are in mHz."""
-    middles = median(F.values)
-    if middles.size and np.nanmin(middles, initial=np.inf) > 1000 and not np.isnan(middles).all():
-        detail = f"the medians {texts_of(middles)} Hz are about those of structures in mHz; {len(F.values)} rows"
-        F.found("wrong-unit", "", np.ones(len(F.values), dtype=bool), detail)
 
 
 @dataclass(frozen=True)

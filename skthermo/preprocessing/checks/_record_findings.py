@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import time
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
@@ -61,13 +62,14 @@ class RecordFinding(NamedTuple):
         index: pd.Index,
         what: str,
         column: Hashable,
-        rows: NDArray,
+        rows: NDArray | None,
         detail: str,
         *,
         period: bool = True,
         meaningless: bool = False,
     ) -> RecordFinding:
-        """A finding in some rows of an index, which the detail ends with."""
+        """A finding in some rows of an index, a mask or positions, by default in all; the detail ends with them."""
+        rows = np.arange(len(index)) if rows is None else np.flatnonzero(rows) if rows.dtype == bool else rows
         if not len(rows):
             return cls(what, column, 0, None, None, detail, meaningless)
         where = f", {period_of(index, rows)}" if period else ""
@@ -178,31 +180,19 @@ class RecordFindings(SavesFrames):
         RecordsWarning
             Of kind "set-aside", or the kind of the finding. A small number of records gives none.
         """
-        what, found = self.table["what"], []
-        is_aside = what.isin(ASIDE_REASONS)
-        aside = is_aside & ~what.isin(list(exclude)) & ~self.table["column"].isin([*self.left_out])
-        if aside.any():
-            n_values, details = self.table["n_rows"][aside].sum(), listed_details(self.table["detail"][aside])
-            count = f"{n_values:,} values cannot be measurements, and count"
-            found.append(
-                RecordsWarning(
-                    f"{'1 value cannot be a measurement, and counts' if n_values == 1 else count} as missing: "
-                    f"{details}. Repair these sensors, or put NaN there",
-                    "set-aside",
-                )
-            )
+        kinds, details = (
+            self.table["what"].mask(self.table["what"].isin(ASIDE_REASONS), "set-aside"),
+            self.table["detail"],
+        )
+        is_of_columns = (kinds == "set-aside") & self.table["column"].isin([*self.left_out])
+        is_of_columns |= (kinds == "useless-column") & (self.table["severity"] == "meaningless")
+        found = []
+        others = ~is_of_columns & ~self.table["what"].isin(["few-records", *exclude])
+        for kind, listed in details[others].groupby(kinds[others], sort=False):
+            found.append(RecordsWarning(WARNINGS[kind].format(listed_details(listed)), kind))
         if self.left_out:
-            found.append(
-                RecordsWarning(
-                    "columns are left out, and nothing is said of them: "
-                    f"{'; '.join(self.left_out.values())}. Repair these sensors, or drop the columns",
-                    "useless-column",
-                )
-            )
-        is_useless = (what == "useless-column") & (self.table["severity"] == "meaningless")
-        others = self.table[~is_aside & ~is_useless & ~what.isin(["few-records", *exclude])]
-        for kind, rows in others.groupby("what", sort=False):
-            found.append(RecordsWarning(WARNINGS[kind].format(listed_details(rows["detail"])), kind))
+            text = f"columns are left out, and nothing is said of them: {'; '.join(self.left_out.values())}"
+            found.append(RecordsWarning(f"{text}. Repair these sensors, or drop the columns", "useless-column"))
         yield from one_of_each_kind(found)
 
     def refuse_meaningless(self, *, exclude: Collection[str] = (), needs_all: bool = False) -> None:

@@ -6,6 +6,7 @@ import codecs
 import csv
 import re
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import product
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import pandas as pd
 
+import skthermo.preprocessing.loggers.stamps as clocks
 from skthermo._core.arrays import Array
 from skthermo._core.estimators import import_optional
 from skthermo._core.frames import MISSING_CODES
@@ -23,29 +25,11 @@ from skthermo._core.text import counted
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing._quantities import Unit, unit_called, unit_in
-from skthermo.preprocessing.loggers.stamps import (
-    EPOCHS,
-    EXCEL,
-    EXCEL_1904,
-    ISO,
-    MOST_LOOKED_AT,
-    MOSTLY,
-    UNIX,
-    UNIX_MS,
-    WITH_OFFSET,
-    ZONE_OPTIONS,
-    by_local_clock,
-    find_stamps,
-    of_the_right_clock,
-    otherwise_written,
-    parsed_or_iso,
-    stamp_text,
-    times_in,
-)
 
 PARQUET, WORKBOOKS = (".parquet", ".pq"), (".xlsx", ".xlsm")
 NO_TEXT_FILES = (*PARQUET, *WORKBOOKS)
 DECIMAL_SIGNS = (".", ",")
+SEPARATORS = (";", "\t", "|", ",", " ")  # a comma late, as it may be a decimal sign
 
 Line: TypeAlias = tuple[int, list[str]]
 """The number of a line, and its cells."""
@@ -87,7 +71,7 @@ class CsvFormat:
     names_line: int = 1
     values_line: int | None = None
     stamp_columns: Sequence[str] = ()
-    stamps: str = ISO
+    stamps: str = clocks.ISO
     time_zone: str | None = None
     missing: Sequence[float] = ()
 
@@ -148,7 +132,7 @@ class Block(NamedTuple):
     where: str
     rows: list[Line]
     is_finished: bool = True
-    serial: str = EXCEL
+    serial: str = clocks.EXCEL
     is_sheet: bool = False
     names_line: int | None = None
 
@@ -194,24 +178,23 @@ def _part(section: Section, block: Block, form: CsvFormat, ignore: Collection[st
     names, where = section.names, block.where
     stamp_columns = list(form.stamp_columns) or names[:1]
     wanted = [name for name in names if name not in stamp_columns and name not in ignore]
-    if len(names) < 2 or any(names.count(name) != 1 for name in [*wanted, *stamp_columns]):
-        raise ValueError(
-            f"{where}, line {section.line}: names {names}; expected stamps and columns, each once, with "
-            f"{form.separator!r} between"
-        )
-    records = _records(section, where)
+    width = len(names)
+    if width < 2 or any(names.count(name) != 1 for name in [*wanted, *stamp_columns]):
+        expected = f"stamps and columns, each once, with {form.separator!r} between"
+        raise ValueError(f"{where}, line {section.line}: names {names}; expected {expected}")
+    records = [(line, without_margin(row, width)) for line, row in section.records]
+    records = [(line, row) for line, row in records if len(row) == width or not row[0].startswith("#")]  # no comments
+    for line, row in records:
+        if len(row) != width:
+            raise ValueError(f"{where}, line {line}: values: {len(row)}; expected {width} as named above")
+        if "\n" in "".join(row):
+            raise ValueError(f"{where}, line {line}: quotes hold several lines; expected quotes that close in theirs")
     lines = [line for line, _ in records]
     cells = dict(zip(names, zip(*(row for _, row in records), strict=True), strict=True)) if records else {}
     texts = [" ".join(parts) for parts in zip(*(cells.get(name, ()) for name in stamp_columns), strict=True)]
     values = {name: _numbers(cells.get(name, ()), form.decimal, f"column {name!r}", where, lines) for name in wanted}
     table = pd.DataFrame(values, _times(texts, form, block, lines), dtype=float)
-    again = table.index.duplicated()
-    if again.any() and (is_other := again & ~table.reset_index().duplicated().to_numpy()).any():
-        place = int(np.argmax(is_other))
-        raise ValueError(
-            f"{where}, line {lines[place]}: {table.index[place]} comes again with other values; expected each once. "
-            f"If the clocks go back then, {ZONE_OPTIONS}"
-        )
+    once(table, f"{where}: ")
     return table
 
 
@@ -225,32 +208,43 @@ def _one_table(parts: list[pd.DataFrame], file: Path, findings: list[RecordsWarn
     tables = [group[0] if len(group) == 1 else pd.concat(group) for group in groups]
     if len(tables) < 2:
         return tables[0]
-    tables = [once(table) for table in tables]
-    whole = pd.concat(tables, axis=1, join="inner")
-    n_stamps = len(pd.concat(table.iloc[:, :0] for table in tables).index.unique())
+    whole, others = side_by_side(tables)
     if not len(whole):
         raise ValueError(f"{file}: the sheets or parts have no stamp in common; expected records of the same times")
-    if n_stamps > len(whole):
-        text = (
-            f"{counted(n_stamps - len(whole), 'stamp')} are not in all sheets or parts of {file}. They are left out; "
-            f"{len(whole)} records have all columns. If they are many, compare the loggers' clocks"
-        )
-        findings.append(RecordsWarning(text, "different-rows"))
+    if len(others):
+        findings.append(lonely_stamps(others, f"sheets or parts of {file}", whole))
     return whole
 
 
-def once(table: pd.DataFrame) -> pd.DataFrame:
+def lonely_stamps(stamps: pd.DatetimeIndex, where: str, whole: pd.DataFrame) -> RecordsWarning:
+    """The finding of stamps that are left out, as they are not everywhere."""
+    text = (
+        f"{counted(len(stamps), 'stamp')} are not in all {where}, the first {stamps.min()}. They are left out; "
+        f"{len(whole)} records have all columns. If they are many, compare the loggers' clocks"
+    )
+    return RecordsWarning(text, "different-rows")
+
+
+def side_by_side(tables: Sequence[pd.DataFrame]) -> tuple[pd.DataFrame, pd.DatetimeIndex]:
+    """Records with the columns of all tables, by their stamps, and the stamps that are not in all."""
+    tables = [once(table) for table in tables]
+    whole, every = pd.concat(tables, axis=1, join="inner"), tables[0].index
+    for table in tables[1:]:
+        every = every.union(table.index)
+    return whole, every.difference(whole.index)
+
+
+def once(table: pd.DataFrame, where: str = "") -> pd.DataFrame:
     """Records that come twice with the same values, up to the last bits, are one; others are an error."""
     again = table.index.duplicated()
     if not again.any():
         return table
-    first = table[~again]
-    known = first.loc[table.index[again]].to_numpy()
-    again[again] = ~np.isclose(table[again].to_numpy(), known, rtol=1e-9, atol=0.0, equal_nan=True).all(axis=1)
-    if again.any():
+    first, more = table[~again], table[again]
+    is_other = ~np.isclose(more, first.loc[more.index], rtol=1e-9, atol=0.0, equal_nan=True).all(axis=1)
+    if is_other.any():
         raise ValueError(
-            f"{counted(again.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
-            f"{table.index[again][0]}; expected each once. If the clocks go back then, {ZONE_OPTIONS}"
+            f"{where}{counted(is_other.sum(), 'stamp')} of {list(table)} come twice with other values, the first "
+            f"{more.index[is_other][0]}; expected each once. If the clocks go back then, {clocks.ZONE_OPTIONS}"
         )
     return first
 
@@ -298,7 +292,7 @@ def _n_above_records(below: list[Line], places: list[int], form: CsvFormat, leas
     for count, (line, row) in enumerate(below):
         is_record = any(_is_number(cell, form.decimal) for cell in row) if least is None else line >= least
         has_places = len(row) > max(places, default=0)
-        if is_record or (has_places and parsed_or_iso([stamp_text(row, places)], form.stamps).notna()[0]):
+        if is_record or (has_places and clocks.parsed_or_iso([clocks.stamp_text(row, places)], form.stamps).notna()[0]):
             return count
     return len(below)
 
@@ -308,26 +302,13 @@ def _is_title(row: list[str], width: int, titles: set[str]) -> bool:
     return row[0] in titles or (len(row) != width and row[0][:1].isalpha())
 
 
-def _records(section: Section, where: str) -> list[Line]:
-    """Lines with as many values as there are names, without comments."""
-    width = len(section.names)
-    records = [(line, without_margin(row, width)) for line, row in section.records]
-    records = [(line, row) for line, row in records if len(row) == width or not row[0].startswith("#")]
-    for line, row in records:
-        if len(row) != width:
-            raise ValueError(f"{where}, line {line}: values: {len(row)}; expected {width} as named above")
-        if "\n" in "".join(row):
-            raise ValueError(f"{where}, line {line}: quotes hold several lines; expected quotes that close in theirs")
-    return records
-
-
 def blocks_in(file: Path, form: CsvFormat) -> list[Block]:
     """Cells of each line that is not empty, with the number of the line: of a text, or of each sheet."""
     if file.suffix.lower() in WORKBOOKS:
         sheets, serial = sheets_of(file)
-        names = {name: f"{file}, sheet {name!r}" if len(sheets) > 1 else str(file) for name in sheets}
         rows = {name: _rows_of_cells(cells, form.decimal) for name, cells in sheets.items()}
-        return [Block(names[name], rows[name], serial=serial, is_sheet=True) for name in sheets]
+        names = [f"{file}, sheet {name!r}" for name in sheets] if len(sheets) > 1 else [str(file)]
+        return [Block(*one, serial=serial, is_sheet=True) for one in zip(names, rows.values(), strict=True)]
     text = text_of(file, form.encoding)
     try:
         rows = rows_of(text, form.separator)
@@ -345,10 +326,12 @@ def blocks_of_records(file: Path, form: CsvFormat) -> tuple[list[Block], list[Re
         return blocks, []
     longest = max(blocks, key=lambda block: len(block.rows))
     names = next((row for line, row in longest.rows if line >= form.names_line), [])
-    lines = {block.where: _line_of_names(block, form, names) for block in blocks if block is not longest}
-    found = [block._replace(names_line=lines.get(block.where)) for block in blocks if lines.get(block.where, 1)]
-    read = [block.where.rpartition("sheet ")[2] for block in found]
-    others = [block.where.rpartition("sheet ")[2] for block in blocks if not lines.get(block.where, 1)]
+    found, read, others = [], [], []
+    for block in blocks:
+        line = None if block is longest else _line_of_names(block, form, names)
+        is_read = block is longest or line is not None
+        found += [block._replace(names_line=line)] if is_read else []
+        (read if is_read else others).append(block.where.rpartition("sheet ")[2])
     text = f"sheets of {file.name} that are read: {', '.join(read)}"
     if others:
         text += f"; not {', '.join(others)}, without stamps as on the longest"
@@ -361,7 +344,7 @@ def _line_of_names(block: Block, form: CsvFormat, names: Sequence[str]) -> int |
     stamps = list(form.stamp_columns) or names[:1]
     if named := [line for line, row in block.rows if stamps != [""] and all(name in row for name in stamps)]:
         return named[0]
-    is_stamp = parsed_or_iso([row[0] for _, row in block.rows], form.stamps).notna()
+    is_stamp = clocks.parsed_or_iso([row[0] for _, row in block.rows], form.stamps).notna()
     first = int(is_stamp.argmax()) if len(is_stamp) else 0
     if form.stamp_columns or not first or 2 * is_stamp.sum() < len(is_stamp):
         return None
@@ -377,13 +360,11 @@ def sheets_of(file: Path) -> tuple[dict[str, Any], str]:
                 name: pd.read_excel(book, sheet_name=name, header=None, dtype=object, na_filter=False).to_numpy()
                 for name in book.sheet_names
             }
-            serial = EXCEL_1904 if book.book.epoch.year == 1904 else EXCEL
+            serial = clocks.EXCEL_1904 if book.book.epoch.year == 1904 else clocks.EXCEL
     except OSError:
         raise
-    except ImportError as error:  # as of any other file that cannot be read: it keeps no other out
-        raise ValueError(f"{file}: {error}") from error
-    except Exception as error:
-        raise ValueError(f"{file} is no Excel workbook: {error}; expected one, or a CSV file") from error
+    except Exception as error:  # of a workbook that is none, or without openpyxl
+        raise ValueError(f"{file} cannot be read: {error}; expected an Excel workbook, or a CSV file") from error
     return {name: cells for name, cells in sheets.items() if cells.size} or {"": np.empty((0, 0))}, serial
 
 
@@ -464,11 +445,9 @@ def number(text: str, decimal: str) -> float:
     """A number, NaN for a text that stands for none or for infinity. With another decimal sign, a point would stand for
     thousands; a single group of them, as in 1,234, might also be decimals, and is refused."""
     if "_" not in text and (decimal == "." or "." not in text):
-        try:
+        with suppress(ValueError):
             value = float(text.replace(decimal, "."))
             return value if isfinite(value) else np.nan
-        except ValueError:
-            pass
     signs = str.maketrans("\u2212\u2013", "--")  # a minus of typesetters, and a dash in its place
     if (plain := text.translate(signs)) != text:
         return number(plain, decimal)
@@ -485,32 +464,31 @@ def number(text: str, decimal: str) -> float:
 
 def _times(texts: Sequence[str], form: CsvFormat, block: Block, lines: Sequence[int]) -> pd.DatetimeIndex:
     """Texts as times: in the time zone of the records; without one, in UTC if they have offsets."""
-    has_offset = [WITH_OFFSET.search(text) is not None for text in texts]
+    has_offset = [clocks.WITH_OFFSET.search(text) is not None for text in texts]
     if 0 < sum(has_offset) < len(texts):
         place = has_offset.index(not has_offset[0])
         raise ValueError(
             f"{block.where}, line {lines[place]}: {texts[place]!r:.100}; {sum(has_offset)} of {len(texts)} stamps have "
             "an offset from UTC; expected all or none"
         )
-    stamps = block.serial if form.stamps in (EXCEL, EXCEL_1904) else form.stamps
-    index = parsed_or_iso(texts, stamps)
+    stamps = block.serial if form.stamps in (clocks.EXCEL, clocks.EXCEL_1904) else form.stamps
+    index = clocks.parsed_or_iso(texts, stamps)
     if block.is_sheet:
-        index = otherwise_written(texts, index, stamps, block.serial, block.where)
-    is_wrong = np.array(index.isna())
-    if is_wrong.any():
-        place = int(np.argmax(is_wrong))
-        stamp_texts = {
-            ISO: "one like 2026-01-31 13:00", UNIX: "seconds since 1970", UNIX_MS: "milliseconds since 1970",
-            EXCEL: "a serial date of Excel, such as 46053.5417",
-        }  # fmt: skip
+        index = clocks.otherwise_written(texts, index, stamps, block.serial, block.where)
+    if index.hasnans:
+        wrong = np.flatnonzero(index.isna())
+        expected = "one such as 2026-01-31 13:00" if form.stamps == clocks.ISO else f"one in the format {form.stamps}"
         raise ValueError(
-            f"{block.where}, line {lines[place]}: {texts[place]!r:.100} is no time; expected "
-            f"{stamp_texts.get(form.stamps, f'one like the format {form.stamps}')}; "
-            f"{is_wrong.sum()} of {len(texts)} stamps are wrong"
+            f"{block.where}, line {lines[wrong[0]]}: {texts[wrong[0]]!r:.100} is no time; expected {expected}; "
+            f"{len(wrong)} of {len(texts)} stamps are wrong"
         )
     if form.time_zone is None:
         return index
-    return index.tz_convert(form.time_zone) if index.tz else by_local_clock(index, form.time_zone, block.where, lines)
+    return (
+        index.tz_convert(form.time_zone)
+        if index.tz
+        else clocks.by_local_clock(index, form.time_zone, block.where, lines)
+    )
 
 
 @dataclass(frozen=True)
@@ -547,24 +525,22 @@ def look_at(file: Path, zone: str | None = None, stamps: str | None = None, want
     if marked:
         records, form = records.mask(records.isin(marked)), replace(form, missing=marked)
     units |= {name: unit for name in records if (unit := unit_in(name))}
-    records, aside = of_the_right_clock(records, file)
+    records, aside = clocks.of_the_right_clock(records, file)
     return FileLook(file, form, records, ignored, units, tuple(notes), (*findings, *aside))
 
 
 def _form_of(file: Path, zone: str | None, stamps: str | None) -> tuple[CsvFormat, list[str]]:
     """Form of a CSV file or workbook, and notes."""
-    if file.suffix.lower() in WORKBOOKS:
-        sheet = max(sheets_of(file)[0].values(), key=len)
-        separator, decimal = ",", _decimal_of(sheet)
-    else:
-        separator, decimal = _division(text_of(file), file)
+    separator, decimal = _division(file)
     block = max(blocks_in(file, CsvFormat(separator, decimal)), key=lambda block: len(block.rows))
-    width = used_width([row for _, row in block.rows], _usual_width([row for _, row in block.rows[:MOST_LOOKED_AT]]))
+    width = used_width(
+        [row for _, row in block.rows], _usual_width([row for _, row in block.rows[: clocks.MOST_LOOKED_AT]])
+    )
     rows = [(line, without_margin(row, width)) for line, row in block.rows]
     cells = [row for _, row in rows if len(row) == width]
-    places, stamps, notes = find_stamps(cells, file, stamps, block.serial)
-    looked = [row if len(row) > max(places) else [""] * (max(places) + 1) for _, row in rows[:MOST_LOOKED_AT]]
-    is_record = times_in(looked, places, stamps).notna()
+    places, stamps, notes = clocks.find_stamps(cells, file, stamps, block.serial)
+    looked = [row if len(row) > max(places) else [""] * (max(places) + 1) for _, row in rows[: clocks.MOST_LOOKED_AT]]
+    is_record = clocks.times_in(looked, places, stamps).notna()
     titles = [
         (place, [one for one in rows[:place] if len(one[1]) == len(rows[place][1]) and one[1][0] != "TOA5"])
         for place in np.flatnonzero(is_record)[:100]
@@ -581,7 +557,7 @@ def _form_of(file: Path, zone: str | None, stamps: str | None) -> tuple[CsvForma
     if lost:
         raise ValueError(f"{block.where}, line {rows[lost[0]][0]} has a stamp above the names; expected names above it")
     stamp_columns = [names_of(names)[place] for place in places]
-    has_offsets = WITH_OFFSET.search(stamp_text(rows[first][1], places)) is not None
+    has_offsets = clocks.WITH_OFFSET.search(clocks.stamp_text(rows[first][1], places)) is not None
     form = CsvFormat(
         separator,
         decimal,
@@ -589,7 +565,7 @@ def _form_of(file: Path, zone: str | None, stamps: str | None) -> tuple[CsvForma
         values_line=rows[first][0] if rows[first][0] != names_line + 1 else None,
         stamp_columns=() if stamp_columns == names_of(names)[:1] else stamp_columns,
         stamps=stamps,
-        time_zone="UTC" if zone is None and (has_offsets or stamps in EPOCHS) else zone,
+        time_zone="UTC" if zone is None and (has_offsets or stamps in clocks.EPOCHS) else zone,
     )
     return form, notes
 
@@ -607,11 +583,11 @@ def _units_and_texts(file: Path, form: CsvFormat, wanted: Collection[str]) -> tu
                     text = f"{name!r} is in {unit.name} and in {units[name].name}"
                     raise ValueError(f"{file}, line {section.line}: {text}; expected one unit of a column")
         stamps = list(form.stamp_columns) or section.names[:1]
-        for _, row in section.records[:MOST_LOOKED_AT]:
+        for _, row in section.records[: clocks.MOST_LOOKED_AT]:
             for name, cell in zip(section.names, row, strict=False):
                 if name not in stamps and (is_number := _is_number(cell, form.decimal)) is not None:
                     kinds.setdefault(name, []).append(is_number)
-    ignored = {name: "it holds text" for name, found in kinds.items() if sum(found) < MOSTLY * len(found)}
+    ignored = {name: "it holds text" for name, found in kinds.items() if sum(found) < clocks.MOSTLY * len(found)}
     shared = [section for section in sections if len(set(section.names) & set(sections[0].names)) > len(stamps)]
     if len(shared) == len(sections):
         n_records = sum(len(section.records) for section in sections)
@@ -622,34 +598,26 @@ def _units_and_texts(file: Path, form: CsvFormat, wanted: Collection[str]) -> tu
     return units, ignored
 
 
-def _decimal_of(sheet: Any) -> str:
-    """The decimal sign by which the most cells of a sheet are numbers."""
-
-    def n_numbers(decimal: str) -> int:
-        rows = _rows_of_cells(sheet[:MOST_LOOKED_AT], decimal)
-        return sum(_is_number(cell, decimal) is True for _, row in rows for cell in row)
-
-    return max(DECIMAL_SIGNS, key=n_numbers)
-
-
-def _division(text: str, file: Path) -> tuple[str, str]:
+def _division(file: Path) -> tuple[str, str]:
     """Separator and decimal sign by which lines of the usual number of columns have the most numbers."""
-    head, found = "\n".join(text.splitlines()[:MOST_LOOKED_AT]), []
-    separators = (";", "\t", "|", ",", " ")  # a comma late, as it may be a decimal sign
-    for rank, (separator, decimal) in enumerate(product(separators, DECIMAL_SIGNS)):
-        try:
-            rows = [row for _, row in rows_of(head, separator)]
-        except ValueError:
-            continue
-        if not rows or (separator == decimal and '"' not in head):
-            continue
-        width = _usual_width(rows)
-        numbers = [_is_number(cell, decimal) for row in rows if len(row) == width for cell in row[1:]]
-        share = numbers.count(True) / len(rows)
-        found.append((share / 1.5 if separator == " " else share, -rank, separator, decimal))  # dates have spaces, too
-    if not found or max(found)[0] == 0:
-        raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {separators} between")
-    return max(found)[2:]
+    if file.suffix.lower() in WORKBOOKS:
+        sheet = max(sheets_of(file)[0].values(), key=len)[: clocks.MOST_LOOKED_AT]
+        ways = {(",", decimal): _rows_of_cells(sheet, decimal) for decimal in DECIMAL_SIGNS}
+    else:
+        head, ways = "\n".join(text_of(file).splitlines()[: clocks.MOST_LOOKED_AT]), {}
+        for separator, decimal in product(SEPARATORS, DECIMAL_SIGNS):
+            with suppress(ValueError):
+                ways[separator, decimal] = rows_of(head, separator) if separator != decimal or '"' in head else []
+    shares = {("", ""): 0.0}
+    for (separator, decimal), lines in ways.items():
+        width = _usual_width([row for _, row in lines])
+        numbers = [_is_number(cell, decimal) for _, row in lines if len(row) == width for cell in row[1:]]
+        share = numbers.count(True) / max(len(lines), 1)
+        shares[separator, decimal] = share / 1.5 if separator == " " else share  # dates have spaces, too
+    best = max(shares, key=lambda way: shares[way])
+    if not shares[best]:
+        raise ValueError(f"{file}: no columns of numbers were found; expected values with one of {SEPARATORS} between")
+    return best
 
 
 def _usual_width(rows: Sequence[Sequence[str]]) -> int:

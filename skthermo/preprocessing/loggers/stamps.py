@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from skthermo._core.frames import DAY, YEAR, of_a_wrong_clock
 from skthermo._core.text import counted
@@ -70,16 +71,13 @@ def parsed(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
         return index if form in EPOCHS else index.round("s")  # a serial date is cut after some decimals
     found = [WITH_OFFSET.search(text) for text in texts]
     plain = [text[: one.start()] if one else text for text, one in zip(texts, found, strict=True)]
-    ends = [re.search(r"(?<=[ T])24(?=:00(:00([.,]0+)?)?$)", text) for text in plain]
-    plain = [
-        f"{text[: end.start()]}00{text[end.end() :]}" if end else text for text, end in zip(plain, ends, strict=True)
-    ]
-    times = _in_nanoseconds(plain, form)
+    begun = [re.sub(r"(?<=[ T])24(?=:00(:00([.,]0+)?)?$)", "00", text) for text in plain]
+    times = _in_nanoseconds(begun, form)
     if form == ISO:
-        times = times.where([re.match(r"\d{4}-\d\d-\d\d", text) is not None for text in plain])
+        times = times.where([re.match(r"\d{4}-\d\d-\d\d", text) is not None for text in begun])
     elif ":" in form and times.notna().any() and times.isna().any():
-        times = times.fillna(_in_nanoseconds(plain, form.partition(" ")[0]))
-    times += pd.to_timedelta([int(end is not None) for end in ends], unit="D")
+        times = times.fillna(_in_nanoseconds(begun, form.partition(" ")[0]))
+    times += pd.to_timedelta([int(here != there) for here, there in zip(plain, begun, strict=True)], unit="D")
     if any(found):
         times -= pd.to_timedelta([_minutes_ahead(one) for one in found], unit="min")
     index = pd.DatetimeIndex(times)
@@ -105,10 +103,7 @@ def parsed_or_iso(texts: Sequence[str], form: str) -> pd.DatetimeIndex:
     others = np.flatnonzero(index.isna())
     if form in (ISO, *NUMERIC_STAMPS) or not len(others):
         return index
-    times, iso = index.to_series(index=range(len(index))), parsed([texts[place] for place in others], ISO)
-    if iso.notna().any() and (iso.tz is None) == (index.tz is None):
-        times.iloc[others] = iso
-    return pd.DatetimeIndex(times)
+    return _completed(index, others, parsed([texts[place] for place in others], ISO))
 
 
 def otherwise_written(
@@ -120,12 +115,16 @@ def otherwise_written(
     rows = [[texts[place]] for place in others]
     for forms in (WRITTEN_STAMPS if form in (ISO, serial) else (), (serial,)) if rows else ():
         if fitting := _fitting(rows, (0,), forms):
-            times = index.to_series(index=range(len(index)))
-            found = times_in(rows, (0,), _certain(rows, (0,), fitting, where)[0])
-            if (found.tz is None) == (index.tz is None):
-                times.iloc[others] = found
-            return pd.DatetimeIndex(times)
+            return _completed(index, others, times_in(rows, (0,), _certain(rows, (0,), fitting, where)[0]))
     return index
+
+
+def _completed(index: pd.DatetimeIndex, places: NDArray[np.intp], found: pd.DatetimeIndex) -> pd.DatetimeIndex:
+    """Times with others in some places, if both have offsets from UTC or none has."""
+    times = index.to_series(index=range(len(index)))
+    if found.notna().any() and (found.tz is None) == (index.tz is None):
+        times.iloc[places] = found
+    return pd.DatetimeIndex(times)
 
 
 def by_local_clock(index: pd.DatetimeIndex, zone: str, where: str, lines: Sequence[int]) -> pd.DatetimeIndex:
@@ -158,27 +157,23 @@ def of_the_right_clock(records: pd.DataFrame, file: Path) -> tuple[pd.DataFrame,
     """Records without those that a wrong clock has stamped, and findings that name these, or a clock that was not
     set."""
     is_wrong = of_a_wrong_clock(records.index)
-    right, wrong, findings = records[~is_wrong], records.index[is_wrong], []
+    right, wrong, texts = records[~is_wrong], records.index[is_wrong], []
     if len(wrong):
-        text = (
+        texts.append(
             f"the stamps of {counted(len(wrong), 'record')} of {file.name} are far from the others, {wrong.min()} to "
             f"{wrong.max()}. They are set aside, as of a wrong clock. Correct their stamps if they count"
         )
-        findings.append(RecordsWarning(text, "wrong-stamps"))
     stamps = right.index.tz_localize(None).sort_values()
-    first, last, gaps = stamps.min(), stamps.max(), np.diff(stamps) / DAY
-    never_set = [pd.Timestamp("1980-01-06"), pd.Timestamp("2000-01-01")]
-    is_unset = (
-        first.year < 1990 or last > pd.Timestamp.now() + YEAR or any(0 <= (first - t) / DAY < 1 for t in never_set)
-    )
-    if is_unset or (gaps > 730).any():
-        years = f", with {gaps.max() / 365.25:.1f} years between" if (gaps > 730).any() else ""
-        text = (
-            f"the stamps of {file.name} are from {first} to {last}{years}, as of a clock that was not set. They are "
+    first, last, years = stamps.min(), stamps.max(), np.diff(stamps) / YEAR
+    starts = (pd.Timestamp("1980-01-06"), pd.Timestamp("2000-01-01"))  # of clocks that were never set
+    is_unset = first.year < 1990 or last > pd.Timestamp.now() + YEAR or any(0 <= (first - t) / DAY < 1 for t in starts)
+    if is_unset or (years > 2).any():
+        between = f", with {years.max():.1f} years between" if (years > 2).any() else ""
+        texts.append(
+            f"the stamps of {file.name} are from {first} to {last}{between}, as of a clock that was not set. They are "
             "taken as they are. Correct them, or give their format"
         )
-        findings.append(RecordsWarning(text, "wrong-stamps"))
-    return right, findings
+    return right, [RecordsWarning(text, "wrong-stamps") for text in texts]
 
 
 def find_stamps(
@@ -187,86 +182,67 @@ def find_stamps(
     """Places of the columns that hold the stamps, their format, and doubts about it."""
     looked = rows[:MOST_LOOKED_AT]
     for forms in [(given,)] if given else [WRITTEN_STAMPS, EPOCHS, (serial,)]:
-        tried = [(places, _fitting(looked, places, forms)) for places in _places(looked)]
-        found = [one for one in tried if one[1]]
+        found = [(places, fitting) for places in _places(looked) if (fitting := _fitting(looked, places, forms))]
         if forms == (serial,) and len(found) > 1:  # whole numbers may be counts of records
             times = [times_in(looked, places, serial).dropna() for places, _ in found]
-            found = [
-                one for one, index in zip(found, times, strict=True) if (index.normalize() != index).any()
-            ] or found
+            varied = [one for one, index in zip(found, times, strict=True) if (index.normalize() != index).any()]
+            found = varied or found
             if len(found) > 1:
                 columns = " and ".join(str(places[0] + 1) for places, _ in found)
                 raise ValueError(f"{file}: columns {columns} may all hold serial dates; expected one that does")
-        if found and forms == EPOCHS:
-            return found[0][0], *_epoch_of(rows, *found[0], file)
         if found:
-            return found[0][0], *_certain(rows, *found[0], str(file))
+            decide = _epoch_of if forms == EPOCHS else _certain
+            return found[0][0], *decide(rows, *found[0], str(file))
     expected = f"in the format {given}" if given else "such as 2026-01-31 13:00 or 31.01.2026 13:00"
     values = max(rows[:MOST_LOOKED_AT], key=lambda row: sum(map(str.isdigit, "".join(row))), default=[])
     raise ValueError(f"{file}: no column holds stamps, {expected}; the first values are {list(values)!r:.200}")
 
 
 def _epoch_of(
-    rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str], file: Path
+    rows: Sequence[Sequence[str]], places: Sequence[int], forms: Sequence[str], where: str
 ) -> tuple[str, list[str]]:
     """The beginning from which numbers count: 1970 where that gives stamps from 2000 until now, else the only other
     one that does, and a note where several do."""
     begins = {form: times.min() for form in forms if len(times := times_in(rows, places, form).dropna())}
-    now = pd.Timestamp.now("UTC")
-    likely = [form for form, begin in begins.items() if begin.year >= 2000 and begin < now + YEAR]
+    latest = pd.Timestamp.now("UTC") + YEAR
+    likely = [form for form, begin in begins.items() if begin.year >= 2000 and begin < latest]
     dates = " or ".join(f"{form!r} ({begins[form]})" for form in (likely or begins))
     first = [form for form in likely if form.startswith(UNIX)] or likely
     if len(first) != 1:
-        raise ValueError(
-            f"{file}: stamps such as {stamp_text(rows[-1], places)!r} may have the formats {dates}; expected --stamps "
-            "with the right one"
-        )
-    if len(likely) > 1 or not first[0].startswith(UNIX):
-        others = f"; they might also be {dates}" if len(likely) > 1 else ""
-        return first[0], [
-            f"stamps of {file.name} are read in the format {first[0]!r}, from {begins[first[0]]} on{others}"
-        ]
-    return first[0], []
+        raise ValueError(ambiguous(where, rows, places, dates))
+    others = f"; they might also be {dates}" if len(likely) > 1 else ""
+    note = f"stamps of {Path(where).name} are read in the format {first[0]!r}, from {begins[first[0]]} on{others}"
+    return first[0], [note] if others or not first[0].startswith(UNIX) else []
+
+
+def ambiguous(where: str, rows: Sequence[Sequence[str]], places: Sequence[int], forms: str) -> str:
+    """The error of stamps that have more than one format."""
+    text = stamp_text(rows[-1], places)
+    return f"{where}: stamps such as {text!r} may have the formats {forms}; expected --stamps with the right one"
 
 
 def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
     """Columns that may hold stamps: parts of dates side by side, each with the nearest time of day, and each alone."""
     columns = list(zip(*rows, strict=True))
-    time_of_day = re.compile(r"\d{1,2}:\d\d(:\d\d(\.\d+)?)?( ?[AaPp][Mm])?$")
-    clocks = [n for n, cells in enumerate(columns) if 2 * sum(map(bool, map(time_of_day.match, cells))) > len(cells)]
-    yield from _parts_of_dates(columns)
+
+    def are_mostly(form: str, share: float = MOSTLY) -> list[bool]:
+        """Which columns hold cells of a form."""
+        counts = [sum(re.fullmatch(form, cell) is not None for cell in cells) for cells in columns]
+        n_cells = [sum(map(bool, cells)) for cells in columns]
+        return [count > share * number for count, number in zip(counts, n_cells, strict=True)]
+
+    are_days, are_hours = are_mostly(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}"), are_mostly(r"[01]?\d|2[0-4]")
+    yield from ((n, n + 1) for n in range(len(columns) - 1) if are_days[n] and are_hours[n + 1])
+    are_parts = are_mostly(r"\d{1,4}")
+    for n, width in product(range(len(columns)), (6, 5, 4)):  # years, months, days, hours, or days first
+        if n + width <= len(columns) and all(are_parts[n : n + width]):
+            yield tuple(range(n, n + width))
+    are_clocks = are_mostly(r"\d{1,2}:\d\d(:\d\d(\.\d+)?)?( ?[AaPp][Mm])?", 0.5)
+    clocks = np.flatnonzero(are_clocks).tolist()
     for n in range(len(columns)):
         near = sorted((abs(clock - n), clock < n, clock) for clock in clocks if clock != n)
         yield from ((n, clock) for *_, clock in near[:1])
         yield (n,)
-
-
-def _parts_of_dates(columns: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
-    """Columns with years, months, days and the parts of a time of day, or days first."""
-    limits = {
-        "year": (1970, 2100),
-        "month": (1, 12),
-        "day": (1, 31),
-        "hour": (0, 24),
-        "minute": (0, 59),
-        "second": (0, 59),
-    }
-
-    def holds(place: int, part: str) -> bool:
-        low, high = limits[part]
-        cells = [cell for cell in columns[place] if cell] if place < len(columns) else []
-        are_parts = [cell.isdecimal() and low <= int(cell) <= high for cell in cells]
-        return bool(cells) and sum(are_parts) >= MOSTLY * len(cells)
-
-    for n, cells in enumerate(columns):
-        are_days = [re.fullmatch(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}", cell) is not None for cell in cells]
-        if sum(are_days) > MOSTLY * len(cells) and holds(n + 1, "hour") and len(set(columns[n + 1])) > 2:
-            yield n, n + 1
-    for order in (("year", "month", "day"), ("day", "month", "year")):
-        for n in range(len(columns)):
-            if all(holds(n + k, part) for k, part in enumerate(order)) and holds(n + 3, "hour"):
-                more = [part for k, part in enumerate(("minute", "second")) if holds(n + 4 + k, part)]
-                yield tuple(range(n, n + 4 + len(more)))
 
 
 def stamp_text(row: Sequence[str], places: Sequence[int]) -> str:
@@ -316,16 +292,10 @@ def _certain(
     shortest = min(readings, key=lambda form: found[form].max() - found[form].min())
     certain = readings if len(readings) == 1 else [form for form in readings if _is_regular(found[form])]
     if certain != [shortest]:
-        raise ValueError(
-            f"{where}: stamps such as {stamp_text(rows[-1], places)!r} may have the formats "
-            f"{' or '.join(map(repr, readings))}; expected --stamps with the right one"
-        )
+        raise ValueError(ambiguous(where, rows, places, " or ".join(map(repr, readings))))
     others = [form for form in readings if form not in certain]
-    return certain[0], [
-        f"stamps of {Path(where).name} may also have the format {form}: by {certain[0]}, they follow each other "
-        "regularly"
-        for form in others[:1]
-    ]
+    name, why = Path(where).name, f"by {certain[0]}, they follow each other regularly"
+    return certain[0], [f"stamps of {name} may also have the format {form}: {why}" for form in others[:1]]
 
 
 def _is_in_order(stamps: pd.DatetimeIndex) -> bool:

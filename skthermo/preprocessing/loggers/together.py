@@ -21,7 +21,7 @@ from skthermo.preprocessing._quantities import (
     kind_of,
     varies_as_modes,
 )
-from skthermo.preprocessing.loggers.logger_files import FileLook, look_at, once
+from skthermo.preprocessing.loggers.logger_files import FileLook, look_at, once, side_by_side
 from skthermo.preprocessing.loggers.stamps import MOSTLY
 
 HZ = "Hz"
@@ -67,20 +67,19 @@ class LoggerRecords:
             text = f"zone is {zone!r:.100}; expected a time zone such as 'Europe/Brussels' or 'UTC'"
             raise ValueError(text) from error
         looks = [look_at(file, zone, stamps, wanted) for file in files]
-        again = [
-            name for n, look in enumerate(looks) for name in look.records if any(name in b.records for b in looks[:n])
-        ]
+        columns = [name for look in looks for name in look.records]
+        again = sorted({name for name in columns if columns.count(name) > 1})
         if again and len({frozenset(look.records) for look in looks}) > 1:
             raise ValueError(f"several files have the columns {again}; expected each in one, beside the stamps")
-        columns = list(dict.fromkeys(name for look in looks for name in look.records))
+        columns = list(dict.fromkeys(columns))
         given = {"temperatures": temperatures, "reference": reference, "responses": responses}
         units = {name: unit for look in looks for name, unit in look.units.items()}
-        roles, ignored, notes = _roles(looks, columns, units, given)
+        ignored = {name: why for look in looks for name, why in look.ignored.items()}
+        roles, notes = _roles(looks, columns, units, given, ignored)
         table, waiting = joined([look.records for look in looks], columns)
         if not len(table):
-            spans = "; ".join(
-                f"{look.file}: {look.records.index.min()} to {look.records.index.max()}" for look in looks
-            )
+            stamps = [(str(look.file), look.records.index) for look in looks]
+            spans = "; ".join(f"{name}: {index.min()} to {index.max()}" for name, index in stamps)
             raise ValueError(f"the files have no stamp in common ({spans}); expected records of the same times")
         table = once(table).sort_index()
         used = [name for names in roles.values() for name in names]
@@ -96,19 +95,23 @@ class LoggerRecords:
                 f"the unit of {', '.join(map(repr, unknown))} is unknown, so that a change up counts as a change down; "
                 "natural frequencies need names such as 'f1 [Hz]'"
             )
-        ignored = {name: why for look in looks for name, why in look.ignored.items()} | ignored
         table = in_usual_units(table, convert)[used]
         return cls(looks, table, roles, of_responses, convert, waiting, ignored, notes)
 
 
 def _roles(
-    looks: Sequence[FileLook], columns: list[str], units: Mapping[str, Unit], given: dict[str, Any]
-) -> tuple[dict[str, list[str]], dict[str, str], list[str]]:
-    """Columns by role, why others have none, and what to know about it: as given, else by unit, name and values. Of two
-    files, what stays open in the first is a temperature, and a response in the second, if its values can be that."""
+    looks: Sequence[FileLook],
+    columns: list[str],
+    units: Mapping[str, Unit],
+    given: dict[str, Any],
+    ignored: dict[str, str],
+) -> tuple[dict[str, list[str]], list[str]]:
+    """Columns by role, and what to know about it: as given, else by unit, name and values; why others have none is
+    added to what is ignored. Of two files, what stays open in the first is a temperature, and a response in the second,
+    if its values can be that."""
     unknown = [name for names in given.values() for name in names or () if name not in columns]
     if unknown:
-        raise ValueError(f"there are no columns {unknown}; expected some of {columns}{_others(looks)}")
+        raise ValueError(f"there are no columns {unknown}; expected some of {columns}{_reasons(ignored)}")
     named = {name for names in given.values() for name in names or ()}
     values = {name: look.records[name] for look in looks for name in look.records}
     kinds = {name: kind_of(name, units.get(name), values[name]) for name in columns if name not in named}
@@ -125,14 +128,18 @@ def _roles(
             if by_file:
                 notes.append(f"{', '.join(by_file)}: {role} as their file says, as names and units do not")
             given[role] = [name for name in kinds if name in found or name in by_file]
-    others = {name: why for name, (_, why) in kinds.items() if not any(name in names for names in given.values())}
+    used = {name for names in given.values() for name in names or ()}
+    ignored |= {name: why for name, (_, why) in kinds.items() if name not in used}
     for role in ("temperatures", "responses"):
         if not given[role]:
-            raise ValueError(
-                f"no column is known to be one of the {role}; expected {role} (--{role}) by name, some of "
-                f"{columns}{_others(looks, others)}"
-            )
-    return {role: list(names) for role, names in given.items()}, others, notes
+            expected = f"{role} (--{role}) by name, some of {columns}{_reasons(ignored)}"
+            raise ValueError(f"no column is known to be one of the {role}; expected {expected}")
+    return {role: list(names) for role, names in given.items()}, notes
+
+
+def _reasons(ignored: Mapping[str, str]) -> str:
+    """Columns that cannot be used, and why."""
+    return "".join(f"; {name!r} is none, as {why}" for name, why in ignored.items())
 
 
 def _is_open(role: str, kind: str, values: pd.Series) -> bool:
@@ -149,13 +156,6 @@ def _response_unit(name: str, unit: Unit | None, values: pd.Series) -> str:
     if kind == FREQUENCY or (unit is None and is_mode):
         return HZ
     return unit.name if unit else ""
-
-
-def _others(looks: Sequence[FileLook], others: Mapping[str, str] | None = None) -> str:
-    """Columns that cannot be used, and why."""
-    others = {name: why for look in looks for name, why in look.ignored.items()} | (others or {})
-    listed = ", ".join(f"{name!r} is none, as {why}" for name, why in others.items())
-    return f"; {listed}" if listed else ""
 
 
 def _foreign(
@@ -181,15 +181,13 @@ def joined(tables: Iterable[pd.DataFrame], columns: Sequence[str]) -> tuple[pd.D
     for table in tables:
         groups.setdefault(frozenset(table), []).append(table)
     whole = groups.pop(frozenset(columns), [])
-    parts = [once(pd.concat(one)) for one in groups.values()]
     waiting = pd.DatetimeIndex([])
-    if parts:
-        together = pd.concat(parts, axis=1, join="inner")
-        every = parts[0].index
-        for part in parts[1:]:
-            every = every.union(part.index)
-        waiting = every.difference(together.index) if set(together) == set(columns) else every
-        whole += [together] if set(together) == set(columns) else []
+    if groups:
+        together, waiting = side_by_side([pd.concat(one) for one in groups.values()])
+        if set(together) == set(columns):
+            whole.append(together)
+        else:
+            waiting = waiting.union(together.index)
     if not whole:
         return pd.DataFrame(columns=list(columns), index=waiting[:0], dtype=float), waiting
     return pd.concat([one[list(columns)] for one in whole]), waiting
