@@ -13,14 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from skthermo._core.arrays import Array, median, robust_deviation, spread_evenly
 from skthermo._core.estimators import Interval
-from skthermo._core.frames import (
-    Table,
-    check_duration,
-    frame_like,
-    has_stamps,
-    positions_of,
-    row_times,
-)
+from skthermo._core.frames import Table, check_duration, frame_like, has_stamps, positions_of, row_times
 from skthermo.preprocessing._transformers import DURATION, RecordTransformer
 from skthermo.preprocessing._weather_lines import WeatherLines, distances_from_neighbours, ridge, without_far
 

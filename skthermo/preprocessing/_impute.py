@@ -13,13 +13,7 @@ from scipy.spatial import cKDTree
 from sklearn.impute import KNNImputer
 
 from skthermo._core.arrays import Array, rows_by_pattern
-from skthermo._core.estimators import (
-    _check_feature_names_in,
-    _get_weights,
-    check_array,
-    check_is_fitted,
-    validate_data,
-)
+from skthermo._core.estimators import _check_feature_names_in, _get_weights, check_array, check_is_fitted, validate_data
 from skthermo._core.frames import frame_like, marker_findings, named_frame
 from skthermo._core.warnings import warn_each
 

@@ -14,14 +14,7 @@ from skthermo._core.frames import as_stamps, of_a_wrong_clock
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import RecordsWarning
 from skthermo.preprocessing.checks._beside_weather import look_at_both, looks_exchanged
-from skthermo.preprocessing.checks._columns import (
-    Reading,
-    are_temperatures,
-    doubt_unit,
-    look_at_responses,
-    look_at_temperatures,
-    put_stuck_aside,
-)
+from skthermo.preprocessing.checks._columns import Reading, look_at
 from skthermo.preprocessing.checks._record_findings import (
     ASIDE_REASONS,
     WARNINGS,
@@ -43,11 +36,9 @@ def examine(
     readings = [Reading(table, what, unit, beside) for table, what, beside in pairs if table is not None]
     tables = [reading for reading in readings if reading.values.size]
     findings = rows_found(tables) if tables else []
-    for number, reading in enumerate(tables):
-        if reading.is_frame and not (
-            number and tables[0].is_frame and reading.given_index.equals(tables[0].given_index)
-        ):
-            findings += times_found(reading.given_index)
+    are_alike = len(tables) == 2 and tables[0].given_index.equals(tables[1].given_index)
+    for reading in tables[:1] if are_alike else tables:
+        findings += times_found(reading.given_index) if reading.is_frame else []
     is_pair, copies = len(tables) == 2, copies_found(tables)
     if is_pair and unit == "Hz" and not copies and looks_exchanged(*(reading.values for reading in tables)):
         detail = "the temperatures vary less, relative to their median, than the frequencies do"
@@ -55,18 +46,8 @@ def examine(
     if any(one.what == "exchanged-tables" for one in copies):
         return readings, [*findings, *copies], False
     for reading in tables:
-        if len(reading.values) < 2:
-            continue
-        if reading.what == "temperatures":  # inputs that are none are like responses of any unit
-            are_thermal = are_temperatures(reading)
-            look_at_temperatures(reading, np.flatnonzero(are_thermal))
-            others = np.flatnonzero(~are_thermal)
-            look_at_responses(reading, in_hertz=False, beside_weather=True, places=others)
-        else:
-            look_at_responses(reading, in_hertz=unit == "Hz", beside_weather=is_pair)
-            if unit == "Hz":
-                doubt_unit(reading, model)
-        put_stuck_aside(reading)
+        if len(reading.values) > 1:
+            look_at(reading, unit, model, beside_weather=is_pair)
     return readings, [*findings, *copies], is_pair and all(one.what != "different-rows" for one in findings)
 
 
@@ -225,12 +206,11 @@ def set_aside(
     readings, findings, _ = examine(temperatures, frequencies, unit, model)
     reasons = (ASIDE_REASONS if is_baseline else {"placeholders"}).difference(exclude)
     needs_change = "useless-column" not in exclude
-    table = findings_table([*findings, *(one for reading in readings for one in reading.findings)])
-    what, is_meaningless = table["what"], table["severity"] == "meaningless"
-    is_useless = is_meaningless & (what == "useless-column")
-    is_harmless = what.isin(ASIDE_REASONS) | (is_meaningless & what.isin(list(exclude)))
+    every = [*findings, *(one for reading in readings for one in reading.findings)]
+    doubtful = [one for one in every if one.what not in ASIDE_REASONS and (needs_all or not one.is_useless_column)]
+    doubtful = [one for one in doubtful if not one.is_meaningless or one.what not in exclude]
     n_rows = max((len(reading.values) for reading in readings), default=0)
-    others = RecordFindings(table[~(is_harmless if needs_all else is_harmless | is_useless)], n_rows)
+    others = RecordFindings(findings_table(doubtful), n_rows)
     others.refuse_meaningless()
     tables, left_out = dict[str, Any](), dict[Hashable, str]()
     for reading in readings:
@@ -239,10 +219,10 @@ def set_aside(
         tables[reading.what], useless = reading.cleaned(**options)
         left_out |= useless
         if reading.columns and set(reading.columns) == set(useless):
-            raise ValueError(
-                f"no column of the {reading.what} can be used: {'; '.join(useless.values())}; expected measurements"
-            )
-    found = RecordFindings(table[is_useless | what.isin(reasons)], n_rows, **tables, left_out=left_out)
+            why = "; ".join(useless.values())
+            raise ValueError(f"no column of the {reading.what} can be used: {why}; expected measurements")
+    aside = [one for one in every if one.is_useless_column or one.what in reasons]
+    found = RecordFindings(findings_table(aside), n_rows, **tables, left_out=left_out)
     found.refuse_meaningless(exclude={"useless-column"}, needs_all=needs_all)
     warn_each(found.warnings())
     return found, list(others.warnings())

@@ -112,12 +112,12 @@ class Reading:
         share = f"{n_rows} rows" if n_found == n_rows else f"{n_found} of {n_rows} rows"
         self.found(what, name, rows, f"{name!r} {detail} in {share}", meaningless=meaningless)
 
-    def put_aside(self, what: str, place: int, wrong: NDArray[np.bool_], *, is_kelvin: bool = False) -> bool:
+    def put_aside(self, what: str, place: int, wrong: NDArray[np.bool_], *, is_kelvin: bool = False) -> None:
         """Add a finding where values of a column are wrong; these, and single values between them, become NaN."""
         column = self.values[:, place]
         wrong = wrong & ~np.isnan(column)
         if not wrong.any():
-            return False
+            return
         levels = np.unique(column[wrong])
         named = texts_of(levels) if len(levels) <= 3 else f"{levels[0]:.6g} to {levels[-1]:.6g}"
         unit = ", as in kelvin," if is_kelvin else self.unit
@@ -125,7 +125,6 @@ class Reading:
         wrong[1:-1] |= wrong[:-2] & wrong[2:]
         self._aside.append((what, place, wrong))
         column[wrong] = np.nan
-        return True
 
     def use(self, reasons: Collection[str]) -> None:
         """Use the values that were put aside for these reasons as they were given."""
@@ -174,6 +173,19 @@ def are_temperatures(T: Reading) -> NDArray[np.bool_]:
     return found
 
 
+def look_at(table: Reading, unit: str, model: Any, *, beside_weather: bool) -> None:
+    """Look at temperatures, at other inputs as at responses of any unit, or at responses, each column by itself."""
+    are_inputs = table.what == "temperatures"
+    are_thermal = are_temperatures(table) if are_inputs else np.zeros(len(table.columns), dtype=bool)
+    in_hertz = unit == "Hz" and not are_inputs
+    look_at_temperatures(table, np.flatnonzero(are_thermal))
+    others = np.flatnonzero(~are_thermal)
+    look_at_responses(table, others, in_hertz=in_hertz, beside_weather=beside_weather or are_inputs)
+    if in_hertz:
+        doubt_unit(table, model)
+    put_stuck_aside(table)
+
+
 def look_at_temperatures(T: Reading, thermal: NDArray[np.intp]) -> None:
     """Put aside values that no thermometer in the open shows, and name columns in another unit or with another sign."""
     varying = []
@@ -188,9 +200,9 @@ def look_at_temperatures(T: Reading, thermal: NDArray[np.intp]) -> None:
             continue
         wrong = np.isin(column, marker_levels(known, 30.0, COLDEST, HOTTEST))
         kelvin = wrong & (column > COLDEST + 273.15) & (column < HOTTEST + 273.15)
-        is_changed = T.put_aside("wrong-unit", place, kelvin, is_kelvin=True)
-        if T.put_aside("placeholders", place, wrong) or is_changed:
-            known = np.sort(column[~np.isnan(column)])
+        T.put_aside("wrong-unit", place, kelvin, is_kelvin=True)
+        T.put_aside("placeholders", place, wrong)
+        known = np.sort(column[~np.isnan(column)])
         low, high = usual_range(known, 10.0)  # a structure passes gaps while records are left out
         T.put_aside("another-level", place, (column < low) | (column > high))
         if has_levels(T, place, known[(known >= low) & (known <= high)]):
@@ -199,14 +211,12 @@ def look_at_temperatures(T: Reading, thermal: NDArray[np.intp]) -> None:
         T.put_aside("implausible-values", place, (T.values[:, place] < COLDEST) | (T.values[:, place] > HOTTEST))
 
 
-def look_at_responses(
-    F: Reading, *, in_hertz: bool, beside_weather: bool, places: NDArray[np.intp] | None = None
-) -> None:
-    """Put aside values that are no frequencies, or no responses of another kind, of all columns or of some.
+def look_at_responses(F: Reading, places: NDArray[np.intp], *, in_hertz: bool, beside_weather: bool) -> None:
+    """Put aside values of some columns that are no frequencies, or no responses of another kind.
 
     Beside the weather, single values far from others are left to the search for exchanged modes and outliers.
     """
-    for place in range(len(F.columns)) if places is None else places.tolist():
+    for place in places.tolist():
         column = F.values[:, place]
         known = np.sort(column[~np.isnan(column)])
         rest = known[~np.isin(known, LOGGED) & ((known > 0) | (not in_hertz))]
@@ -214,8 +224,8 @@ def look_at_responses(
         levels = marker_levels(known, 3 * (high - low)) if high > low or not rest.size else known[:0]
         is_apart = (column > 2 * middle) | (column < middle / 2) if in_hertz else np.ones(len(column), dtype=bool)
         wrong = np.isin(column, levels) & (is_apart | np.isin(column, LOGGED)) | (in_hertz & (column <= 0))
-        if F.put_aside("placeholders", place, wrong):
-            known = np.sort(column[~np.isnan(column)])
+        F.put_aside("placeholders", place, wrong)
+        known = np.sort(column[~np.isnan(column)])
         if not has_levels(F, place, known):
             continue
         low, high = usual_range(known)
