@@ -308,3 +308,13 @@ def test_more_files_are_read_as_they_are(kind, series, tmp_path):
 @of_each(DOUBTFUL)
 def test_what_is_not_certain_is_said_or_refused(kind, series, tmp_path):
     assert verdict(kind, series, tmp_path) in ("right", "said", "refused")
+
+
+@pytest.mark.filterwarnings("ignore:.*'lane' is not used")
+def test_a_flag_beside_a_date_is_no_time_of_day(tmp_path):
+    days = records(pd.date_range("2025-01-05", periods=N)).assign(lane=np.arange(N) % 2)
+    file = tmp_path / "log.csv"
+    file.write_text(lines(days[["lane", "T_air", "T_deck", "f1", "f2"]], lambda t: f"{t:%Y-%m-%d}"))
+    T, F = read_records(file)
+    assert T.index.equals(F.index)
+    assert (T.index == days.index).all()

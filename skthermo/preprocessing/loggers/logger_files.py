@@ -482,13 +482,9 @@ def _times(texts: Sequence[str], form: CsvFormat, block: Block, lines: Sequence[
             f"{block.where}, line {lines[wrong[0]]}: {texts[wrong[0]]!r:.100} is no time; expected {expected}; "
             f"{len(wrong)} of {len(texts)} stamps are wrong"
         )
-    if form.time_zone is None:
-        return index
-    return (
-        index.tz_convert(form.time_zone)
-        if index.tz
-        else clocks.by_local_clock(index, form.time_zone, block.where, lines)
-    )
+    if form.time_zone is not None and index.tz is None:
+        return clocks.by_local_clock(index, form.time_zone, block.where, lines)
+    return index if form.time_zone is None else index.tz_convert(form.time_zone)
 
 
 @dataclass(frozen=True)

@@ -232,7 +232,9 @@ def _places(rows: Sequence[Sequence[str]]) -> Iterator[tuple[int, ...]]:
         return [count > share * number for count, number in zip(counts, n_cells, strict=True)]
 
     are_days, are_hours = are_mostly(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}"), are_mostly(r"[01]?\d|2[0-4]")
-    yield from ((n, n + 1) for n in range(len(columns) - 1) if are_days[n] and are_hours[n + 1])
+    for n in range(len(columns) - 1):
+        if are_days[n] and are_hours[n + 1] and len(set(filter(str.isdecimal, columns[n + 1]))) > 2:  # no flag
+            yield n, n + 1
     are_parts = are_mostly(r"\d{1,4}")
     for n, width in product(range(len(columns)), (6, 5, 4)):  # years, months, days, hours, or days first
         if n + width <= len(columns) and all(are_parts[n : n + width]):
