@@ -53,8 +53,10 @@ class PastFeatures(RecordTransformer):
         """Stamps of new records, of the same kind as those of `fit`."""
         stamps = stamps_of(X)
         if (stamps is None) != (self.stamps_ is None):
-            has, had = ("no" if one is None else "a" for one in (stamps, self.stamps_))
-            raise ValueError(f"X has {has} DatetimeIndex; expected {had} DatetimeIndex, as in fit")
+            has, had = (
+                "rows without a DatetimeIndex" if one is None else "a DatetimeIndex" for one in (stamps, self.stamps_)
+            )
+            raise ValueError(f"X has {has}; expected {had}, as in fit")
         if stamps is not None and (self.time_zone_ is None) != (stamps.tz is None):
             raise ValueError(f"X has stamps in time zone {stamps.tz}; expected {self.time_zone_}, as in fit")
         return stamps
@@ -80,7 +82,7 @@ def stamps_of(X: Table) -> pd.DatetimeIndex | None:
         raise ValueError(f"X has a missing stamp (NaT) in row {np.flatnonzero(index.isna())[0]}")
     if index.has_duplicates:
         row = int(index.duplicated().argmax())
-        raise ValueError(f"X has the stamp {index[row]} of row {row} more than once; expected each stamp once")
+        raise ValueError(f"X has the duplicate stamp {index[row]} in row {row}; expected each stamp once")
     return index
 
 

@@ -165,7 +165,7 @@ def read_reference(reference: Any) -> ReferenceModes:
     parts = dict(reference if is_mapping else zip(("frequencies", "shapes"), reference, strict=False))
     if not parts.keys() >= {"frequencies", "shapes"} or (not is_mapping and len(reference) != 2):
         got = f"the fields {list(parts)}" if is_mapping else f"{len(reference)} parts"
-        raise ValueError(f"reference has {got}; expected frequencies and shapes")
+        raise ValueError(f"reference has {got}; expected 'frequencies' and 'shapes'")
     given, shapes, sensors = parts["frequencies"], parts["shapes"], parts.get("sensors")
     frequencies = real_array(given, "reference frequencies")
     if frequencies.ndim != 1 or not frequencies.size or not (np.isfinite(frequencies) & (frequencies > 0)).all():

@@ -1286,7 +1286,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("ModeTracker", "transposed shapes", lambda: tracked(shapes=POLES["shapes"].transpose(0, 2, 1)), "(2, 3, 2)|shape"),
     ("ModeTracker", "complex damping", lambda: tracked(damping=np.ones((2, 2)) * 1j), "complex"),
     ("ModeTracker", "damping of one record", lambda: tracked(damping=np.ones((1, 2))), "damping 1"),
-    ("ModeTracker", "shapes of one record", lambda: tracked(**LISTS | {"shapes": LISTS["shapes"][:1]}), "1 records"),
+    ("ModeTracker", "shapes of one record", lambda: tracked(**LISTS | {"shapes": LISTS["shapes"][:1]}), "shapes 1"),
     ("ModeTracker", "shapes of one pole", lambda: tracked(**LISTS | {"shapes": [[[1, 2, 1]]] * 2}), "record 0"),
     ("ModeTracker", "an index of another length", lambda: tracked(index=[1, 2, 3]), "3 entries"),
     ("ModeTracker", "transposed reference", lambda: tracker((REFERENCE[0], REFERENCE[1].T)), "transpose"),
