@@ -189,7 +189,9 @@ class RecordFindings(SavesFrames):
         found = []
         others = ~is_of_columns & ~self.table["what"].isin(["few-records", *exclude])
         for kind, listed in details[others].groupby(kinds[others], sort=False):
-            found.append(RecordsWarning(WARNINGS[kind].format(listed_details(listed)), kind))
+            text = WARNINGS[kind].format(listed_details(listed))
+            n_values = self.table["n_rows"][listed.index].sum() if kind == "set-aside" else 0
+            found.append(RecordsWarning(f"{n_values:,} {text}" if n_values > 1 else text, kind))
         if self.left_out:
             text = f"columns are left out, and nothing is said of them: {'; '.join(self.left_out.values())}"
             found.append(RecordsWarning(f"{text}. Repair these sensors, or drop the columns", "useless-column"))
