@@ -19,6 +19,7 @@ from skthermo._core.frames import row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning
+from skthermo.preprocessing.checks import stuck_runs
 from skthermo.preprocessing.folds import Rows
 from skthermo.residuals.numbers import independent_records
 
@@ -163,7 +164,8 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     Columns are frequencies or residuals. A column whose values are positive, with a standard deviation below a third of
     their mean, is read as a frequency, and is divided by its mean; the methods above get relative frequencies and
     residuals as they are. `fit` sets aside, as if they were missing, frequencies that are farther from the median than
-    half of it, residuals that are farther than a hundred robust standard deviations, and infinite values.
+    half of it, residuals that are farther than a hundred robust standard deviations, infinite values, and those of a
+    sensor that is stuck.
 
     ``_cause(X, rows)`` says why rows have no index. A detector that learns a distribution has ``_has_likelihood()``
     True and ``_log_densities(F)``, and with them a ``score``. A detector, or a step before it, that looks at earlier
@@ -248,8 +250,9 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
         F = np.where(labelled_damaged(y, len(F))[:, np.newaxis], np.nan, F)
         times = row_times(X)
         self.findings_: list[SkthermoWarning] = []
-        F, self.report_ = read_columns(F, getattr(X, "columns", range(F.shape[1])), self.findings_)
-        order, are_residuals = np.argsort(times, kind="stable"), (self.report_["read_as"] == "residual").to_numpy()
+        order, names = np.argsort(times, kind="stable"), getattr(X, "columns", range(F.shape[1]))
+        F, self.report_ = read_columns(F, order, names, self.findings_)
+        are_residuals = (self.report_["read_as"] == "residual").to_numpy()
         residuals = F[np.ix_(order, are_residuals)]
         self.n_independent_ = independent_records(residuals) if are_residuals.any() else float(len(F))
         self.baseline_index_ = self._learn(F, times)
@@ -333,26 +336,33 @@ def labelled_damaged(y: Any, n_rows: int) -> NDArray[np.bool_]:
     return labels == -1
 
 
-def read_columns(F: Array, names: Any, findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:
-    """A baseline as detectors learn it, and how each column was read; what was set aside is added to the findings."""
-    read = [read_column(values, name) for values, name in zip(F.T, names, strict=True)]
+def read_columns(F: Array, order: Rows, names: Any, findings: list[SkthermoWarning]) -> tuple[Array, pd.DataFrame]:
+    """A baseline as detectors learn it, and how each column was read; what was set aside is added to the findings.
+
+    ``order`` are the rows in order of time.
+    """
+    read = [read_column(values, order, name) for values, name in zip(F.T, names, strict=True)]
     table = pd.DataFrame([row for row, _ in read], index=pd.Index(names))
     far = np.column_stack([rows for _, rows in read])
     if far.any():
         F = np.where(far, np.nan, F)
         findings.append(
             RecordsWarning(
-                f"values of {', '.join(map(repr, table.index[far.any(axis=0)]))} are far from all others there. They "
-                "count as missing (report_ has their number). Put NaN where a value is missing",
+                f"values of {', '.join(map(repr, table.index[far.any(axis=0)]))} are far from all others there, or "
+                "repeat one for long. They count as missing (report_ has their number). Put NaN where a value is "
+                "missing",
                 "set-aside",
             )
         )
     return F / table["level"].to_numpy(), table
 
 
-def read_column(values: Array, name: Any) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """As what a column was read, and which of its values are far from all others."""
-    known = values[np.isfinite(values)]
+def read_column(values: Array, order: Rows, name: Any) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """As what a column was read, and which of its values are far from all others, or of a sensor that is stuck."""
+    is_stuck = np.zeros(len(values), dtype=bool)
+    for rows in stuck_runs(values[order]):
+        is_stuck[order[rows]] = True
+    known = values[np.isfinite(values) & ~is_stuck]
     if not len(known):
         raise ValueError(f"column {name!r} has no value in {len(values)} rows; expected some in each")
     if known.min() == known.max():
@@ -363,7 +373,7 @@ def read_column(values: Array, name: Any) -> tuple[dict[str, Any], NDArray[np.bo
     is_frequency = middle > 0 and scatter < middle / 3
     farthest = middle / 2 if is_frequency else 100 * scatter or np.inf
     far = np.abs(values - middle) > farthest
-    far |= np.isinf(values)
+    far |= np.isinf(values) | is_stuck
     if far.any():
         known = known[np.abs(known - middle) <= farthest]
     mean = known.mean()

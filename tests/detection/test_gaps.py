@@ -86,6 +86,18 @@ def test_a_shrunk_covariance_evaluates_rows_with_gaps_and_learns_from_complete_o
         MahalanobisDetector(covariance=LedoitWolf()).fit(never_whole)
 
 
+def test_a_mode_that_is_stuck_teaches_as_if_it_were_missing_in_any_order_of_rows():
+    stamps = pd.date_range("2025", periods=400, freq="h")
+    stuck, missing = (pd.DataFrame(F, stamps, ["f1", "f2", "f3"]) for _ in range(2))
+    stuck.iloc[100:180, 1], missing.iloc[100:180, 1] = F[100, 1], np.nan
+    expected = MahalanobisDetector().fit(missing)
+    for table in (stuck, stuck[::-1]):
+        with pytest.warns(UserWarning, match="'f2'.*set-aside"):
+            found = MahalanobisDetector().fit(table)
+        assert found.report_["n_set_aside"].tolist() == [0, 80, 0]
+        np.testing.assert_allclose(found.damage_index(missing), expected.damage_index(missing), rtol=1e-9)
+
+
 def test_only_rows_without_any_mode_have_no_index_and_are_not_evaluated():
     stamps = pd.date_range("2025", periods=400, freq="h")
     frame = pd.DataFrame(GAPPY, stamps, ["f1", "f2", "f3"])

@@ -3,7 +3,7 @@ units."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Collection, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -347,20 +347,21 @@ def in_degrees(T: Reading, places: list[int]) -> list[int]:
 def put_stuck_aside(table: Reading) -> None:
     """Put aside the runs in which a column only repeats a value; a column that begins as another one is its lag."""
     for place, column in enumerate(table.values.T):
-        rows = np.flatnonzero(~np.isnan(column))
-        values = column[rows]
-        first, lengths = equal_runs(values)
-        if place in table.useless or len(values) < 20 or lengths.max() < 5 or len(lengths) < 3:
-            continue
+        for stuck in stuck_runs(column) if place not in table.useless else ():
+            if stuck[0] > 0 or np.count_nonzero(table.values[0] == column[0]) == 1:
+                table.put_aside("stuck", place, np.isin(np.arange(len(column)), stuck))
+
+
+def stuck_runs(column: Array) -> Iterator[NDArray[np.intp]]:
+    """Rows of each run in which a column only repeats a value."""
+    rows = np.flatnonzero(~np.isnan(column))
+    values = column[rows]
+    first, lengths = equal_runs(values)
+    if len(values) >= 20 and lengths.max() >= 5 and len(lengths) >= 3:
         longest = np.argsort(-lengths, kind="stable")[:20]
         for run in np.sort(longest[lengths[longest] >= 5]):
-            stuck = rows[first[run] : first[run] + lengths[run]]
-            if stuck[0] == 0 and np.count_nonzero(table.values[0] == column[0]) > 1:
-                continue
             if is_outstanding(values[first], lengths, run):
-                wrong = np.zeros(len(column), dtype=bool)
-                wrong[stuck] = True
-                table.put_aside("stuck", place, wrong)
+                yield rows[first[run] : first[run] + lengths[run]]
 
 
 def equal_runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
