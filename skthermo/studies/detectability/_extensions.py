@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,21 +14,14 @@ from scipy.stats import t as student
 from sklearn.base import clone
 
 from skthermo._core.arrays import Array, as_floats, as_random_state, check_noise, integer_row, real_array
-from skthermo._core.frames import check_same_rows, column_names
+from skthermo._core.frames import check_same_rows
 from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
 from skthermo.studies._scenarios import BaseScenario, Scenario
 from skthermo.studies.detectability._pod_curve import FamilyRates, families_of, fitted_curve
-from skthermo.studies.detectability._simulation import (
-    LARGEST_SEED,
-    SIMULATED,
-    Candidate,
-    Measurement,
-    Simulation,
-    clean_frequencies,
-)
+from skthermo.studies.detectability._simulation import Candidate, Measurement, Simulation, sensors_of
 from skthermo.studies.detectability._study import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM
 
@@ -115,7 +108,6 @@ def compare_extensions(
         raise ValueError(f"study is {study!r:.200}; expected a DetectabilityStudy that has been run")
     name, fem = study.detector_name(detector), study.fem
     present = study.candidates_[name]
-    present = replace(present, detector=clone(present.detector))
     factors = np.ravel(real_array(baseline_factors, "baseline_factors")).tolist()
     if np.ndim(baseline_factors) != 1 or not all(1 < factor < np.inf for factor in factors):
         raise ValueError(f"baseline_factors is {baseline_factors!r:.200}; expected numbers above 1, such as [2.0]")
@@ -126,23 +118,26 @@ def compare_extensions(
         longer = replace(present, n_baseline=int(np.ceil(present.n_baseline * factor)))
         candidates["baseline", f"baseline x {factor:g}"] = longer
     n_repeats = int(study.results_["n_repeats"].max())
-    seeds = as_random_state(study.random_state).randint(LARGEST_SEED, size=n_repeats)
+    seeds = as_random_state(study.random_state).randint(np.iinfo(np.int32).max, size=n_repeats)
     measurement = Measurement.asked(fem, study.noise, study.gaps, study.outliers)
-    scenarios, rows = scenarios_of(study, name), []
+    scenarios, trials, rows = scenarios_of(study, name), [], []
     with collected() as findings, single_blas_thread():
         findings += fem.thermal_.doubts(fem.weather(T)) + _doubtful_modes(fem, ranks)
         scatter = check_noise(_scatter(study) if noise is None else noise, len(ranks), names)
-        further, known = dict(zip(ranks, scatter, strict=True)), (scenarios, measurement, present)
-        trials = [Trial.prepared(fem, T, *known, candidates, further)] if candidates else []
+        compared = [(fem, T, candidates, dict(zip(ranks, scatter, strict=True)))] if candidates else []
         for sensor, chain, weather in _with_sensors(study, present, sensors):
-            seeing = replace(present, columns=[*present.columns, sensor])
-            trials.append(Trial.prepared(chain, weather, *known, {("sensor", str(sensor)): seeing}, {}))
-    for trial in trials:
-        jobs = (delayed(trial.repeat)(int(seed)) for seed in seeds)
+            seeing = {("sensor", str(sensor)): replace(present, columns=[*present.columns, sensor])}
+            compared.append((chain, weather, seeing, {}))
+        for chain, weather, others, further in compared:
+            healthy = Simulation(chain, [Scenario("healthy")], chain.records_.temperatures, measurement)
+            changed = Simulation(chain, scenarios, weather, measurement)
+            trials.append(trial(healthy, changed, {None: present} | others, further))
+    for repeat in trials:
+        jobs = (delayed(repeat)(int(seed)) for seed in seeds)
         repeats = run_jobs(jobs, len(seeds), unit="repeats", n_jobs=study.n_jobs)
         rows += [
             _row(*key, family, np.array([[one[None][family], one[key][family]] for one in repeats]))
-            for key in trial.candidates
+            for key in filter(None, repeats[0])
             for family in repeats[0][None]
         ]
     if not rows:
@@ -151,68 +146,40 @@ def compare_extensions(
     return pd.DataFrame(rows).sort_values("gain", ascending=False, kind="stable", ignore_index=True)
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """Candidates that are compared with the present detector in the same simulated campaigns of a chain.
+def trial(
+    healthy: Simulation, changed: Simulation, candidates: Mapping[Any, Candidate], modes: Mapping[int, float]
+) -> Callable[[int], dict[Any, dict[str, float]]]:
+    """A function of a seed that compares candidates in the same simulated campaigns of a chain: of every one the
+    smallest detectable severity of each family.
 
-    ``healthy`` records are in the weather of the chain's training, which begins again where a baseline is longer;
-    ``changed`` ones in new weather. ``further`` modes have relative ``scatter`` by name, and frequencies without noise,
-    (n_records, n_modes), by scenario.
+    The weather of healthy records begins again where a baseline is longer. ``modes`` are further ones, with their
+    relative scatter by rank.
     """
+    fem, names, scatter = healthy.fem, [mode_name(rank) for rank in modes], list(modes.values())
+    further = {
+        one.name: fem.thermal_.simulated(simulation.weather, [*modes], **one.changes(simulation.T))
+        for simulation in ((healthy, changed) if modes else ())
+        for one in simulation.scenarios
+    }
+    n_periods = -(-max(one.n_baseline for one in candidates.values()) // len(healthy.T))
 
-    present: Candidate
-    candidates: Mapping[tuple[str, str], Candidate]
-    healthy: Simulation
-    changed: Simulation
-    scatter: Mapping[str, float]
-    further: Mapping[str, Array]
-
-    @classmethod
-    def prepared(
-        cls,
-        fem: DataInformedFEM,
-        T: Any,
-        scenarios: Sequence[Scenario],
-        measurement: Measurement,
-        present: Candidate,
-        candidates: Mapping[tuple[str, str], Candidate],
-        modes: Mapping[int, float],
-    ) -> Trial:
-        """With all frequencies without noise; modes are scatters by rank."""
-        nothing = [Scenario("healthy")]
-        simulations, further = [], {}
-        for weather, states in ((fem.records_.temperatures, nothing), (T, scenarios)):
-            clean = clean_frequencies(fem, states, weather, 1)
-            simulations.append(Simulation(fem, states, weather, clean, measurement))
-            for one in states if modes else ():
-                further[one.name] = fem.thermal_.simulated(fem.weather(weather), [*modes], **one.changes(weather))
-        scatter = {mode_name(rank): one for rank, one in modes.items()}
-        return cls(present, candidates, *simulations, scatter, further)
-
-    def repeat(self, seed: int) -> dict[tuple[str, str] | None, dict[str, float]]:
-        """The smallest detectable severity of each family, of every candidate and, under None, at present."""
-        arrangements = {None: self.present, **self.candidates}
-        longest = max(one.n_baseline for one in arrangements.values())
-        n_periods = -(-longest // len(self.healthy.T))
-        first, *others = np.random.RandomState(seed).randint(LARGEST_SEED, size=(1 + n_periods, 2))
-        with collected(drop_others=True), single_blas_thread():
-            tables = self._tables(self.changed, first)
-            periods = [self._tables(self.healthy, seeds)[0][1] for seeds in others]
-            baseline = pd.concat([later(table, number) for number, table in enumerate(periods)])
-            return {key: smallest(one, baseline, tables) for key, one in arrangements.items()}
-
-    def _tables(self, simulation: Simulation, seeds: Sequence[int]) -> list[tuple[BaseScenario, pd.DataFrame]]:
+    def tables(simulation: Simulation, seeds: Sequence[int]) -> list[tuple[BaseScenario, pd.DataFrame]]:
         """Records of each scenario, all with the same noise; further modes are missing where all others are."""
-        tables, names = [], list(self.scatter)
+        found, noise = [], np.random.RandomState(seeds[1]).standard_normal((len(names), len(simulation.T))).T * scatter
         for one in simulation.records(0, seeds):
-            table = one.table
-            if names:
-                random = np.random.RandomState(seeds[1])
-                noise = random.standard_normal((len(names), len(table))).T * list(self.scatter.values())
-                noise[table[list(simulation.fem.mode_names_)].isna().all(axis=1)] = np.nan
-                table = table.assign(**dict(zip(names, (self.further[one.scenario.name] * (1 + noise)).T, strict=True)))
-            tables.append((one.scenario, table))
-        return tables
+            missing = one.table[list(fem.mode_names_)].isna().all(axis=1).to_numpy()[:, np.newaxis]
+            values = further[one.scenario.name] * np.where(missing, np.nan, 1 + noise) if names else noise
+            found.append((one.scenario, one.table.assign(**dict(zip(names, values.T, strict=True)))))
+        return found
+
+    def repeat(seed: int) -> dict[Any, dict[str, float]]:
+        first, *others = np.random.RandomState(seed).randint(np.iinfo(np.int32).max, size=(1 + n_periods, 2))
+        with collected(drop_others=True), single_blas_thread():
+            periods = [later(tables(healthy, seeds)[0][1], number) for number, seeds in enumerate(others)]
+            records = tables(changed, first)
+            return {key: smallest(one, pd.concat(periods), records) for key, one in candidates.items()}
+
+    return repeat
 
 
 def later(table: pd.DataFrame, period: int) -> pd.DataFrame:
@@ -252,7 +219,7 @@ def scenarios_of(study: DetectabilityStudy, detector: str) -> list[Scenario]:
     study."""
     scenarios = []
     for (name, family, source), rates in families_of(study.results_, study.confidence_).items():
-        if name != detector or source != SIMULATED or not len(rates.tested):
+        if name != detector or source != "simulated" or not len(rates.tested):
             continue
         members = [one for one in study.scenarios_ if isinstance(one, Scenario) and one.family == family]
         groups = {group for member in members for group in member.damage or {}}
@@ -334,8 +301,7 @@ def _with_sensors(
     """Each further sensor by the name that a detector sees, with a chain that was fitted with it and its weather."""
     if sensors is None:
         return []
-    T, F = study.fem.records_.temperatures, study.fem.records_.frequencies
-    known = column_names(T, "T")
+    T, F, known = study.fem.records_.temperatures, study.fem.records_.frequencies, sensors_of(study.fem)
     if not isinstance(sensors, pd.DataFrame) or not sensors.shape[1]:
         raise ValueError(f"sensors is {sensors!r:.200}; expected a frame with a column for each candidate")
     if not set(known) & set(present.columns):
@@ -346,14 +312,11 @@ def _with_sensors(
     check_same_rows(T, sensors, ("the temperatures of the training", "sensors"))
     found = []
     for name in sensors.columns:
-        values = as_floats(sensors[name])
-        if not isinstance(T, pd.DataFrame):
-            beside, seen = np.column_stack([T, values]), f"T{T.shape[1] + 1}"
-        elif name in known:
+        if name in known:
             raise ValueError(f"sensor {name!r} has the name of a measured temperature; expected another name")
-        else:
-            beside, seen = pd.concat([T, pd.Series(values, T.index, name=name)], axis=1), name
-        found.append((seen, clone(study.fem).fit(beside, F), beside))
+        beside = pd.DataFrame(as_floats(T), getattr(T, "index", None), known)
+        beside[name] = as_floats(sensors[name])
+        found.append((name, clone(study.fem).fit(beside, F), beside))
     return found
 
 

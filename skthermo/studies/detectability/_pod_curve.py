@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -138,19 +138,15 @@ class PODCurve:
         highest : float or ndarray
             Likewise; the two hold such a curve with the curve's confidence.
         """
-        places = real_array(severity, "severity")
-        if not self.replicates:
-            return np.full(places.shape, np.nan), np.full(places.shape, np.nan)
-        lowest, highest = np.quantile([one.predict(severity)[0] for one in self.replicates], self._tails, axis=0)
+        curves = [one.predict(severity)[0] for one in self.replicates] or [np.full(np.shape(severity), np.nan)]
+        lowest, highest = np.quantile(curves, self._tails, axis=0)
         return lowest, highest
 
     @property
     def a90_prediction_interval(self) -> tuple[float, float]:
         """Band in which a90 of a measured campaign should lie, with the curve's confidence; NaN without replicates."""
-        if not self.replicates:
-            return float("nan"), float("nan")
-        tails, found = self._tails, np.abs([one.a90 for one in self.replicates])
-        lowest, highest = np.sign(self.severities[0]) * np.quantile(found, tails)
+        found = np.abs([one.a90 for one in self.replicates] or [np.nan])
+        lowest, highest = np.sign(self.severities[0]) * np.quantile(found, self._tails)
         return float(lowest), float(highest)
 
     @property
@@ -281,10 +277,10 @@ def fitted_curve(
     fits = {}
     if magnitudes[k > 0].max() > magnitudes[k < n].min():
         fits = {is_log: most_likely(np.log(magnitudes) if is_log else magnitudes, k, n) for is_log in laws}
-    law = max(fits, key=lambda is_log: round(fits[is_log].log_likelihood, 6), default=None)  # both fit two severities
-    if law is None or fits[law].increase < 1e-6:
+    law = max(fits, key=lambda is_log: round(fits[is_log][2], 6), default=None)  # both fit two severities
+    if law is None or fits[law][0][1] < 1e-6:
         raise ValueError(f"{rates}, which does not increase; expected one that increases with the severity's magnitude")
-    curve = PODCurve(s, k, n, *fits[law].coefficients.tolist(), fits[law].covariance, law, **options)
+    curve = PODCurve(s, k, n, *fits[law][0].tolist(), fits[law][1], law, **options)
     if not curve.n_missed:
         return curve, []
     text = (
@@ -335,37 +331,26 @@ def bracket_of(severities: Array, pod: Array, level: float) -> tuple[float, floa
     return lowest, float(magnitudes[magnitudes > lowest].min(initial=np.inf)) if magnitudes[-1] > lowest else np.nan
 
 
-class LogisticFit(NamedTuple):
-    """Intercept and slope, their covariance, the ln likelihood, and the increase of the logit over the severities."""
-
-    coefficients: Array
-    covariance: Array
-    log_likelihood: float
-    increase: float
-
-
-def most_likely(x: Array, k: Array, n: Array) -> LogisticFit:
-    """The most likely intercept and slope, by Newton's method."""
+def most_likely(x: Array, k: Array, n: Array) -> tuple[Array, Array, float]:
+    """The most likely intercept and slope by Newton's method, their covariance, and the ln likelihood."""
     centre, width = np.average(x, weights=n), np.ptp(x)
     design = np.column_stack([np.ones_like(x), (x - centre) / width])
 
     def log_likelihood(b: Array) -> float:
         return float((k * log_expit(design @ b) + (n - k) * log_expit(-design @ b)).sum())
 
-    coefficients = np.zeros(2)
+    coefficients, step = np.zeros(2), np.zeros(2)
     for _ in range(100):
-        pod = expit(design @ coefficients)
-        information = (design.T * (n * pod * (1 - pod))) @ design
-        gradient = design.T @ (k - n * pod)
-        step, now = np.linalg.solve(information, gradient), log_likelihood(coefficients)
-        if gradient @ step < 1e-10:  # units of ln likelihood
-            break
-        while log_likelihood(coefficients + step) < now:
+        while log_likelihood(coefficients + step) < log_likelihood(coefficients):
             step = step / 2
         coefficients = coefficients + step
+        pod = expit(design @ coefficients)
+        information, gradient = (design.T * (n * pod * (1 - pod))) @ design, design.T @ (k - n * pod)
+        step = np.linalg.solve(information, gradient)
+        if gradient @ step < 1e-10:  # units of ln likelihood
+            break
     scaled = np.array([[1.0, -centre / width], [0.0, 1 / width]])
-    covariance = scaled @ np.linalg.inv(information) @ scaled.T
-    return LogisticFit(scaled @ coefficients, covariance, now, float(coefficients[1]))
+    return scaled @ coefficients, scaled @ np.linalg.inv(information) @ scaled.T, log_likelihood(coefficients)
 
 
 @dataclass(frozen=True, eq=False)

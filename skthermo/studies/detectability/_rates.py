@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import beta, t
+from scipy.stats import beta, mannwhitneyu, t
 
 from skthermo._core.arrays import Array
 from skthermo._core.frames import Table, correlation_times, row_times, time_of
@@ -22,15 +22,19 @@ FEW_ALARMS = 10  # minimum number of alarms, and of records without one, to esti
 
 @dataclass(frozen=True)
 class Rate:
-    """Rate of alarms over evaluated records (NaN without any), its bounds, and the number of independent records with
-    the same error."""
+    """Rate of alarms over evaluated records (NaN without any) and its bounds, the range of one more repeat, and counts,
+    among them the number of independent records with the same error."""
 
     rate: float
     ci_low: float
     ci_high: float
+    pi_low: float
+    pi_high: float
     n_alarms: int
     n_records: int
+    n_not_evaluated: int
     n_effective: float
+    n_repeats: int
 
 
 def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = False) -> Rate:
@@ -40,13 +44,19 @@ def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = Fa
     there is none. With ``whole_repeats``, all records of a repeat depend on each other.
     """
     n_alarms, n_records = int((decisions < 0).sum()), int(np.count_nonzero(~np.isnan(decisions)))
-    if not n_records:
-        return Rate(float("nan"), 0.0, 1.0, 0, 0, 0.0)
-    rate = n_alarms / n_records
-    if np.array_equal(decisions, decisions[[0] * len(decisions)], equal_nan=True):
-        decisions = decisions[:1]  # repeats without noise count once
-    n_effective = _n_effective(decisions, confidence, whole_repeats and len(decisions) > 1)
-    return Rate(rate, *clopper_pearson(rate * n_effective, n_effective, confidence), n_alarms, n_records, n_effective)
+    rate, n_effective = n_alarms / n_records if n_records else float("nan"), 0.0
+    if n_records:
+        once = 1 if is_constant(decisions) else len(decisions)  # repeats without noise count once
+        n_effective = _n_effective(decisions[:once], confidence, whole_repeats and once > 1)
+    bounds = clopper_pearson(np.nan_to_num(rate) * n_effective, n_effective, confidence)
+    ends = prediction_interval(decisions, confidence)
+    counts = n_alarms, n_records, decisions.size - n_records, n_effective, len(decisions)
+    return Rate(rate, *bounds, *ends, *counts)
+
+
+def is_constant(decisions: Array) -> bool:
+    """Whether all repeats have the same decisions."""
+    return np.array_equal(decisions, decisions[[0] * len(decisions)], equal_nan=True)
 
 
 def clopper_pearson(n_alarms: float, n_records: float, confidence: float) -> tuple[float, float]:
@@ -130,7 +140,6 @@ class EvaluatedRecords:
                 "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
                 "after the onset"
             )
-        pi_low, pi_high = prediction_interval(decisions, confidence)
         return {
             "detector": self.detector,
             "scenario": scenario.name,
@@ -138,16 +147,7 @@ class EvaluatedRecords:
             "severity": scenario.severity,
             "source": self.source,
             "measure": "PFA" if scenario.is_healthy else "POD",
-            "rate": rate.rate,
-            "ci_low": rate.ci_low,
-            "ci_high": rate.ci_high,
-            "pi_low": pi_low,
-            "pi_high": pi_high,
-            "n_alarms": rate.n_alarms,
-            "n_records": rate.n_records,
-            "n_not_evaluated": decisions.size - rate.n_records,
-            "n_effective": rate.n_effective,
-            "n_repeats": len(decisions),
+            **vars(rate),
             "time_to_detection": _mean_wait(decisions < 0, waits, self.rows),
             "error": "",
         }
@@ -216,18 +216,15 @@ class Contender:
 
     def has_noise(self) -> bool:
         """Whether any decision differs from repeat to repeat."""
-        return any(not np.array_equal(one, one[[0] * len(one)], equal_nan=True) for one in self.damaged)
+        return not all(map(is_constant, self.damaged))
 
     def auc(self) -> float:
         """Area under the ROC curve, the chance that a damaged record is further off than a healthy one; mean over the
         damaged scenarios."""
-        healthy = np.sort(self.healthy[~np.isnan(self.healthy)])
-        areas = []
-        for decisions in self.damaged:
-            evaluated = decisions[~np.isnan(decisions)]
-            below = (healthy.searchsorted(evaluated, "left") + healthy.searchsorted(evaluated, "right")) / 2
-            areas.append(1 - below.mean() / len(healthy))
-        return float(np.mean(areas))
+        healthy = self.healthy[~np.isnan(self.healthy)].astype(float)
+        evaluated = [one[~np.isnan(one)] for one in self.damaged]
+        chances = [mannwhitneyu(healthy, one, method="asymptotic").statistic / len(one) for one in evaluated]
+        return float(np.mean(chances)) / len(healthy)
 
     def _threshold(self, limit: float, left_out: int | None) -> float:
         """Decision below which as many of the calibration's records lie as the limit allows."""
@@ -263,7 +260,7 @@ def rank(
         {
             name: _rates(rows[rows["detector"] == name], limit)
             | {"pod_at_equal_pfa": contender.pod(limit), "auc": contender.auc()}
-            | _by_family(name, rows[rows["detector"] == name], families)
+            | _by_family({family: one for (detector, family), one in families.items() if detector == name})
             for name, contender in contenders.items()
         },
         orient="index",
@@ -312,16 +309,16 @@ def _rates(rows: pd.DataFrame, limit: float) -> dict[str, Any]:
     }
 
 
-def _by_family(name: str, rows: pd.DataFrame, families: Mapping[Any, Any]) -> dict[str, float]:
+def _by_family(families: Mapping[str, Any]) -> dict[str, float]:
     """Probability of detection of each family, and its smallest severity that is found reliably."""
     found = {}
-    for family, some in rows[(rows["measure"] == "POD") & rows["family"].notna()].groupby("family", sort=False):
-        rates = some[["rate", "ci_low", "ci_high"]].mean()
-        found |= dict(zip(with_bounds(f"pod {family}", " "), rates, strict=True))
+    for name, family in families.items():
+        rates = family.rows[["rate", "ci_low", "ci_high"]].mean()
+        found |= dict(zip(with_bounds(f"pod {name}", " "), rates, strict=True))
         try:
-            found[f"mdd {family}"] = families[name, family].on_grid(0.9)[0]
-        except (KeyError, ValueError):  # no severity, or one twice, or of both signs
-            found[f"mdd {family}"] = np.nan
+            found[f"mdd {name}"] = family.on_grid(0.9)[0]
+        except ValueError:  # no severity, or one twice, or of both signs
+            found[f"mdd {name}"] = np.nan
     return found
 
 

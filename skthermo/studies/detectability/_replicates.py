@@ -13,7 +13,7 @@ from scipy.special import expit, logit
 from scipy.stats import t
 
 from skthermo._core.arrays import Array, as_floats, positive_integer
-from skthermo._core.frames import DAY, DAY_NS, Table, column_names, frame_like, has_stamps, row_times
+from skthermo._core.frames import DAY, DAY_NS, Table, frame_like, has_stamps, row_times
 from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.text import listed
 from skthermo._core.warnings import collected
@@ -22,14 +22,7 @@ from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies._scenarios import checked_models
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, fitted_curve
 from skthermo.studies.detectability._rates import rates_by_scenario
-from skthermo.studies.detectability._simulation import (
-    LARGEST_SEED,
-    SIMULATED,
-    Candidate,
-    Decided,
-    Simulation,
-    clean_frequencies,
-)
+from skthermo.studies.detectability._simulation import Candidate, Decided, Simulation
 from skthermo.surrogate import DataInformedFEM, refitted, resampled
 from skthermo.updating import ModelUpdater
 
@@ -59,7 +52,7 @@ class Replicates:
         years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
         if positive_integer(number, "n_replicates") < 2:
             raise ValueError(f"n_replicates is {number}; expected at least 2, 10 or more for bands of 90 %")
-        seeds = np.random.RandomState(seed).randint(LARGEST_SEED, size=number + 1).tolist()
+        seeds = np.random.RandomState(seed).randint(np.iinfo(np.int32).max, size=number + 1).tolist()
         if models is not None:
             models = checked_models(fem, models)
             if "model" not in parts:
@@ -74,14 +67,13 @@ class Replicates:
         self, simulation: Simulation, candidates: Mapping[str, Candidate], n_jobs: int | None, verbose: int
     ) -> tuple[list[dict[Any, list[float]]], list[str]]:
         """Rates of alarms of every replicate as one part after the other varies, and the errors of those that fail."""
-        simulation = replace(simulation, clean={}, reference=None)
         jobs = (delayed(self._rates)(simulation, candidates, number) for number in range(len(self.seeds)))
         outcomes = run_jobs(jobs, len(self.seeds), unit="replicates", n_jobs=n_jobs, verbose=verbose)
         return [one for one in outcomes if isinstance(one, dict)], [one for one in outcomes if isinstance(one, str)]
 
     def _rates(self, simulation: Simulation, candidates: Mapping[str, Candidate], number: int) -> Any:
         random = np.random.RandomState(self.seeds[number])
-        weather, records, noise = random.randint(LARGEST_SEED, size=3).tolist()
+        weather, records, noise = random.randint(np.iinfo(np.int32).max, size=3).tolist()
         chain, T, measurement, rates = simulation.fem, self.years[0], simulation.measurement, {}
         with collected(drop_others=True), single_blas_thread():
             try:
@@ -97,8 +89,8 @@ class Replicates:
                     if part == "baseline":  # the training records determine the noise up to an error
                         errors = simulation.fem.recorder_.residuals.level_errors
                         measurement = replace(measurement, levels=np.exp(errors * random.standard_normal(len(errors))))
-                    clean = clean_frequencies(chain, simulation.scenarios, T, 1, first=number)
-                    here = replace(simulation, T=T, clean=clean, measurement=measurement)
+                    drawn = {"n_repeats": 1, "first": number, "reference": None}
+                    here = replace(simulation, T=T, chain=chain, measurement=measurement, **drawn)
                     found = Decided.by(candidates, here.records(0, [noise if self.with_noise else 0]))
                     if found.errors:
                         raise next(iter(found.errors.values()))
@@ -127,60 +119,40 @@ def drawn_models(
     ``deviation``; stiffnesses are known to a ``spread`` before."""
     mean = np.nanmean(as_floats(fem.records_.frequencies), axis=0)
     with collected(drop_others=True):
-        try:
-            updater = ModelUpdater(fem.model, bounds=0.6, prior=spread).fit(mean, frequency_std=deviation * mean)
-            return list(updater.sample_models(number, spread=spread, random_state=seed))
-        except (AttributeError, TypeError, ValueError) as error:
-            raise ValueError(
-                f"other models like {fem.model!r:.200} cannot be drawn from the training records ({error}); expected "
-                "models=[...], or uncertainty without 'model', such as ('noise', 'baseline', 'weather')"
-            ) from error
+        updater = ModelUpdater(fem.model, bounds=0.6, prior=spread).fit(mean, frequency_std=deviation * mean)
+        return list(updater.sample_models(number, spread=spread, random_state=seed))
 
 
 def resampled_days(T: Table, random: np.random.RandomState, *, most: int = 15) -> Table:
     """The temperatures of other days of the season for each row, at the same time of day: whole weeks are taken up to
     ``most`` days earlier or later. Rows keep their stamps; those without stamps count as a year."""
-    if len(T) < 2:
-        return T
     days = row_times(T) / DAY_NS if has_stamps(T) else np.arange(len(T)) * (364 / len(T))
-    order = np.argsort(days, kind="stable")
-    days = days[order]
     week = (days // 7).astype(int)
     shift = random.randint(-most, most + 1, week[-1] + 1)[week]
     outside = (days + shift < 0) | (days + shift > days[-1])
     wanted = np.where(outside, days - shift, days + shift)
-    near = np.rint(np.interp(wanted, days, np.arange(len(days)))).astype(int)
+    rows = np.arange(len(days))
+    near = np.rint(np.interp(wanted, days, rows)).astype(int)
     is_there = np.abs(days[near] - wanted) <= np.median(np.diff(days)) / 2 + 1e-9
-    taken = np.empty(len(T), dtype=int)
-    taken[order] = order[np.where(is_there, near, np.arange(len(days)))]
-    return frame_like(T, as_floats(T)[taken])
+    return frame_like(T, as_floats(T)[np.where(is_there, near, rows)])
 
 
 def other_years(T: Sequence[Table]) -> list[Table]:
-    """Every year of weather on the stamps of the first: row by row, or matched by the time of the year."""
+    """Every year of weather on the rows of the first, by the time of the year where it has stamps."""
     first, years = T[0], [T[0]]
     for number, other in enumerate(T[1:], start=1):
-        if np.ndim(other) != 2 or not len(other) or np.isnan(as_floats(other)).all():
-            raise ValueError(f"year {number} of T is {other!r:.200}; expected a table of temperatures, as the first")
-        names = [column_names(table, "T") for table in (first, other)]
-        if names[0] != names[1]:
-            raise ValueError(f"year {number} of T has the sensors {names[1]}; expected those of the first, {names[0]}")
-        if len(first) == len(other):
-            years.append(frame_like(first, as_floats(other)))
-            continue
-        if not (has_stamps(first) and has_stamps(other)):
-            raise ValueError(
-                f"year {number} of T has {len(other)} rows, the first {len(first)}; expected the same number, or stamps"
-            )
-        whole_years = 365 * DAY * round((first.index[0] - other.index[0]) / (365 * DAY))
-        moved = other.set_axis(other.index + whole_years).sort_index()
-        near = moved.index.get_indexer(first.index, method="nearest", tolerance=DAY)
-        if (near < 0).any():
-            raise ValueError(
-                f"year {number} of T has no record within a day of the season of {(near < 0).sum()} of {len(first)} "
-                "rows of the first; expected records of the same season"
-            )
-        years.append(frame_like(first, as_floats(moved)[near]))
+        year = other
+        if has_stamps(first) and has_stamps(other):
+            whole_years = 365 * DAY * round((first.index[0] - other.index[0]) / (365 * DAY))
+            moved = other.set_axis(other.index + whole_years).sort_index()
+            near = moved.index.get_indexer(first.index, method="nearest", tolerance=DAY)
+            if (near < 0).any():
+                raise ValueError(
+                    f"year {number} of T has no record within a day of the season of {(near < 0).sum()} of "
+                    f"{len(first)} rows of the first; expected records of the same season"
+                )
+            year = moved.iloc[near]
+        years.append(frame_like(first, as_floats(year), getattr(year, "columns", None)))
     return years
 
 
@@ -199,7 +171,7 @@ class ReplicateRates:
         cls, found: Sequence[Mapping[Any, Any]], results: pd.DataFrame, replicates: Replicates
     ) -> ReplicateRates:
         """The rates of all replicates beside the results of the study."""
-        own = results[(results["source"] == SIMULATED) & (results["error"] == "")]
+        own = results[(results["source"] == "simulated") & (results["error"] == "")]
         own = own.set_index(["detector", "scenario"])
         rates = {key: np.array([one[key] for one in found]) for key in own.index}
         return cls(rates, own, replicates.parts, replicates.with_noise)
@@ -236,7 +208,7 @@ class ReplicateRates:
     def banded(self, results: pd.DataFrame, confidence: float) -> pd.DataFrame:
         """The table of a study, whose simulated rows have the bands of the replicates."""
         results = results.copy()
-        for row in results.index[(results["source"] == SIMULATED) & (results["error"] == "")]:
+        for row in results.index[(results["source"] == "simulated") & (results["error"] == "")]:
             key = results.at[row, "detector"], results.at[row, "scenario"]
             results.loc[row, ["pi_low", "pi_high"]] = self.prediction_interval(key, confidence)
         return results
@@ -269,7 +241,7 @@ class ReplicateRates:
     def _campaigns(self, family: FamilyRates) -> Array:
         """Rates of single campaigns, (n_campaigns, n_severities); none of measured records."""
         keys = list(zip(family.tested["detector"], family.tested["scenario"], strict=True))
-        return np.array([self.campaigns(key) for key in keys]).T if family.source == SIMULATED else np.empty(0)
+        return np.array([self.campaigns(key) for key in keys]).T if family.source == "simulated" else np.empty(0)
 
     def table(self) -> pd.DataFrame:
         """Standard deviation of the rate due to each part, and its share of the variance, by detector and scenario.
@@ -300,7 +272,7 @@ def in_sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: st
         f"{confidence:.0%} prediction intervals include the uncertainty of {listed([PARTS[name] for name in names])}. "
         "They hold in weather like that of the training records: colder or warmer days can raise more false alarms."
     ]
-    rows = results[(results["detector"] == detector) & (results["source"] == SIMULATED)].set_index("scenario")
+    rows = results[(results["detector"] == detector) & (results["source"] == "simulated")].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"]
     if len(width):
         widest = rows.loc[width.idxmax()]

@@ -11,12 +11,11 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
-from joblib import Memory
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, clone
 
 from skthermo._core.arrays import Array, as_floats
-from skthermo._core.estimators import last_step, seed_parts
+from skthermo._core.estimators import last_step, seed_parts, seeded
 from skthermo._core.frames import Table, check_same_rows, column_names
 from skthermo._core.memory import remembered
 from skthermo._core.parallel import single_blas_thread
@@ -25,10 +24,7 @@ from skthermo.exceptions import SkthermoWarning
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.surrogate import DataInformedFEM
 
-SIMULATED, REFERENCE = "simulated", "reference"
-LARGEST_SEED = np.iinfo(np.int32).max
-
-Key: TypeAlias = tuple[str, ...]
+Key: TypeAlias = tuple[str, str | None, str]
 
 
 def sensors_of(fem: DataInformedFEM) -> list[Hashable]:
@@ -63,6 +59,12 @@ def named(fem: DataInformedFEM, records: Table, what: str) -> pd.DataFrame:
     return pd.DataFrame(as_floats(records), columns=columns[n_columns])
 
 
+def baseline_table(fem: DataInformedFEM, baseline: Table | None) -> pd.DataFrame:
+    """What detectors learn, with the chain's names; by default the chain's records."""
+    T, F = fem.records_.temperatures, fem.records_.frequencies
+    return side_by_side(fem, T, F) if baseline is None else named(fem, baseline, "the baseline")
+
+
 def has_targets(detector: BaseEstimator) -> bool:
     """Whether a part of a detector takes some of its columns for targets, as `TemperatureCompensator` does."""
     return any(name.rsplit("__", 1)[-1] == "targets" for name in detector.get_params())
@@ -88,27 +90,21 @@ class Candidate:
 
     @classmethod
     def learned(
-        cls,
-        fem: DataInformedFEM,
-        baseline: Table | None,
-        random_state: np.random.RandomState | None,
-        memory: str | Memory | None,
-        detector: BaseEstimator,
+        cls, fem: DataInformedFEM, detector: BaseEstimator, baseline: Table | None, random_state: Any, memory: Any
     ) -> Candidate:
         """A clone, fitted to the baseline or the chain's records; only a detector with targets sees temperatures.
 
         The random state, of which a copy is used, seeds parts without a seed of their own.
         """
-        T, F = fem.records_.temperatures, fem.records_.frequencies
-        table = side_by_side(fem, T, F) if baseline is None else named(fem, baseline, "the baseline")
+        table, records = baseline_table(fem, baseline), fem.records_
         is_sensor, sees_sensors = table.columns.isin(sensors_of(fem)), has_targets(detector)
         if sees_sensors and not is_sensor.any():
             raise ValueError("the detector compensates for temperature, and the baseline has none; expected both")
-        given = (T, F) if baseline is None else (baseline,)
+        given = (records.temperatures, records.frequencies) if baseline is None else (baseline,)
         is_frame = any(isinstance(one, pd.DataFrame) for one in given)
         columns = list(table.columns[sees_sensors | ~is_sensor])
         unfitted = clone(detector)
-        seed_parts(unfitted, deepcopy(random_state))
+        seed_parts(unfitted, deepcopy(seeded(random_state)))
         candidate = cls(unfitted, columns, len(table), is_frame)
         return cls(remembered(memory, fitted_to, unfitted, candidate.seen(table)), columns, len(table), is_frame)
 
@@ -144,17 +140,16 @@ def fitted_to(detector: BaseEstimator, table: Table) -> BaseEstimator:
 @dataclass(frozen=True, eq=False)
 class Decided:
     """Decisions of detectors by detector, scenario and source: (n_records,) of one repeat, (n_repeats, n_records) of
-    several.
+    several. The scenario is None for healthy records with noise of other seeds, by which thresholds are moved.
 
-    ``calibration`` are decisions on healthy records with noise of other seeds, by detector and source, ``indices``
-    damage indices of the first repeat, ``errors`` those of detectors that failed, and ``findings`` what others doubt.
+    ``indices`` are damage indices of the first repeat, ``errors`` those of detectors that failed, and ``findings`` what
+    others doubt.
     """
 
     decisions: Mapping[Key, Array]
     errors: Mapping[str, Exception]
     findings: Sequence[SkthermoWarning] = ()
     indices: Mapping[Key, pd.Series] = field(default_factory=dict)
-    calibration: Mapping[Key, Array] = field(default_factory=dict)
 
     @classmethod
     def by(cls, candidates: Mapping[str, Candidate], records: Iterable[Records], *, is_first: bool = False) -> Decided:
@@ -185,13 +180,9 @@ class Decided:
     def together(cls, repeats: Sequence[Decided]) -> Decided:
         """Several repeats, one after the other; findings and measured records are those of the first."""
         errors = {name: error for one in reversed(repeats) for name, error in one.errors.items()}
-        joined = {}
-        for part in ("decisions", "calibration"):
-            each = [getattr(one, part) for one in repeats]
-            keys = [key for key in each[0] if key[0] not in errors]
-            joined[part] = {key: np.array([one[key] for one in each if key in one]) for key in keys}
-        indices = {key: index for key, index in repeats[0].indices.items() if key[0] not in errors}
-        return cls(joined["decisions"], errors, repeats[0].findings, indices, joined["calibration"])
+        keys = [key for key in repeats[0].decisions if key[0] not in errors]
+        joined = {key: np.array([one.decisions[key] for one in repeats if key in one.decisions]) for key in keys}
+        return cls(joined, errors, repeats[0].findings, repeats[0].indices)
 
 
 def by_detector(findings: Iterable[SkthermoWarning], name: str, detectors: Mapping[str, Any]) -> list[SkthermoWarning]:
@@ -228,15 +219,31 @@ class Measurement:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """One weather, and the frequencies without noise, (n_records, n_modes), of each draw of every scenario;
-    ``reference`` gives true frequencies for a scenario and a seed."""
+    """One weather, and the frequencies without noise, (n_records, n_modes), of each draw of every scenario that repeats
+    from the ``first`` on take; those of another ``chain`` where one is given. ``reference`` gives true frequencies for
+    a scenario and a seed."""
 
     fem: DataInformedFEM
     scenarios: Sequence[BaseScenario]
     T: Table
-    clean: Mapping[str, Sequence[Array]]
     measurement: Measurement
+    n_repeats: int = 1
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None = None
+    chain: DataInformedFEM | None = None
+    first: int = 0
+    clean: Mapping[str, Sequence[Array]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        chain, clean = self.fem if self.chain is None else self.chain, {}
+        weather, model = chain.weather(self.T), chain.thermal_
+        for one in self.scenarios:
+            numbers = np.arange(self.first, self.first + min(one.n_draws, self.n_repeats)) % one.n_draws
+            changes = [one.changes(self.T, int(number)) for number in numbers]
+            if len(changes) > 1 and hasattr(chain.model, "with_damage_parameters"):
+                clean[one.name] = model.with_each(weather, [change["damage"] for change in changes], one.kind)
+            else:
+                clean[one.name] = [model.simulated(weather, **change) for change in changes]
+        object.__setattr__(self, "clean", clean)
 
     @cached_property
     def weather(self) -> Any:
@@ -254,7 +261,7 @@ class Simulation:
         for scenario in self.scenarios if scenarios is None else scenarios:
             draws = self.clean[scenario.name]
             frequencies = draws[repeat % len(draws)] * (1 + noise)
-            yield Records(scenario, SIMULATED, side_by_side(self.fem, T, frequencies), T)
+            yield Records(scenario, "simulated", side_by_side(self.fem, T, frequencies), T)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 if np.shape(values)[0] != len(T):
@@ -270,14 +277,10 @@ class Simulation:
         table = named(self.fem, values, f"the reference of scenario {scenario.name!r}")
         if not isinstance(values, pd.DataFrame) and isinstance(T, pd.DataFrame) and len(table) == len(T):
             table = table.set_axis(T.index)
-        return Records(scenario, REFERENCE, table, T)
+        return Records(scenario, "reference", table, T)
 
     def repeat(
-        self,
-        candidates: Mapping[str, Candidate],
-        number: int,
-        seeds: Sequence[int],
-        given: Mapping[str, Table] | None = None,
+        self, candidates: Mapping[str, Candidate], number: int, seeds: Sequence[int], given: Any = None
     ) -> Decided:
         """Decisions on one repeat of all scenarios, on those that are given, and on other healthy records, by which
         thresholds are moved."""
@@ -287,23 +290,7 @@ class Simulation:
             found = Decided.by(candidates, records, is_first=given is not None)
             healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
             left = {name: one for name, one in candidates.items() if name not in found.errors}
-            others = np.random.RandomState(seeds).randint(LARGEST_SEED, size=2)
+            others = np.random.RandomState(seeds).randint(np.iinfo(np.int32).max, size=2)
             again = Decided.by(left, self.records(number, others, healthy) if healthy else [])
-        calibration = {(name, source): decisions for (name, _, source), decisions in again.decisions.items()}
-        return Decided(found.decisions, {**found.errors, **again.errors}, found.findings, found.indices, calibration)
-
-
-def clean_frequencies(
-    fem: DataInformedFEM, scenarios: Sequence[BaseScenario], T: Table, n_repeats: int, first: int = 0
-) -> dict[str, list[Array]]:
-    """Frequencies without noise by scenario, for each of the draws that the repeats take, from the first one on."""
-    weather, clean = fem.weather(T), {}
-    for scenario in scenarios:
-        numbers = np.arange(first, first + min(scenario.n_draws, n_repeats)) % scenario.n_draws
-        changes = [scenario.changes(T, int(number)) for number in numbers]
-        if len(changes) > 1 and hasattr(fem.model, "with_damage_parameters"):
-            draws = [change["damage"] for change in changes]
-            clean[scenario.name] = fem.thermal_.with_each(weather, draws, scenario.kind)
-        else:
-            clean[scenario.name] = [fem.thermal_.simulated(weather, **change) for change in changes]
-    return clean
+        moving = {(name, None, source): decisions for (name, _, source), decisions in again.decisions.items()}
+        return Decided(found.decisions | moving, {**found.errors, **again.errors}, found.findings, found.indices)

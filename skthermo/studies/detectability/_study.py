@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import NotFittedError
 
-from skthermo._core.arrays import Array, as_random_state, check_jobs, check_probability, is_auto, positive_integer
-from skthermo._core.estimators import Stages, last_step, seeded
+from skthermo._core.arrays import as_random_state, check_jobs, check_probability, is_auto, mapping_of, positive_integer
+from skthermo._core.estimators import Stages, last_step
 from skthermo._core.frames import Table, has_stamps, usual_step
 from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.text import duration_text
@@ -25,17 +25,7 @@ from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenario
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._rates import EvaluatedRecords, in_words, rank
 from skthermo.studies.detectability._replicates import ReplicateRates, Replicates, in_sentences
-from skthermo.studies.detectability._simulation import (
-    LARGEST_SEED,
-    REFERENCE,
-    SIMULATED,
-    Candidate,
-    Decided,
-    Measurement,
-    Simulation,
-    by_detector,
-    clean_frequencies,
-)
+from skthermo.studies.detectability._simulation import Candidate, Decided, Measurement, Simulation, by_detector
 from skthermo.surrogate import DataInformedFEM
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
@@ -339,12 +329,13 @@ class DetectabilityStudy(BaseEstimator):
             Detectors are named where there are several.
         """
         check_chain(self.fem)
-        detectors, scenarios = self._checked_detectors(), self._checked_scenarios(reference)
+        detectors, scenarios = self._checked_detectors(), read_scenarios(self.scenarios, self.fem.model)
+        function, given = (reference, {}) if callable(reference) else (None, checked_reference(reference, scenarios))
         most_repeats = 20 if is_auto(self.n_repeats) else positive_integer(self.n_repeats, "n_repeats")
         tol = check_probability(self.tol, "tol")
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
-        seeds = as_random_state(self.random_state).randint(LARGEST_SEED, size=(most_repeats, 2))
+        seeds = as_random_state(self.random_state).randint(np.iinfo(np.int32).max, size=(most_repeats, 2))
         replicates = Replicates.asked(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
         T, stages = replicates.years[0], Stages(self, 4 + bool(replicates.parts))
         with collected() as findings, single_blas_thread():
@@ -352,15 +343,14 @@ class DetectabilityStudy(BaseEstimator):
                 candidates, errors = self._learned(detectors, baseline, findings)
             with stages.stage("frequencies"):
                 findings += self.fem.thermal_.doubts(self.fem.weather(T))
-                clean = clean_frequencies(self.fem, scenarios, T, most_repeats)
-            measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
-            function, given = (reference, {}) if callable(reference) else (None, reference or {})
-            simulation = Simulation(self.fem, scenarios, T, clean, measurement, function)
+                measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
+                simulation = Simulation(self.fem, scenarios, T, measurement, most_repeats, function)
             with stages.stage("first repeat"):
                 first = simulation.repeat(candidates, 0, seeds[0], given)
                 findings += first.findings
             with stages.stage("other repeats"):
-                decided = self._repeats(simulation, candidates, first, seeds, bool(replicates.parts), tol, confidence)
+                grows = tol if is_auto(self.n_repeats) and replicates.parts else None
+                decided = self._repeats(simulation, candidates, first, seeds, grows, confidence)
         errors |= decided.errors
         rows, records = {}, {name: evaluated(decided, name, scenarios) for name in candidates if name not in errors}
         for name, some in records.items():
@@ -384,10 +374,11 @@ class DetectabilityStudy(BaseEstimator):
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
-        self.decisions_, self.calibration_, self.indices_ = (
-            {key: one for key, one in part.items() if key[0] in left}
-            for part in (decided.decisions, decided.calibration, decided.indices)
+        kept, self.indices_ = (
+            {key: one for key, one in part.items() if key[0] in left} for part in (decided.decisions, decided.indices)
         )
+        self.decisions_ = {key: one for key, one in kept.items() if key[1] is not None}
+        self.calibration_ = {(name, source): one for (name, of, source), one in kept.items() if of is None}
         self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()
         self.warnings_ = list(map(str, one_of_each_kind(findings)))
         warn_each(findings)
@@ -397,11 +388,11 @@ class DetectabilityStudy(BaseEstimator):
         self, detectors: Mapping[str, Any], baseline: Any, findings: list[SkthermoWarning]
     ) -> tuple[dict[str, Candidate], dict[str, Exception]]:
         """Fitted detectors, and the errors of the others."""
-        candidates, errors, random_state = {}, {}, seeded(self.random_state)
+        candidates, errors, options = {}, {}, (baseline, self.random_state, self.memory)
         for name, detector in detectors.items():
             with collected() as doubts:
                 try:
-                    candidates[name] = Candidate.learned(self.fem, baseline, random_state, self.memory, detector)
+                    candidates[name] = Candidate.learned(self.fem, detector, *options)
                 except Exception as error:
                     errors[name] = error
             findings += by_detector(doubts, name, detectors)
@@ -410,17 +401,15 @@ class DetectabilityStudy(BaseEstimator):
     def _repeats(
         self,
         simulation: Simulation,
-        candidates: Mapping[str, Candidate],
+        ready: dict[str, Any],
         first: Decided,
         seeds: Any,
-        has_replicates: bool,
-        tol: float,
+        tol: Any,
         confidence: float,
     ) -> Decided:
-        """All repeats: as many as asked for or, for "auto", as the bounds need; of the noise alone, whose bands are
-        those of the repeats, the most."""
-        left = still_evaluating({k: v for k, v in candidates.items() if k not in first.errors}, first.errors)
-        found, grows = [first], is_auto(self.n_repeats) and has_replicates
+        """All repeats: one for each of the seeds or, with ``tol``, as many of them as the bounds need."""
+        left = still_evaluating({k: v for k, v in ready.items() if k not in first.errors}, first.errors)
+        found = [first]
 
         def add(n_repeats: int) -> Decided:
             numbers = range(len(found), n_repeats)
@@ -429,15 +418,15 @@ class DetectabilityStudy(BaseEstimator):
             found.extend(run_jobs(jobs, len(numbers), unit="repeats", **options))
             return Decided.together(found)
 
-        decided = add(3 if grows else len(seeds))
-        if not grows:
+        decided = add(len(seeds) if tol is None else 3)
+        if tol is None:
             return decided
         rows = [
             one.summary(confidence)
             for name in left
             if name not in decided.errors
             for one in evaluated(decided, name, simulation.scenarios)
-            if one.source == SIMULATED and np.isfinite(one.decisions).any()
+            if one.source == "simulated" and np.isfinite(one.decisions).any()
         ]
         widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
         return add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
@@ -702,7 +691,7 @@ class DetectabilityStudy(BaseEstimator):
 
     def labelled_scores(
         self, detector: str | None = None, source: str = "simulated", scenarios: Sequence[str] | None = None
-    ) -> tuple[NDArray[np.bool_], Array]:
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
         """Which records are damaged, and how suspicious a detector finds them, as scikit-learn's curves take them.
 
         Parameters
@@ -732,7 +721,7 @@ class DetectabilityStudy(BaseEstimator):
         *study.labelled_scores("raw"), name="raw")`` of scikit-learn.
         """
         name = self.detector_name(detector)
-        parts: dict[bool, list[Array]] = {False: [], True: []}
+        parts: dict[bool, list[Any]] = {False: [], True: []}
         for one in self._records(source):
             is_healthy = one.scenario.is_healthy
             if one.detector == name and (is_healthy or scenarios is None or one.scenario.name in scenarios):
@@ -768,7 +757,7 @@ class DetectabilityStudy(BaseEstimator):
         """
         ranking = self.ranking(max_false_alarms, source)
         lines = [in_words(ranking, max_false_alarms, self.confidence_)]
-        if self.replicates_ is not None and source == SIMULATED:
+        if self.replicates_ is not None and source == "simulated":
             lines.append(self.uncertainty_summary(ranking.index[0]))
         return "\n".join(lines)
 
@@ -833,19 +822,6 @@ class DetectabilityStudy(BaseEstimator):
             check_detector(detector, f"detector {name!r}")
         return dict(self.detectors)
 
-    def _checked_scenarios(self, reference: Any) -> list[BaseScenario]:
-        """The scenarios; an error if they or the names of the reference are wrong."""
-        scenarios = read_scenarios(self.scenarios, self.fem.model)
-        names = [scenario.name for scenario in scenarios]
-        if reference is not None and not callable(reference) and not isinstance(reference, Mapping):
-            raise ValueError(
-                f"reference is {reference!r:.200}; expected {{name of scenario: frequencies}} or a function"
-            )
-        unknown = [name for name in reference if name not in names] if isinstance(reference, Mapping) else []
-        if unknown:
-            raise ValueError(f"reference has the scenarios {unknown}; expected some of {names}")
-        return scenarios
-
     def __sklearn_clone__(self) -> DetectabilityStudy:
         many = isinstance(self.detectors, Mapping)
         twins = {k: clone(one) for k, one in self.detectors.items()} if many else clone(self.detectors)
@@ -859,6 +835,16 @@ def check_detector(detector: BaseEstimator, what: str) -> None:
     if isinstance(detector, type) or lacking:
         without = f", without {lacking}" if lacking else ", a class"
         raise ValueError(f"{what} is {detector!r:.200}{without}; expected an outlier detector")
+
+
+def checked_reference(reference: Any, scenarios: Sequence[BaseScenario]) -> Mapping[str, Any]:
+    """Measured frequencies by the name of the scenario."""
+    expected, names = "{name of scenario: frequencies} or a function", [scenario.name for scenario in scenarios]
+    given = mapping_of({} if reference is None else reference, "reference", expected)
+    unknown = [name for name in given if name not in names]
+    if unknown:
+        raise ValueError(f"reference has the scenarios {unknown}; expected some of {names}")
+    return given
 
 
 def still_evaluating(left: dict[str, Candidate], errors: Mapping[str, Exception]) -> dict[str, Candidate]:
@@ -887,7 +873,7 @@ def evaluated(decided: Decided, detector: str, scenarios: Sequence[BaseScenario]
     return [
         EvaluatedRecords(detector, scenario, source, decided.indices[key], decided.decisions[key])
         for scenario in scenarios
-        for source in (SIMULATED, REFERENCE)
+        for source in ("simulated", "reference")
         if (key := (detector, scenario.name, source)) in decided.decisions
     ]
 
@@ -905,7 +891,7 @@ def failures(failed: Sequence[str], n_replicates: int) -> list[ModelWarning]:
 
 def many_false_alarms(results: pd.DataFrame) -> list[ResultWarning]:
     """A detector that takes most simulated records of the healthy structure for damaged is a finding."""
-    many = results[(results["measure"] == "PFA") & (results["source"] == SIMULATED) & (results["ci_low"] > 0.5)]
+    many = results[(results["measure"] == "PFA") & (results["source"] == "simulated") & (results["ci_low"] > 0.5)]
     if not len(many):
         return []
     by = f" (detectors {many['detector'].unique().tolist()})" if results["detector"].nunique() > 1 else ""

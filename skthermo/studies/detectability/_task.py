@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -13,16 +13,7 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 from sklearn.utils import Bunch
 
-from skthermo._core.arrays import (
-    Array,
-    as_columns,
-    as_floats,
-    as_random_state,
-    check_names,
-    check_probability,
-    check_size,
-    positive_integer,
-)
+from skthermo._core.arrays import as_floats, as_random_state, check_names, check_probability, positive_integer
 from skthermo._core.estimators import BaseSearchCV, _num_samples, last_step
 from skthermo._core.frames import Table, has_stamps, row_times, time_of
 from skthermo._core.parallel import single_blas_thread
@@ -31,16 +22,7 @@ from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.preprocessing.checks import set_aside
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._rates import Rate, rate_of
-from skthermo.studies.detectability._simulation import (
-    LARGEST_SEED,
-    Measurement,
-    Simulation,
-    clean_frequencies,
-    has_targets,
-    named,
-    sensors_of,
-    side_by_side,
-)
+from skthermo.studies.detectability._simulation import Measurement, Simulation, baseline_table, has_targets, sensors_of
 from skthermo.studies.detectability._study import check_detector
 from skthermo.surrogate import DataInformedFEM
 
@@ -53,7 +35,7 @@ class Decisions:
     Negative decisions are alarms, NaN where a record is not evaluated; labels are +1 (healthy) and -1 (damaged).
     """
 
-    values: Array
+    values: NDArray[np.float64]
     labels: NDArray[np.intp]
     scenario: NDArray[np.intp]
     repeat: NDArray[np.intp]
@@ -69,8 +51,15 @@ class Decisions:
 
     def found(self, limit: float) -> float:
         """Share of the damaged records in alarm, mean over scenarios; the threshold is raised where the limit asks."""
-        raised = self.raised(limit)
-        return float(np.mean([np.mean(self.values[rows] < raised) for rows in self.damaged()]))
+        return float(np.mean([pod.rate for pod in self.pods(limit)]))
+
+    def pods(self, limit: float, confidence: float = 0.95, drawn: Collection[int] = ()) -> list[Rate]:
+        """That share with bounds by scenario; what is not evaluated is not found. Repeats of those ``drawn`` differ."""
+        missed = np.where(np.isnan(self.values), 0.0, self.values - self.raised(limit))
+        damaged = {
+            one: (self.labels == -1) & (self.scenario == one) for one in np.unique(self.scenario[self.labels == -1])
+        }
+        return [rate_of(self.by_repeat(missed, rows), confidence, one in drawn) for one, rows in damaged.items()]
 
     def raised(self, limit: float) -> float:
         """Decision below which there is an alarm: 0, or less where more healthy records than the limit lie below."""
@@ -86,17 +75,11 @@ class Decisions:
         """Share of the evaluated healthy records beyond the detector's own threshold, with bounds."""
         return rate_of(self.by_repeat(self.values, self.healthy()), confidence)
 
-    def healthy(self) -> NDArray[np.intp]:
+    def healthy(self) -> NDArray[np.bool_]:
         """Healthy records of the scenario that has most; those of others are the same records with the same noise."""
-        first = np.bincount(self.scenario[self.labels == 1]).argmax()
-        return np.flatnonzero((self.labels == 1) & (self.scenario == first))
+        return (self.labels == 1) & (self.scenario == np.bincount(self.scenario[self.labels == 1]).argmax())
 
-    def damaged(self) -> list[NDArray[np.intp]]:
-        """Damaged records of each scenario that has some."""
-        damaged = np.unique(self.scenario[self.labels == -1])
-        return [np.flatnonzero((self.labels == -1) & (self.scenario == one)) for one in damaged]
-
-    def by_repeat(self, values: Array, rows: NDArray[np.intp]) -> Array:
+    def by_repeat(self, values: NDArray[np.float64], rows: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Values of some records, (n_repeats, n_records); in one row where repeats differ in number."""
         counts = np.unique(self.repeat[rows], return_counts=True)[1]
         return values[rows].reshape(len(counts) if np.ptp(counts) == 0 else 1, -1)
@@ -162,9 +145,6 @@ class TaskScorer:
                 f"X has the temperatures {seen}, and the detector {estimator!r:.200} would take them for "
                 "frequencies; expected a task with columns=modes, or a pipeline with a TemperatureCompensator"
             )
-
-
-SHORTEST_GAP = 30.0  # days between two states, where whole years do not fit into the stamps that pandas knows
 
 
 class DetectionTask(Bunch):
@@ -252,9 +232,7 @@ class DetectionTask(Bunch):
         if isinstance(detector, BaseSearchCV):
             if not hasattr(detector, "best_params_"):
                 raise ValueError(f"{detector!r:.200} has no best_params_; expected a search that is fitted")
-            if hasattr(detector, "best_estimator_") and not hasattr(
-                last_step(detector.best_estimator_), "damage_index"
-            ):
+            if hasattr(detector, "best_estimator_") and not hasattr(last_step(detector), "damage_index"):
                 text = (
                     "the search has fitted best_estimator_ to all records of the task, damaged ones among them, since "
                     "a detector of another library ignores their labels. It takes such damage for healthy: do not use "
@@ -319,8 +297,7 @@ class DetectionTask(Bunch):
         if not named:
             raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
         seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
-        limit = self.scoring.max_false_alarms
-        fresh, findings = _task(self.fem, T, self.scenarios, self.baseline, self.measurement, limit, 1, seeds)
+        fresh, findings = self._simulated(T, self.scoring.max_false_alarms, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
             text = "the weather is that of the task: the optimism is that of the noise alone. Give that of another year"
             findings.append(WeatherWarning(text, "other-weather"))
@@ -335,17 +312,40 @@ class DetectionTask(Bunch):
         table.insert(4, "optimism", table["tuned"] - table["fresh"])
         return table
 
+    def _simulated(
+        self, T: Table, limit: float, n_splits: int, seeds: Sequence[int]
+    ) -> tuple[DetectionTask, list[SkthermoWarning]]:
+        """A task with its records, with the noise of some seeds, and what is doubtful about its weather."""
+        baseline, labels = self.baseline, _labels(self.scenarios, T)
+        n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
+        index = _moved(T, baseline, n_repeats * n_scenarios)
+        with collected() as findings, single_blas_thread():
+            findings += self.fem.thermal_.doubts(self.fem.weather(T))
+            simulation = Simulation(self.fem, self.scenarios, T, self.measurement, n_repeats)
+            tables = [
+                one.table[list(baseline)].to_numpy()
+                for repeat, seed in enumerate(seeds)
+                for one in simulation.records(repeat, [seed])
+            ]
+        X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)])
+        X = X.rename_axis(baseline.index.name)
+        y = pd.Series(np.r_[np.ones(n_baseline, dtype=int), np.tile(labels.ravel(), n_repeats)], X.index, name="y")
+        repeat, scenario = np.divmod(np.repeat(np.arange(len(tables)), n_records), n_scenarios)
+        before = np.full(n_baseline, -1)
+        names = pd.Categorical.from_codes(np.r_[before, scenario], [one.name for one in self.scenarios])
+        states = pd.DataFrame({"scenario": names, "repeat": np.r_[before, repeat]}, X.index)
+        groups = np.array_split(np.arange(n_repeats), n_splits)
+        cv = [(np.arange(n_baseline), n_baseline + np.flatnonzero(np.isin(repeat, group))) for group in groups]
+        scoring = TaskScorer(y[n_baseline:], repeat * n_scenarios + scenario, n_scenarios, sensors_of(self.fem), limit)
+        simulated = {"X": X, "y": y, "cv": cv, "scoring": scoring, "states": states, "T": T, "seeds": seeds}
+        return DetectionTask(**{**self, **simulated}), findings
+
     def _rates(self, detector: BaseEstimator, confidence: float) -> dict[str, Any]:
         """Score and false alarms of a fitted detector on all simulated records, with bounds."""
         limit = self.scoring.max_false_alarms
         found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
-        drawn = [scenario.n_draws > 1 for scenario in self.scenarios]
-        missed = np.where(np.isnan(found.values), 0.0, found.values - found.raised(limit))  # not evaluated is not found
-        pods = [
-            rate_of(found.by_repeat(missed, rows), confidence, drawn[found.scenario[rows[0]]])
-            for rows in found.damaged()
-        ]
-        alarms, worth = found.false_alarms(confidence), found.worth(limit)
+        drawn = {number for number, scenario in enumerate(self.scenarios) if scenario.n_draws > 1}
+        pods, alarms, worth = found.pods(limit, confidence, drawn), found.false_alarms(confidence), found.worth(limit)
         return {
             "fresh": found.score(limit),
             "fresh_ci_low": worth * float(np.mean([pod.ci_low for pod in pods])),
@@ -469,70 +469,23 @@ def detection_task(
     n_splits = positive_integer(n_splits, "n_splits")
     if n_splits > len(seeds):
         raise ValueError(f"n_splits is {n_splits} for {len(seeds)} repeats; expected at most as many splits as repeats")
-    limit = check_size(max_false_alarms, "max_false_alarms", 0.0, 1.0, "a share between 0 and 1, such as 0.02")
+    limit = check_probability(max_false_alarms, "max_false_alarms")
     check_chain(fem)
     table, findings = _baseline(fem, baseline)
     table = table[_columns(table, columns, fem.mode_names_)]
     measurement = Measurement.asked(fem, noise, gaps, outliers)
-    task, doubts = _task(fem, T, read_scenarios(scenarios, fem.model), table, measurement, limit, n_splits, seeds)
+    given = {"scenarios": read_scenarios(scenarios, fem.model), "baseline": table, "measurement": measurement}
+    task, doubts = DetectionTask(fem=fem, **given)._simulated(T, limit, n_splits, seeds)
     warn_each([*findings, *doubts])
     return task
 
 
-def _task(
-    fem: DataInformedFEM,
-    T: Table,
-    scenarios: Any,
-    baseline: pd.DataFrame,
-    measurement: Measurement,
-    limit: float,
-    n_splits: int,
-    seeds: Sequence[int],
-) -> tuple[DetectionTask, list[SkthermoWarning]]:
-    """A task with the noise of some seeds, and what is doubtful about its weather."""
-    labels = _labels(scenarios, T)
-    n_baseline, n_repeats, (n_scenarios, n_records) = len(baseline), len(seeds), labels.shape
-    index = _moved(T, baseline, n_repeats * n_scenarios)
-    with collected() as findings, single_blas_thread():
-        findings += fem.thermal_.doubts(fem.weather(T))
-        simulation = Simulation(fem, scenarios, T, clean_frequencies(fem, scenarios, T, n_repeats), measurement)
-        tables = [
-            one.table[list(baseline)].to_numpy()
-            for repeat, seed in enumerate(seeds)
-            for one in simulation.records(repeat, [seed])
-        ]
-    X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)]).rename_axis(baseline.index.name)
-    y = pd.Series(np.r_[np.ones(n_baseline, dtype=int), np.tile(labels.ravel(), n_repeats)], X.index, name="y")
-    state = np.repeat(np.arange(len(tables)), n_records)
-    codes = np.r_[np.full(n_baseline, -1), state % n_scenarios]
-    scenario = pd.Categorical.from_codes(codes, [one.name for one in scenarios])
-    states = {"scenario": scenario, "repeat": np.r_[np.full(n_baseline, -1), state // n_scenarios]}
-    groups = np.array_split(np.arange(n_repeats), n_splits)
-    tests = [n_baseline + np.flatnonzero(np.isin(state // n_scenarios, group)) for group in groups]
-    task = DetectionTask(
-        X=X,
-        y=y,
-        cv=[(np.arange(n_baseline), test) for test in tests],
-        scoring=TaskScorer(y.iloc[n_baseline:], state, n_scenarios, sensors_of(fem), limit),
-        baseline=baseline,
-        states=pd.DataFrame(states, X.index),
-        fem=fem,
-        T=T,
-        scenarios=scenarios,
-        measurement=measurement,
-        seeds=seeds,
-    )
-    return task, findings
-
-
 def _baseline(fem: DataInformedFEM, baseline: Table | None) -> tuple[pd.DataFrame, list[SkthermoWarning]]:
     """Measured records as a frame, by default those of the chain, and findings; rows without stamps are numbered."""
+    table = baseline_table(fem, baseline)
+    table = pd.DataFrame(as_floats(table), table.index if has_stamps(table) else None, table.columns)
     if baseline is None:
-        T, F = fem.records_.temperatures, fem.records_.frequencies
-        table = side_by_side(fem, T if has_stamps(T) else as_floats(T), F)
-        return table if has_stamps(table) else table.reset_index(drop=True), []
-    table = named(fem, baseline, "the baseline")
-    table = pd.DataFrame(as_columns(table), table.index if has_stamps(table) else None, table.columns)
+        return table, []
     is_sensor = table.columns.isin(sensors_of(fem))
     T, F = (table.loc[:, chosen] if chosen.any() else None for chosen in (is_sensor, ~is_sensor))
     is_whole = table.shape[1] == len(sensors_of(fem)) + len(fem.mode_names_)
@@ -556,7 +509,7 @@ def _moved(T: Table, baseline: pd.DataFrame, n_states: int) -> pd.Index:
             f"T has the index {stamps!r:.200}, and the baseline stamps in the time zone {baseline.index.tz}; expected "
             "T on a DatetimeIndex as well, with a time zone if the baseline has one, and each stamp once"
         )
-    day, gap = pd.Timedelta(days=1), pd.Timedelta(days=SHORTEST_GAP)
+    day, gap = pd.Timedelta(days=1), pd.Timedelta(days=30)  # between two states
     wait, period = (baseline.index.max() + gap - stamps.min()) / day, (stamps.max() - stamps.min() + gap) / day
     room = (pd.Timestamp.max.tz_localize(stamps.tz) - stamps.max()) / day - 1
     for length in (365.2425, 1.0):  # whole years or, where they do not fit, days
@@ -598,4 +551,4 @@ def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) ->
 def _seeds(n_repeats: Any, random_state: np.random.RandomState | None) -> NDArray[np.intp]:
     """Seeds of the noise of each repeat: of a task, and of its confirmation."""
     size = positive_integer(n_repeats, "n_repeats"), 2
-    return as_random_state(random_state).randint(LARGEST_SEED, size=size)
+    return as_random_state(random_state).randint(np.iinfo(np.int32).max, size=size)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse
-from scipy.sparse.csgraph import connected_components, depth_first_order
+from scipy.sparse.csgraph import connected_components
 
 from skthermo._core.arrays import Array, MatrixLike, check_names, is_real, real_array
 from skthermo.fem import Structure
@@ -178,8 +178,6 @@ def _read_patterns(model: Any, what: str, given: Any) -> dict[str, Any]:
             model.with_added(**{what: found[name]})
         except ValueError as error:
             raise ValueError(f"{argument} {name!r}: {error}") from error
-        if not abs(found[name]).max() > 0:
-            raise ValueError(f"{argument} {name!r} is 0 everywhere; expected {unit} at some degrees of freedom")
     return found
 
 
@@ -207,10 +205,9 @@ def members_of(model: Any, names: Sequence[str]) -> MemberLine:
 
 
 def lines_of(structure: Structure, members: Sequence[Hashable]) -> list[MemberLine]:
-    """Members that common nodes connect, line by line, each from its end of lower coordinates.
+    """Members that common nodes connect, line by line, each in the order of its coordinates.
 
-    Members that no other one touches, such as stays or bearings, are one line together; so are all members where
-    there are more than four lines, as in a grid of beams.
+    Members that no other one touches, such as stays or bearings, are one line together.
     """
     ends = [structure.members[member].nodes for member in members]
     middles = np.array([np.mean([structure.nodes[node] for node in nodes], axis=0) for nodes in ends])
@@ -218,25 +215,12 @@ def lines_of(structure: Structure, members: Sequence[Hashable]) -> list[MemberLi
     has_node = np.zeros((len(ends), len(places)))
     for row, some in zip(has_node, ends, strict=True):
         row[[places[node] for node in some if len(some) > 1]] = 1
-    touches = has_node @ has_node.T > 0
-    np.fill_diagonal(touches, False)
-    labels = connected_components(touches, directed=False)[1]
-    connected = [np.flatnonzero(labels == label) for label in np.unique(labels)]
-    lines = [_in_order(one, touches, middles) for one in connected if len(one) > 1]
-    alone = np.array([one[0] for one in connected if len(one) == 1], dtype=int)
-    if len(lines) > 4:
-        lines, alone = [], np.arange(len(members))
-    lines += [_by_place(alone, middles)] if len(alone) else []
-    return [[members[place] for place in line] for line in sorted(lines, key=lambda line: tuple(middles[line[0]]))]
-
-
-def _in_order(line: Array, touches: Array, middles: Array) -> list[int]:
-    """Members followed from an end; by place where they branch or form a ring."""
-    by_place, number = _by_place(line, middles), touches.sum(axis=1)
-    tips = [place for place in by_place if number[place] == 1]
-    if len(tips) != 2 or number[line].max() > 2:
-        return by_place
-    return depth_first_order(touches, tips[0], directed=False)[0].tolist()
+    labels = connected_components(has_node @ has_node.T, directed=False)[1]
+    is_alone = np.bincount(labels)[labels] == 1
+    labels[is_alone] = labels.max() + 1
+    lines = [_by_place(np.flatnonzero(labels == label), middles) for label in np.unique(labels)]
+    lines = sorted(lines, key=lambda line: tuple(middles[line[0]]))
+    return [[members[place] for place in line] for line in lines]
 
 
 def _by_place(line: Array, middles: Array) -> list[int]:

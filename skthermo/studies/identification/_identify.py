@@ -21,7 +21,6 @@ from skthermo._core.text import (
     chance_text,
     counted,
     listed,
-    percent,
     probability_text,
     share_text,
     significant,
@@ -184,8 +183,8 @@ def identify_damage(
     prior = DamagePrior() if prior is None else prior
     if not isinstance(prior, DamagePrior):
         raise ValueError(f"prior is {prior!r}; expected a DamagePrior")
-    if shapes is None and dofs is not None:
-        raise ValueError("dofs came without shapes; expected both or neither")
+    if (shapes is None) != (dofs is None):
+        raise ValueError("one of shapes and dofs came without the other; expected both or neither")
     if not isinstance(structure, Structure | None):
         raise ValueError(f"structure is {structure!r:.200}; expected the Structure or ImportedStructure of the model")
     check_jobs(n_jobs)
@@ -604,7 +603,7 @@ class IdentifiedDamage(Sentences):
             yield f"Less probable: {'; '.join(texts)}."
         if best.is_healthy:
             bounds = self.groups["highest_if_damaged"].drop(self.unobservable)
-            losses = [f"{_percent(bound)} in {name}" for name, bound in bounds[bounds > 0].items()]
+            losses = [f"{share_text(bound)} in {name}" for name, bound in bounds[bounds > 0].items()]
             yield f"95{SPACE}% upper bounds on undetected losses of {self.kind}: {listed(losses)}."
         else:
             yield f"Probability of no change: {chance_text(1 - self.probability_of_damage)}."
@@ -670,10 +669,6 @@ class IdentifiedDamage(Sentences):
     def __repr__(self) -> str:
         best = self.explanations.iloc[0]
         return f"IdentifiedDamage({best['text']}, probability {self.probability:.2g})"
-
-
-def _percent(size: float) -> str:
-    return percent(size, ".2g" if abs(size) < 0.995 else ".0f")
 
 
 def _size(cause: Cause, amount: float) -> str:

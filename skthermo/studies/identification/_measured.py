@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -151,13 +151,9 @@ def _check_ratios(ratios: Array, names: Any) -> None:
 def _checked(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
     """The frequencies as an array, with NaN for values that cannot be."""
     frequencies = as_floats(check_array(F, input_name="F", dtype=np.float64, allow_infinite=True))
-    names = getattr(F, "columns", None)
-    if names is not None and list(names) != fem.mode_names_:
-        raise ValueError(f"the frequencies have the columns {list(names)}; expected {fem.mode_names_}, as in fit")
-    if frequencies.shape[1] != len(fem.mode_names_):
-        raise ValueError(
-            f"frequencies have shape {frequencies.shape}; expected {len(fem.mode_names_)} modes, as in fit"
-        )
+    names = list(getattr(F, "columns", range(frequencies.shape[1])))
+    if len(names) != len(fem.mode_names_) or (hasattr(F, "columns") and names != fem.mode_names_):
+        raise ValueError(f"the frequencies have the columns {names}; expected {fem.mode_names_}, as in fit")
     kinds = {"few-records", "useless-column"}
     found, _ = set_aside(T, F, model=fem.model, exclude=kinds, needs_all=True, is_baseline=False)
     return as_floats(found.frequencies)
@@ -225,37 +221,29 @@ class ComparedShapes:
             found.append(turned @ np.linalg.svd(reference[np.newaxis])[2][1:].T)
         return np.concatenate(found, axis=-1)
 
-    def similarity(self, shapes: NDArray) -> Array:
-        """Mean MAC of records (n_records, n_sensors, n_modes) with the reference, (n_modes,); NaN without any."""
-        filled, squares = np.nan_to_num(shapes), np.where(np.isnan(shapes), 0.0, self.reference**2)
-        along = np.abs((filled.conj() * self.reference).sum(axis=1)) ** 2
-        lengths = (np.abs(filled) ** 2).sum(axis=1) * squares.sum(axis=1)
-        return means_of_known(np.divide(along, lengths, out=np.full(along.shape, np.nan), where=lengths > 0))
+
+def similarity(shapes: NDArray, reference: Array) -> Array:
+    """Mean MAC of records (n_records, n_sensors, n_modes) with a reference, (n_modes,); NaN without any."""
+    filled, squares = np.nan_to_num(shapes), np.where(np.isnan(shapes), 0.0, reference**2)
+    along = np.abs((filled.conj() * reference).sum(axis=1)) ** 2
+    lengths = (np.abs(filled) ** 2).sum(axis=1) * squares.sum(axis=1)
+    return means_of_known(np.divide(along, lengths, out=np.full(along.shape, np.nan), where=lengths > 0))
 
 
 def _shape_changes(
     model: Any, theta: Array, shapes: Any, dofs: ArrayLike | None, noise: Any, names: Sequence[Any]
 ) -> tuple[ComparedShapes, Array, Array, list[SkthermoWarning]]:
-    """The model's shapes, the measured change of their components, and its variances.
-
-    Of the records' parameters and the nominal ones, those count that give the measured healthy shapes better.
-    """
-    if dofs is None:
-        raise ValueError("shapes came without dofs; expected the degree of freedom of each of their rows")
+    """The model's shapes, the measured change of their components, and its variances."""
     if not hasattr(model, "modes"):
         raise ValueError(f"{model!r} has no method 'modes'; expected a model with one, to compare mode shapes")
-    stated, candidates = _stated(noise, len(names), what="shape_noise", most=1), []
-    for state in (theta, np.ones_like(theta)):
-        whole = model.modes(state)[1][0]
-        places = check_dofs(dofs, len(whole), getattr(model, "dofs", ()))
-        reference = whole[places] / np.abs(whole[places]).max(axis=0)
-        healthy, later = records = read_shapes(shapes, reference.shape)
-        present = [(~np.isnan(one)).mean(axis=0) for one in records]  # at least in half of the records of its mode
-        known = np.logical_and(*(share >= np.maximum(share.max(axis=0) / 2, 1e-9) for share in present))
-        candidates.append(ComparedShapes(state, places, reference, known))
-    compared = max(candidates, key=lambda one: np.nansum(one.similarity(healthy)))
-    foreign = (compared.similarity(healthy) < 0.5) & compared.known.any(axis=0)
-    compared = replace(compared, known=compared.known & ~foreign & (compared.known.sum(axis=0) > 1))
+    stated, whole = _stated(noise, len(names), what="shape_noise", most=1), model.modes(theta)[1][0]
+    places = check_dofs(dofs, len(whole), getattr(model, "dofs", ()))
+    reference = whole[places] / np.abs(whole[places]).max(axis=0)
+    healthy, later = records = read_shapes(shapes, reference.shape)
+    present = [(~np.isnan(one)).mean(axis=0) for one in records]  # at least in half of the records of its mode
+    known = np.logical_and(*(share >= np.maximum(share.max(axis=0) / 2, 1e-9) for share in present))
+    foreign = (similarity(healthy, reference) < 0.5) & known.any(axis=0)
+    compared = ComparedShapes(theta, places, reference, known & ~foreign & (known.sum(axis=0) > 1))
     if not compared.known.any():
         raise ValueError("no mode has shapes that can be compared; expected two sensors or more with both states")
     modes = np.repeat(np.arange(len(names)), np.maximum(compared.known.sum(axis=0) - 1, 0))  # of each component
