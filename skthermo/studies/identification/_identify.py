@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from typing import Any
@@ -213,16 +213,14 @@ def identify_damage(
         whole = averaged(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
 
     errors, similarity = _errors(evidence)
-    draws, explained, members = _drawn(whole, causes, random), whole, errors[[]]
+    draws, explained = _drawn(whole, causes, random), whole
     if structure is not None:
-        located, members = _located(evidence, whole, shift, structure, fem, measured)
+        located, members = _located(evidence, shift, structure, fem, measured)
         explained = located.explanations(random)
     n_observed, best = len(seen.change), explained[0]
     by_group = tabulated(explained, errors.index).join(errors)
     found = IdentifiedDamage(
-        table=by_group
-        if structure is None
-        else tabulated(explained, members.index).join(members).rename_axis("member"),
+        table=by_group if structure is None else tabulated(explained, members.index).join(members),
         groups=by_group,
         shifts=_shifts(shift, explained, fem.mode_names_),
         draws=draws,
@@ -261,26 +259,17 @@ def _errors(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def _located(
-    evidence: Evidence,
-    whole: Sequence[DamageExplanation],
-    shift: FrequencyShift,
-    structure: Structure,
-    fem: Any,
-    measured: Mapping[str, Any],
+    evidence: Evidence, shift: FrequencyShift, structure: Structure, fem: Any, measured: Mapping[str, Any]
 ) -> tuple[Evidence, pd.DataFrame]:
-    """Evidence of stretches of groups that may be damaged, of all if whole ones do not explain the shifts; members."""
-    n_left = len(evidence.change) - len(whole[0].causes)
-    is_open = sum(one.probability for one in whole if one.has_else) > 0.1
-    is_open |= chance_of(whole[0].misfit, n_left, shift.freedom) < 0.05
-    asked = [cause for cause in evidence.causes if not cause.alone]
-    probable = tabulated(whole, [cause.name for cause in asked if cause.kind == "damage"])["probability"]
+    """Evidence of stretches of all groups that may be damaged, and the members of these groups."""
     causes: list[Cause] = []
-    units: list[Cause] = []  # pieces, the sums of whose effects are those of stretches
+    pieces: list[Cause] = []  # the sums of whose effects are those of stretches
     parts: dict[str, dict[str, set[Hashable]]] = {}
     members: dict[Hashable, dict[str, Any]] = {}
-    for cause in asked:
+    for cause in evidence.causes:
         if cause.kind != "damage":
             causes.append(cause)
+        if cause.kind != "damage" or cause.alone:
             continue
         lines = lines_of(structure, members_of(fem.model, cause.of))
         for place, line in enumerate(lines, 1):
@@ -288,27 +277,22 @@ def _located(
                 middle = np.mean([structure.nodes[node] for node in structure.members[member].nodes], axis=0)
                 at = dict(zip("xyz", middle.tolist(), strict=False))
                 members[member] = {"group": cause.name, "line": place, "element": number} | at
-        if not is_open and probable[cause.name] < min(0.02, probable.max()):
-            parts |= {name: parts.get(name, {}) for name in cause.of}  # whose members `divide` checks, too
-            causes.append(replace(cause, rows=tuple(member for line in lines for member in line)))
-            continue
         divided = pieces_of(lines)
-        pieces = [piece for line in divided for piece in line]
-        names = [f"{cause.name}, piece {number}" for number in range(1, len(pieces) + 1)]
+        named = {
+            f"{cause.name}, piece {number}": set(piece)
+            for number, piece in enumerate((piece for line in divided for piece in line), 1)
+        }
         for name in cause.of:
             inside = set(members_of(fem.model, [name]))
-            named = {piece: inside.intersection(rows) for piece, rows in zip(names, pieces, strict=True)}
-            parts[name] = {piece: rows for piece, rows in named.items() if rows}
-        units += [Cause(name, of=(name,)) for name in names]
-        causes += stretches(structure, cause, divided, names)
+            parts[name] = {piece: rows & inside for piece, rows in named.items() if rows & inside}
+        pieces += [Cause(name, of=(name,)) for name in named]
+        causes += stretches(structure, cause, divided, [*named])
     seen = observed(fem, structure.divide(fem.model, parts), shift, **measured)
-    units += [cause for cause in causes if not cause.alone]
-    is_in = np.array(
-        [[unit.name in ((*cause.of,) if cause.alone else (cause.name,)) for unit in units] for cause in causes]
-    )
-    effects = np.einsum("cu,suo->sco", is_in, effects_of(seen, units, 7))
+    units = pieces + [cause for cause in causes if not cause.alone]
+    by_unit = dict(zip([unit.name for unit in units], effects_of(seen, units, 7).swapaxes(0, 1), strict=True))
+    effects = [sum(by_unit[name] for name in (cause.of if cause.alone else [cause.name])) for cause in causes]
     table = pd.DataFrame(list(members.values()), pd.Index(list(members), name="member", tupleize_cols=False))
-    return Evidence(seen, causes, effects, evidence.prior, shift.freedom), table
+    return Evidence(seen, causes, np.stack(effects, axis=1), evidence.prior, shift.freedom), table
 
 
 def _shifts(shift: FrequencyShift, explained: Sequence[DamageExplanation], names: Sequence[Any]) -> pd.DataFrame:
@@ -364,7 +348,7 @@ def tabulated(explained: Sequence[DamageExplanation], rows: Sequence[Hashable]) 
         extreme = present["ci_low" if present["severity"] < 0 else "ci_high"]
         if_changed = {"if_damaged": present["severity"], "highest_if_damaged": extreme}
         found.append({"probability": probability, **averages(values, weights), **if_changed})
-    return pd.DataFrame(found, pd.Index(list(rows), tupleize_cols=False))
+    return pd.DataFrame(found, pd.Index(list(rows), name=getattr(rows, "name", None), tupleize_cols=False))
 
 
 def averages(values: Array, weights: Array) -> dict[str, float]:
