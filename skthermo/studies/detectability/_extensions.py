@@ -21,7 +21,7 @@ from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
 from skthermo.studies._scenarios import BaseScenario, Scenario
 from skthermo.studies.detectability._pod_curve import FamilyRates, families_of, fitted_curve
-from skthermo.studies.detectability._simulation import Candidate, Measurement, Simulation, sensors_of
+from skthermo.studies.detectability._simulation import Candidate, Simulation, scatter_of, sensors_of
 from skthermo.studies.detectability._study import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM
 
@@ -119,7 +119,7 @@ def compare_extensions(
         candidates["baseline", f"baseline x {factor:g}"] = longer
     n_repeats = int(study.results_["n_repeats"].max())
     seeds = as_random_state(study.random_state).randint(np.iinfo(np.int32).max, size=n_repeats)
-    measurement = Measurement.asked(fem, study.noise, study.gaps, study.outliers)
+    measurement = scatter_of(fem, study.noise, study.gaps, study.outliers)
     scenarios, trials, rows = scenarios_of(study, name), [], []
     with collected() as findings, single_blas_thread():
         findings += fem.thermal_.doubts(fem.weather(T)) + _doubtful_modes(fem, ranks)

@@ -258,12 +258,7 @@ def pod_curve(
 
 
 def fitted_curve(
-    severities: ArrayLike,
-    n_detected: ArrayLike,
-    n_records: ArrayLike,
-    *,
-    log: bool | Literal["auto"] = "auto",
-    confidence: float = 0.95,
+    severities: ArrayLike, n_detected: ArrayLike, n_records: ArrayLike, *, log: Any = "auto", confidence: float = 0.95
 ) -> tuple[PODCurve, list[ResultWarning]]:
     """The curve, and what is doubtful about it."""
     laws = [True, False] if is_auto(log) else [check_flag(log, "log")]

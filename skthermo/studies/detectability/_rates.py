@@ -15,10 +15,6 @@ from skthermo._core.arrays import Array
 from skthermo._core.frames import Table, correlation_times, row_times, time_of
 from skthermo.studies._scenarios import BaseScenario
 
-BLOCK = 10  # length of a block, in correlation times
-LEAST_FREEDOM = 10  # fewest degrees of freedom of the variance; blocks are shortened to reach them
-FEW_ALARMS = 10  # minimum number of alarms, and of records without one, to estimate their variance
-
 
 @dataclass(frozen=True)
 class Rate:
@@ -75,7 +71,7 @@ def _n_effective(decisions: Array, confidence: float, whole_repeats: bool) -> fl
     n_repeats, rate, effects = len(decisions), alarms.sum() / n_records, [1.0]
     if 0 < rate < 1:
         effects.append(_variance_of_mean(alarms, evaluated, starts) / (rate * (1 - rate) / n_records))
-    if min(rate, 1 - rate) * n_records < FEW_ALARMS:  # the decisions are correlated at least as much as their signs
+    if min(rate, 1 - rate) * n_records < 10:  # too few; the decisions are correlated at least as much as their signs
         variance = np.nanmean(scatter**2)
         if variance > 0:
             effects.append(_variance_of_mean(np.nan_to_num(scatter), evaluated, starts) / (variance / n_records))
@@ -84,12 +80,12 @@ def _n_effective(decisions: Array, confidence: float, whole_repeats: bool) -> fl
     return float(n_records / max(effects) * min((t.isf(tail, n_records - 1) / t.isf(tail, freedom)) ** 2, 1.0))
 
 
-def _blocks(scatter: Array) -> NDArray[np.intp]:
+def _blocks(scatter: Array, *, length: int = 10, least_freedom: int = 10) -> NDArray[np.intp]:
     """First records of contiguous blocks of several correlation times, whose sums in different repeats are
-    independent."""
+    independent; they are shortened until the variance of the sums has its least degrees of freedom."""
     n_repeats, n_records = scatter.shape
     time = correlation_times(scatter.T).mean()
-    number = max(n_records / (BLOCK * time), LEAST_FREEDOM / max(n_repeats - 1, 1) + (n_repeats == 1))
+    number = max(n_records / (length * time), least_freedom / max(n_repeats - 1, 1) + (n_repeats == 1))
     number = int(np.clip(np.ceil(number), 1, n_records))
     return np.linspace(0, n_records, number, endpoint=False).astype(int)
 
@@ -174,17 +170,6 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
     return float(detected.mean()) if detected.size else float("nan")
 
 
-def rates_by_scenario(
-    decisions: Mapping[tuple[str, ...], Array], scenarios: Sequence[BaseScenario], T: Table
-) -> dict[tuple[str, str], float]:
-    """Rates of alarms of one repeat from the onset of the damage on, by detector and scenario."""
-    by_name, rates = {one.name: one for one in scenarios}, {}
-    for (name, scenario, source), values in decisions.items():
-        kept = EvaluatedRecords(name, by_name[scenario], source, T, values[np.newaxis]).from_onset()[0]
-        rates[name, scenario] = float((kept < 0).sum() / max(np.count_nonzero(~np.isnan(kept)), 1))
-    return rates
-
-
 @dataclass(frozen=True, eq=False)
 class Contender:
     """One detector's decisions on records of one source: of the healthy structure, of every damaged scenario, and of
@@ -194,13 +179,13 @@ class Contender:
     damaged: Sequence[Array]
     calibration: Array | None
 
-    def pod(self, limit: float | None = None, left_out: int | None = None) -> float:
+    def pod(self, limit: float | None = None, left_out: int | Sequence[int] = ()) -> float:
         """Mean probability of detection over the damaged scenarios, without one of the repeats if asked.
 
         With a limit, the threshold is moved so that as many of the calibration's records are alarms; NaN without any.
         """
         threshold = 0.0 if limit is None else self._threshold(limit, left_out)
-        parts = [_without(decisions, left_out) for decisions in self.damaged]
+        parts = [np.delete(decisions, left_out, axis=0) for decisions in self.damaged]
         shares = [(part < threshold).sum() / np.count_nonzero(~np.isnan(part)) for part in parts]
         return float("nan") if np.isnan(threshold) else float(np.mean(shares))
 
@@ -226,18 +211,14 @@ class Contender:
         chances = [mannwhitneyu(healthy, one, method="asymptotic").statistic / len(one) for one in evaluated]
         return float(np.mean(chances)) / len(healthy)
 
-    def _threshold(self, limit: float, left_out: int | None) -> float:
+    def _threshold(self, limit: float, left_out: int | Sequence[int]) -> float:
         """Decision below which as many of the calibration's records lie as the limit allows."""
         if self.calibration is None:
             return float("nan")
-        known = _without(self.calibration, left_out)
+        known = np.delete(self.calibration, left_out, axis=0)
         known = known[~np.isnan(known)]
         place = int(limit * known.size + 1e-9)  # of products such as 0.29 * 100
         return float(np.partition(known, place)[place]) if known.size else float("nan")
-
-
-def _without(decisions: Array, left_out: int | None) -> Array:
-    return decisions if left_out is None else np.delete(decisions, left_out, axis=0)
 
 
 def rank(

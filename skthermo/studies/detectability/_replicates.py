@@ -21,7 +21,7 @@ from skthermo.fem import FEModel
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies._scenarios import checked_models
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, fitted_curve
-from skthermo.studies.detectability._rates import rates_by_scenario
+from skthermo.studies.detectability._rates import EvaluatedRecords
 from skthermo.studies.detectability._simulation import Candidate, Decided, Simulation
 from skthermo.surrogate import DataInformedFEM, refitted, resampled
 from skthermo.updating import ModelUpdater
@@ -74,7 +74,8 @@ class Replicates:
     def _rates(self, simulation: Simulation, candidates: Mapping[str, Candidate], number: int) -> Any:
         random = np.random.RandomState(self.seeds[number])
         weather, records, noise = random.randint(np.iinfo(np.int32).max, size=3).tolist()
-        chain, T, measurement, rates = simulation.fem, self.years[0], simulation.measurement, {}
+        chain, T, levels, rates = simulation.fem, self.years[0], 1.0, {}
+        scenarios = {one.name: one for one in simulation.scenarios}
         with collected(drop_others=True), single_blas_thread():
             try:
                 for part in self.parts:
@@ -88,14 +89,17 @@ class Replicates:
                         chain = resampled(chain, records)
                     if part == "baseline":  # the training records determine the noise up to an error
                         errors = simulation.fem.recorder_.residuals.level_errors
-                        measurement = replace(measurement, levels=np.exp(errors * random.standard_normal(len(errors))))
-                    drawn = {"n_repeats": 1, "first": number, "reference": None}
-                    here = replace(simulation, T=T, chain=chain, measurement=measurement, **drawn)
+                        levels = np.exp(errors * random.standard_normal(len(errors)))
+                    drawn = {"n_repeats": 1, "first": number, "levels": levels, "reference": None}
+                    here = replace(simulation, T=T, chain=chain, **drawn)
                     found = Decided.by(candidates, here.records(0, [noise if self.with_noise else 0]))
                     if found.errors:
                         raise next(iter(found.errors.values()))
-                    for key, rate in rates_by_scenario(found.decisions, simulation.scenarios, T).items():
-                        rates.setdefault(key, []).append(rate)
+                    for (name, scenario, source), values in found.decisions.items():
+                        one = EvaluatedRecords(name, scenarios[scenario], source, T, values[np.newaxis])
+                        kept = one.from_onset()[0]
+                        rate = float((kept < 0).sum() / max(np.count_nonzero(~np.isnan(kept)), 1))
+                        rates.setdefault((name, scenario), []).append(rate)
             except Exception as error:
                 return f"{type(error).__name__}: {error}"
         return rates
@@ -207,10 +211,8 @@ class ReplicateRates:
 
     def banded(self, results: pd.DataFrame, confidence: float) -> pd.DataFrame:
         """The table of a study, whose simulated rows have the bands of the replicates."""
-        results = results.copy()
-        for row in results.index[(results["source"] == "simulated") & (results["error"] == "")]:
-            key = results.at[row, "detector"], results.at[row, "scenario"]
-            results.loc[row, ["pi_low", "pi_high"]] = self.prediction_interval(key, confidence)
+        bands, results = [self.prediction_interval(key, confidence) for key in self.own.index], results.copy()
+        results.loc[(results["source"] == "simulated") & (results["error"] == ""), ["pi_low", "pi_high"]] = bands
         return results
 
     def smallest(self, family: FamilyRates, level: float, method: str, confidence: float) -> tuple[float, float]:

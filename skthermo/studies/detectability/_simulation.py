@@ -192,45 +192,28 @@ def by_detector(findings: Iterable[SkthermoWarning], name: str, detectors: Mappi
     return [type(one)(f"detector {name!r}: {one.args[0]}", one.kind) for one in findings]
 
 
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`, and factors
-    of the noise of each mode."""
-
-    noise: Any
-    gaps: Any
-    outliers: Any
-    levels: Any = 1.0
-
-    @classmethod
-    def asked(cls, fem: DataInformedFEM, noise: Any, gaps: Any, outliers: Any) -> Measurement:
-        """Outliers may be the frequencies of the training records before these were cleaned."""
-        return cls(noise, gaps, fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers)
-
-    def drawn(self, fem: DataInformedFEM, weather: Any, seed: int) -> tuple[Array, Array]:
-        """Relative noise, (n_records, n_modes), NaN where a mode is missing, and the temperatures with gaps."""
-        noise, T = fem.recorder_.noise(weather, self.noise, self.gaps, self.outliers, seed), as_floats(weather.given)
-        noise = noise * self.levels
-        if isinstance(self.gaps, str) and np.isnan(as_floats(fem.records_.temperatures)).any():
-            missing = fem.recorder_.gaps(weather, self.gaps, self.outliers, seed)[0]
-            T = np.where(missing, np.nan, T)
-        return noise, T
+def scatter_of(fem: DataInformedFEM, noise: Any, gaps: Any, outliers: Any) -> dict[str, Any]:
+    """Noise, gaps and outliers of simulated records, as in `~skthermo.surrogate.DataInformedFEM.simulate`; outliers may
+    be the frequencies of the training records before these were cleaned."""
+    outliers = fem.recorder_.service_of(outliers) if np.ndim(outliers) else outliers
+    return {"noise": noise, "gaps": gaps, "outliers": outliers}
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """One weather, and the frequencies without noise, (n_records, n_modes), of each draw of every scenario that repeats
     from the ``first`` on take; those of another ``chain`` where one is given. ``reference`` gives true frequencies for
-    a scenario and a seed."""
+    a scenario and a seed, ``levels`` are factors of the noise of each mode."""
 
     fem: DataInformedFEM
     scenarios: Sequence[BaseScenario]
     T: Table
-    measurement: Measurement
+    measurement: Mapping[str, Any]
     n_repeats: int = 1
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None = None
     chain: DataInformedFEM | None = None
     first: int = 0
+    levels: Any = 1.0
     clean: Mapping[str, Sequence[Array]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -256,7 +239,11 @@ class Simulation:
 
         These are drawn by the first seed; the second is that of the reference.
         """
-        noise, T = self.measurement.drawn(self.fem, self.weather, int(seeds[0]))
+        T, options = as_floats(self.weather.given), {**self.measurement, "random_state": int(seeds[0])}
+        noise = self.fem.recorder_.noise(self.weather, **options) * self.levels
+        if isinstance(options["gaps"], str) and np.isnan(as_floats(self.fem.records_.temperatures)).any():
+            del options["noise"]
+            T = np.where(self.fem.recorder_.gaps(self.weather, **options)[0], np.nan, T)
         T = pd.DataFrame(T, self.T.index if isinstance(self.T, pd.DataFrame) else None, sensors_of(self.fem))
         for scenario in self.scenarios if scenarios is None else scenarios:
             draws = self.clean[scenario.name]

@@ -25,7 +25,7 @@ from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenario
 from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies.detectability._rates import EvaluatedRecords, in_words, rank
 from skthermo.studies.detectability._replicates import ReplicateRates, Replicates, in_sentences
-from skthermo.studies.detectability._simulation import Candidate, Decided, Measurement, Simulation, by_detector
+from skthermo.studies.detectability._simulation import Candidate, Decided, Simulation, by_detector, scatter_of
 from skthermo.surrogate import DataInformedFEM
 
 Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
@@ -343,7 +343,7 @@ class DetectabilityStudy(BaseEstimator):
                 candidates, errors = self._learned(detectors, baseline, findings)
             with stages.stage("frequencies"):
                 findings += self.fem.thermal_.doubts(self.fem.weather(T))
-                measurement = Measurement.asked(self.fem, self.noise, self.gaps, self.outliers)
+                measurement = scatter_of(self.fem, self.noise, self.gaps, self.outliers)
                 simulation = Simulation(self.fem, scenarios, T, measurement, most_repeats, function)
             with stages.stage("first repeat"):
                 first = simulation.repeat(candidates, 0, seeds[0], given)
@@ -399,13 +399,7 @@ class DetectabilityStudy(BaseEstimator):
         return still_evaluating(candidates, errors), errors
 
     def _repeats(
-        self,
-        simulation: Simulation,
-        ready: dict[str, Any],
-        first: Decided,
-        seeds: Any,
-        tol: Any,
-        confidence: float,
+        self, simulation: Simulation, ready: dict[str, Any], first: Decided, seeds: Any, tol: Any, confidence: float
     ) -> Decided:
         """All repeats: one for each of the seeds or, with ``tol``, as many of them as the bounds need."""
         left = still_evaluating({k: v for k, v in ready.items() if k not in first.errors}, first.errors)
@@ -497,11 +491,8 @@ class DetectabilityStudy(BaseEstimator):
         found = self._family(family, source, detector)
         curve, findings = found.curve(log)
         warn_each(findings)
-        return (
-            curve
-            if self.replicates_ is None
-            else replace(curve, replicates=tuple(self.replicates_.curves(found, curve.log)))
-        )
+        curves = () if self.replicates_ is None else self.replicates_.curves(found, curve.log)
+        return replace(curve, replicates=tuple(curves))
 
     def minimum_detectable_damage(
         self, level: float = 0.9, method: Literal["grid", "curve"] = "grid", detector: str | None = None
@@ -672,7 +663,9 @@ class DetectabilityStudy(BaseEstimator):
         asked = self.confidence_ if confidence is None else check_probability(confidence, "confidence")
         if by not in ("pod", "pod_at_equal_pfa"):
             raise ValueError(f"by is {by!r:.100}; expected 'pod' or 'pod_at_equal_pfa'")
-        self._check_source(source)
+        known = results["source"].dropna().unique().tolist()
+        if source not in known:
+            raise ValueError(f"source is {source!r:.100}; expected one of {known}")
         rows = results[results["source"] == source]
         for measure, kind in (("PFA", "healthy"), ("POD", "damaged")):
             if not (rows["measure"] == measure).any():
@@ -782,11 +775,6 @@ class DetectabilityStudy(BaseEstimator):
         name = self.detector_name(detector)
         return in_sentences(self._results, self.uncertainty_, name, self.confidence_)
 
-    def _check_source(self, source: Any) -> None:
-        known = self._results["source"].dropna().unique().tolist()
-        if source not in known:
-            raise ValueError(f"source is {source!r:.100}; expected one of {known}")
-
     def _records(self, source: str) -> list[EvaluatedRecords]:
         """What the detectors evaluated of one source."""
         decided = Decided(self.decisions_, {}, indices=self.indices_)
@@ -880,13 +868,10 @@ def evaluated(decided: Decided, detector: str, scenarios: Sequence[BaseScenario]
 
 def failures(failed: Sequence[str], n_replicates: int) -> list[ModelWarning]:
     """Replicates that have failed are a finding, and an error where they are most."""
+    text = f"{len(failed)} of {n_replicates} replicates failed, the first with {failed[:1]}"
     if 2 * len(failed) > n_replicates:
-        raise ValueError(
-            f"{len(failed)} of {n_replicates} replicates failed, the first with {failed[0]}; expected chains that can "
-            "be refitted, or uncertainty='noise'"
-        )
-    text = f"{len(failed)} of {n_replicates} replicates failed, the first with {failed[:1]}. Bands are of the others"
-    return [ModelWarning(text, "no-solution")] if failed else []
+        raise ValueError(f"{text}; expected chains that can be refitted, or uncertainty='noise'")
+    return [ModelWarning(f"{text}. Bands are of the others", "no-solution")] if failed else []
 
 
 def many_false_alarms(results: pd.DataFrame) -> list[ResultWarning]:

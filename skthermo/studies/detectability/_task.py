@@ -22,7 +22,7 @@ from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.preprocessing.checks import set_aside
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies.detectability._rates import Rate, rate_of
-from skthermo.studies.detectability._simulation import Measurement, Simulation, baseline_table, has_targets, sensors_of
+from skthermo.studies.detectability._simulation import Simulation, baseline_table, has_targets, scatter_of, sensors_of
 from skthermo.studies.detectability._study import check_detector
 from skthermo.surrogate import DataInformedFEM
 
@@ -202,9 +202,6 @@ class DetectionTask(Bunch):
     baseline: pd.DataFrame
     states: pd.DataFrame
 
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-
     def refit(self, detector: BaseEstimator) -> BaseEstimator:
         """A detector, or the best one of a search, fitted to the baseline alone.
 
@@ -294,8 +291,6 @@ class DetectionTask(Bunch):
         """
         check_probability(confidence, "confidence")
         named = detectors if isinstance(detectors, Mapping) else {"": detectors}
-        if not named:
-            raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
         seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
         fresh, findings = self._simulated(T, self.scoring.max_false_alarms, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
@@ -473,7 +468,7 @@ def detection_task(
     check_chain(fem)
     table, findings = _baseline(fem, baseline)
     table = table[_columns(table, columns, fem.mode_names_)]
-    measurement = Measurement.asked(fem, noise, gaps, outliers)
+    measurement = scatter_of(fem, noise, gaps, outliers)
     given = {"scenarios": read_scenarios(scenarios, fem.model), "baseline": table, "measurement": measurement}
     task, doubts = DetectionTask(fem=fem, **given)._simulated(T, limit, n_splits, seeds)
     warn_each([*findings, *doubts])
@@ -541,9 +536,8 @@ def _labels(scenarios: Sequence[BaseScenario], T: Table) -> NDArray[np.intp]:
 
 def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) -> list[Hashable]:
     """Those columns of the baseline that a detector shall see, in the order of the baseline."""
-    chosen = list(baseline.columns) if columns is None else check_names(columns, "columns")
-    unknown = [name for name in chosen if name not in baseline.columns]
-    if unknown or not set(chosen) & set(modes):
+    chosen = list(baseline.columns) if columns is None else check_names(columns, "columns", list(baseline))
+    if not set(chosen) & set(modes):
         raise ValueError(f"columns are {chosen}; expected some of {list(baseline.columns)}, modes among them")
     return [name for name in baseline.columns if name in chosen]
 
