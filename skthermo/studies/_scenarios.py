@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Integral
@@ -22,7 +21,7 @@ from skthermo.surrogate import DataInformedFEM
 LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
 
 
-class BaseScenario(ABC):
+class BaseScenario:
     """What changes in a structure from the onset on; scenarios of one family differ in severity only.
 
     The severity is NaN where there is no single one, and the onset None where the change is there from the beginning.
@@ -72,9 +71,9 @@ class BaseScenario(ABC):
         changes = self._changes(T, int(repeat))
         return changes | {"kind": self.kind} if self.kind != "stiffness" else changes
 
-    @abstractmethod
     def _changes(self, T: Table, repeat: int) -> dict[str, Any]:
         """Hook: the arguments that differ from those of the healthy structure."""
+        raise NotImplementedError
 
 
 def check_chain(fem: DataInformedFEM) -> None:
@@ -87,9 +86,7 @@ def check_chain(fem: DataInformedFEM) -> None:
 def checked_models(fem: DataInformedFEM, models: Any) -> list[FEModel]:
     """Models that a chain can be refitted with, or an error."""
     if isinstance(models, str) or not isinstance(models, Sequence) or not len(models):
-        raise ValueError(
-            f"models is {models!r:.200}; expected a list of FE models, as ModelUpdater.sample_models gives"
-        )
+        raise ValueError(f"models is {models!r:.200}; expected a list of FE models, such as sample_models gives")
     wanted = list(fem.model.parameter_names), fem.model.n_modes
     for number, model in enumerate(models):
         found = list(getattr(model, "parameter_names", [])), getattr(model, "n_modes", None)
@@ -113,10 +110,8 @@ def severities_of(damage: Any, name: str) -> dict[str, float]:
     damage = mapping_of({} if damage is None else damage, f"damage of scenario {name!r}", "{group: severity}")
     for group, severity in damage.items():
         if np.ndim(severity):
-            raise ValueError(
-                f"severity of {group!r} in scenario {name!r} has shape {np.shape(severity)}; expected one number, or "
-                "ProgressiveDamage for damage that grows"
-            )
+            what = f"severity of {group!r} in scenario {name!r} has shape {np.shape(severity)}"
+            raise ValueError(f"{what}; expected one number, or ProgressiveDamage for damage that grows")
         check_severities(severity, group, name)
     return {group: float(severity) for group, severity in damage.items()}
 
@@ -229,9 +224,8 @@ def read_scenarios(given: Table, model: FEModel) -> list[BaseScenario]:
     if isinstance(given, type) or not isinstance(given, Iterable):
         raise ValueError(f"scenarios is {given!r:.200}; expected a list of scenarios, as sweep makes it")
     scenarios, known = [_as_scenario(one) for one in given], getattr(model, "groups", None)
-    wrong = [scenario for scenario in scenarios if not isinstance(scenario, BaseScenario)]
-    names = [scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)]
-    if wrong or not names or len(set(names)) < len(names):
+    names = {scenario.name for scenario in scenarios if isinstance(scenario, BaseScenario)}
+    if not names or len(names) < len(scenarios):
         raise ValueError(f"scenarios are {scenarios!r:.500}; expected one or more, each with a name of its own")
     unknown = {group for one in scenarios for group in one.groups if known is not None and group not in known}
     if unknown:

@@ -274,7 +274,7 @@ def test_confirmation_in_the_same_weather_says_so(fem):
         ({"scenarios": [Scenario("one"), Scenario("one", {"top": 0.1})]}, "each with a name of its own"),
         ({"scenarios": [Scenario("one"), Scenario("two", {"roof": 0.1})]}, "damage groups"),
         ({"n_splits": 3}, "n_splits is 3 for 2 repeats"),
-        ({"columns": ["f1", "f9"]}, "columns are"),
+        ({"columns": ["f1", "f9"]}, "columns names"),
         ({"columns": ["T1"]}, "modes among them"),
         ({"baseline": SIDE_BY_SIDE.rename(columns={"f1": "g1"})}, "the baseline has the columns"),
         ({"T": WEATHER.to_numpy()}, "T on a DatetimeIndex as well"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -125,10 +125,7 @@ def compare_extensions(
         findings += fem.thermal_.doubts(fem.weather(T)) + _doubtful_modes(fem, ranks)
         scatter = check_noise(_scatter(study) if noise is None else noise, len(ranks), names)
         compared = [(fem, T, candidates, dict(zip(ranks, scatter, strict=True)))] if candidates else []
-        for sensor, chain, weather in _with_sensors(study, present, sensors):
-            seeing = {("sensor", str(sensor)): replace(present, columns=[*present.columns, sensor])}
-            compared.append((chain, weather, seeing, {}))
-        for chain, weather, others, further in compared:
+        for chain, weather, others, further in compared + _with_sensors(fem, present, sensors):
             healthy = Simulation(chain, [Scenario("healthy")], chain.records_.temperatures, measurement)
             changed = Simulation(chain, scenarios, weather, measurement)
             trials.append(trial(healthy, changed, {None: present} | others, further))
@@ -222,17 +219,13 @@ def scenarios_of(study: DetectabilityStudy, detector: str) -> list[Scenario]:
         if name != detector or source != "simulated" or not len(rates.tested):
             continue
         members = [one for one in study.scenarios_ if isinstance(one, Scenario) and one.family == family]
-        groups = {group for member in members for group in member.damage or {}}
-        kinds = {member.kind for member in members}
-        is_damage = all(member.changes(None).keys() <= {"damage", "kind"} for member in members)
-        if len(groups) != 1 or len(kinds) != 1 or not is_damage:
+        losses = {(group, member.kind) for member in members for group in member.damage or {}}
+        if len(losses) != 1 or not all(member.changes(None).keys() <= {"damage", "kind"} for member in members):
             scenarios += members
             continue
-        severities = _around(rates) * np.linspace(0.3, 1.5, 13)
-        for severity in np.clip(severities, -0.95, 0.95).tolist():
-            changed = {groups.copy().pop(): severity}
-            options = {"family": family, "severity": severity, "kind": members[0].kind}
-            scenarios.append(Scenario(f"{family} {severity}", changed, **options))
+        group, kind = losses.pop()
+        severities = np.clip(_around(rates) * np.linspace(0.3, 1.5, 13), -0.95, 0.95).tolist()
+        scenarios += [Scenario(f"{family} {one}", {group: one}, family=family, kind=kind) for one in severities]
     if not scenarios:
         raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
     return scenarios
@@ -272,7 +265,7 @@ def _further_modes(model: FEModel, modes: Sequence[int] | None) -> list[int]:
     again = [mode for mode in modes if mode in measured]
     if again:
         raise ValueError(f"modes {again} are measured already; expected others than {list(measured)}")
-    return [int(mode) for mode in modes]
+    return modes
 
 
 def _doubtful_modes(fem: DataInformedFEM, ranks: Sequence[int], *, most: float = 2.0) -> list[ResultWarning]:
@@ -295,20 +288,15 @@ def _doubtful_modes(fem: DataInformedFEM, ranks: Sequence[int], *, most: float =
     return [ResultWarning(text, "undetermined")] if doubtful else []
 
 
-def _with_sensors(
-    study: DetectabilityStudy, present: Candidate, sensors: pd.DataFrame | None
-) -> list[tuple[Hashable, DataInformedFEM, Any]]:
-    """Each further sensor by the name that a detector sees, with a chain that was fitted with it and its weather."""
+def _with_sensors(fem: DataInformedFEM, present: Candidate, sensors: pd.DataFrame | None) -> list[tuple[Any, ...]]:
+    """A chain that was fitted with each further sensor, its weather, a detector that sees the sensor, and no modes."""
     if sensors is None:
         return []
-    T, F, known = study.fem.records_.temperatures, study.fem.records_.frequencies, sensors_of(study.fem)
+    T, F, known = fem.records_.temperatures, fem.records_.frequencies, sensors_of(fem)
     if not isinstance(sensors, pd.DataFrame) or not sensors.shape[1]:
         raise ValueError(f"sensors is {sensors!r:.200}; expected a frame with a column for each candidate")
     if not set(known) & set(present.columns):
-        raise ValueError(
-            "the detector sees no temperatures, so that no sensor changes what it detects; expected sensors=None, or a "
-            "detector that sees them, such as a pipeline with TemperatureCompensator"
-        )
+        raise ValueError("the detector sees no temperatures; expected one that does, or sensors=None")
     check_same_rows(T, sensors, ("the temperatures of the training", "sensors"))
     found = []
     for name in sensors.columns:
@@ -316,7 +304,8 @@ def _with_sensors(
             raise ValueError(f"sensor {name!r} has the name of a measured temperature; expected another name")
         beside = pd.DataFrame(as_floats(T), getattr(T, "index", None), known)
         beside[name] = as_floats(sensors[name])
-        found.append((name, clone(study.fem).fit(beside, F), beside))
+        seeing = {("sensor", str(name)): replace(present, columns=[*present.columns, name])}
+        found.append((clone(fem).fit(beside, F), beside, seeing, {}))
     return found
 
 

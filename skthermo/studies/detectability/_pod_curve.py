@@ -299,18 +299,11 @@ def checked_counts(severities: ArrayLike, n_detected: ArrayLike, n_records: Arra
     names = ("severities", "n_detected", "n_records")
     s, k, n = (real_array(v, name) for v, name in zip((severities, n_detected, n_records), names, strict=True))
     if s.ndim != 1 or not s.shape == k.shape == n.shape:
-        raise ValueError(
-            f"severities, n_detected and n_records have shapes {s.shape}, {k.shape}, {n.shape}; expected "
-            "vectors of one length"
-        )
+        raise ValueError(f"{names} have shapes {s.shape}, {k.shape}, {n.shape}; expected vectors of one length")
     if not (np.isfinite(s).all() and ((s > 0).all() or (s < 0).all()) and (s < 1).all()):
-        raise ValueError(
-            f"severities are {s.tolist()}; expected shares of the stiffness, all above 0 and below 1, or all negative"
-        )
+        raise ValueError(f"severities are {s.tolist()}; expected shares, all above 0 and below 1, or all negative")
     if not (np.isfinite(n).all() and (k >= 0).all() and (k <= n).all()):
-        raise ValueError(
-            f"n_detected is {k.tolist()} and n_records {n.tolist()}; expected 0 <= n_detected <= n_records"
-        )
+        raise ValueError(f"n_detected is {k.tolist()}, n_records {n.tolist()}; expected 0 <= n_detected <= n_records")
     order = np.argsort(np.abs(s), kind="stable")
     s, k, n = (values[order][n[order] > 0] for values in (s, k, n))
     if len(np.unique(s)) < 2:

@@ -16,7 +16,7 @@ from sklearn.base import BaseEstimator, clone
 
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import last_step, seed_parts, seeded
-from skthermo._core.frames import Table, check_same_rows, column_names
+from skthermo._core.frames import Table, column_names
 from skthermo._core.memory import remembered
 from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import collected
@@ -71,12 +71,11 @@ def has_targets(detector: BaseEstimator) -> bool:
 
 
 class Records(NamedTuple):
-    """Records of a scenario from one source, which may lack the temperatures T of the simulated ones."""
+    """Records of a scenario from one source."""
 
     scenario: BaseScenario
     source: str
     table: pd.DataFrame
-    T: Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,16 +119,12 @@ class Candidate:
         return seen if self.is_frame else seen.to_numpy()
 
     def entering(self, records: Records) -> Table:
-        """What the detector sees of records, whose temperatures are those of the weather if they lack their own."""
-        table, lacking = records.table, [name for name in self.columns if name not in records.table]
+        """What the detector sees of records."""
+        lacking = [name for name in self.columns if name not in records.table]
         if lacking:
-            what = f"the {records.source} of scenario {records.scenario.name!r}"
-            names = column_names(records.T, "T")
-            if not set(lacking) <= set(names):
-                raise ValueError(f"{what} lacks the columns {lacking}; expected those that the detector sees")
-            check_same_rows(records.T, table, ("temperatures", what))
-            table = table.assign(**dict(zip(names, as_floats(records.T).T, strict=True)))
-        return self.seen(table)
+            text = f"the {records.source} of scenario {records.scenario.name!r} lacks the columns {lacking}"
+            raise ValueError(f"{text}; expected those that the detector sees, or frequencies in the rows of T")
+        return self.seen(records.table)
 
 
 def fitted_to(detector: BaseEstimator, table: Table) -> BaseEstimator:
@@ -232,6 +227,12 @@ class Simulation:
     def weather(self) -> Any:
         return self.fem.weather(self.T)
 
+    @cached_property
+    def temperatures(self) -> pd.DataFrame:
+        """With the chain's names, before any is missing."""
+        index = self.T.index if isinstance(self.T, pd.DataFrame) else None
+        return pd.DataFrame(as_floats(self.weather.given), index, sensors_of(self.fem))
+
     def records(
         self, repeat: int, seeds: Sequence[int], scenarios: Sequence[BaseScenario] | None = None
     ) -> Iterator[Records]:
@@ -239,32 +240,32 @@ class Simulation:
 
         These are drawn by the first seed; the second is that of the reference.
         """
-        T, options = as_floats(self.weather.given), {**self.measurement, "random_state": int(seeds[0])}
+        T, options = self.temperatures, {**self.measurement, "random_state": int(seeds[0])}
         noise = self.fem.recorder_.noise(self.weather, **options) * self.levels
         if isinstance(options["gaps"], str) and np.isnan(as_floats(self.fem.records_.temperatures)).any():
             del options["noise"]
-            T = np.where(self.fem.recorder_.gaps(self.weather, **options)[0], np.nan, T)
-        T = pd.DataFrame(T, self.T.index if isinstance(self.T, pd.DataFrame) else None, sensors_of(self.fem))
+            T = T.mask(self.fem.recorder_.gaps(self.weather, **options)[0])
         for scenario in self.scenarios if scenarios is None else scenarios:
             draws = self.clean[scenario.name]
             frequencies = draws[repeat % len(draws)] * (1 + noise)
-            yield Records(scenario, "simulated", side_by_side(self.fem, T, frequencies), T)
+            yield Records(scenario, "simulated", side_by_side(self.fem, T, frequencies))
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 if np.shape(values)[0] != len(T):
-                    raise ValueError(
-                        f"the reference of scenario {scenario.name!r} has shape {np.shape(values)}; expected "
-                        f"frequencies for the {len(T)} rows of T"
-                    )
+                    what = f"the reference of scenario {scenario.name!r} has shape {np.shape(values)}"
+                    raise ValueError(f"{what}; expected frequencies for the {len(T)} rows of T")
                 yield self.measured(scenario, values, T)
 
-    def measured(self, scenario: BaseScenario, values: Table, T: Table | None = None) -> Records:
-        """Given records of a scenario; those without times of their own have the rows of the weather, if as many."""
-        T = self.T if T is None else T
+    def measured(self, scenario: BaseScenario, values: Table, T: pd.DataFrame | None = None) -> Records:
+        """Given records of a scenario; those without times of their own have the rows of the weather, if as many, and
+        those in its rows have its temperatures where they have none."""
+        T = self.temperatures if T is None else T
         table = named(self.fem, values, f"the reference of scenario {scenario.name!r}")
-        if not isinstance(values, pd.DataFrame) and isinstance(T, pd.DataFrame) and len(table) == len(T):
+        if not isinstance(values, pd.DataFrame) and len(table) == len(T):
             table = table.set_axis(T.index)
-        return Records(scenario, "reference", table, T)
+        if table.index.equals(T.index):
+            table = table.join(T[[name for name in T if name not in table]])
+        return Records(scenario, "reference", table)
 
     def repeat(
         self, candidates: Mapping[str, Candidate], number: int, seeds: Sequence[int], given: Any = None

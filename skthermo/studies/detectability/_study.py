@@ -540,17 +540,12 @@ class DetectabilityStudy(BaseEstimator):
             families = {key[1:]: one for key, one in families.items() if key[0] == name}
         if not families:
             raise ValueError("no scenario belongs to a family with a severity; expected some, as `sweep` makes them")
-        found, findings = {}, []
-        for key, family in families.items():
-            if method == "grid":
-                found[key] = family.on_grid(level)
-            else:
-                found[key], doubts = family.on_curve(level)
-                findings += doubts
-        warn_each(findings)
-        names = ["detector", "family", "source"][-len(next(iter(found))) :]
-        index = pd.MultiIndex.from_tuples(list(found), names=names)
-        table = pd.DataFrame(list(found.values()), index=index, columns=["mdd", "ci_low", "ci_high"])
+        is_grid = method == "grid"
+        found = [(one.on_grid(level), []) if is_grid else one.on_curve(level) for one in families.values()]
+        warn_each([doubt for _, doubts in found for doubt in doubts])
+        names = ["detector", "family", "source"][-len(next(iter(families))) :]
+        index = pd.MultiIndex.from_tuples(list(families), names=names)
+        table = pd.DataFrame([ends for ends, _ in found], index=index, columns=["mdd", "ci_low", "ci_high"])
         if self.replicates_ is None:
             return table
         bands = [self.replicates_.smallest(one, level, method, self.confidence_) for one in families.values()]
@@ -799,16 +794,13 @@ class DetectabilityStudy(BaseEstimator):
 
     def _checked_detectors(self) -> dict[str, Any]:
         """Detectors by name; an error for what is none."""
-        if not isinstance(self.detectors, Mapping):
-            check_detector(self.detectors, "the detector")
-            return {type(last_step(self.detectors)).__name__: self.detectors}
-        if not self.detectors or not all(isinstance(name, str) and name for name in self.detectors):
-            raise ValueError(
-                f"detectors is {self.detectors!r:.200}; expected a detector, or a mapping of names to detectors"
-            )
-        for name, detector in self.detectors.items():
+        is_one = not isinstance(self.detectors, Mapping)
+        named = {type(last_step(self.detectors)).__name__: self.detectors} if is_one else dict(self.detectors)
+        if not named or not all(isinstance(name, str) and name for name in named):
+            raise ValueError(f"detectors is {named!r:.200}; expected a detector, or a mapping of names to detectors")
+        for name, detector in named.items():
             check_detector(detector, f"detector {name!r}")
-        return dict(self.detectors)
+        return named
 
     def __sklearn_clone__(self) -> DetectabilityStudy:
         many = isinstance(self.detectors, Mapping)

@@ -66,9 +66,7 @@ class Decisions:
         healthy = self.values[self.healthy()]
         evaluated = np.sort(healthy[~np.isnan(healthy)])
         if not evaluated.size:
-            raise ValueError(
-                f"none of {len(healthy)} healthy records is evaluated; expected a detector that evaluates some"
-            )
+            raise ValueError(f"none of {len(healthy)} healthy records is evaluated; expected a detector of some")
         return float(min(evaluated[int(limit * len(evaluated) + 1e-9)], 0.0))
 
     def false_alarms(self, confidence: float = 0.95) -> Rate:
@@ -291,6 +289,8 @@ class DetectionTask(Bunch):
         """
         check_probability(confidence, "confidence")
         named = detectors if isinstance(detectors, Mapping) else {"": detectors}
+        if not named:
+            raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
         seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
         fresh, findings = self._simulated(T, self.scoring.max_false_alarms, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
@@ -527,10 +527,8 @@ def _labels(scenarios: Sequence[BaseScenario], T: Table) -> NDArray[np.intp]:
             row[times >= (-np.inf if one.onset is None else time_of(T, one.onset, "onset"))] = -1
     for name, label in (("healthy", 1), ("damaged", -1)):
         if not (labels == label).any():
-            raise ValueError(
-                f"none of the scenarios {[one.name for one in scenarios]} has {name} records; expected a healthy "
-                "scenario and a damaged one, as sweep makes them"
-            )
+            names = [one.name for one in scenarios]
+            raise ValueError(f"none of the scenarios {names} has {name} records; expected a healthy and a damaged one")
     return labels
 
 

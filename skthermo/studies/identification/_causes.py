@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, pairwise
 from typing import Any, Literal
@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
-from skthermo._core.arrays import Array, MatrixLike, check_names, is_real, real_array
+from skthermo._core.arrays import Array, check_names, is_real, real_array
 from skthermo.fem import Structure
 from skthermo.fem.damage import ALL_GROUPS, LossKind, kind_option, read_groups
 
@@ -62,10 +62,8 @@ class DamagePrior:
     def __post_init__(self) -> None:
         numbers = real_array(self.numbers, "numbers")
         if numbers.shape not in ((2,), (3,), (4,)) or (numbers < 0).any() or not np.isclose(numbers.sum(), 1):
-            raise ValueError(
-                f"numbers is {self.numbers!r}; expected probabilities of none, one, two and at most three causes, "
-                "which add up to 1"
-            )
+            expected = "expected probabilities of none, one, two and at most three causes, which add up to 1"
+            raise ValueError(f"numbers is {self.numbers!r}; {expected}")
         if not isinstance(self.law, str) or self.law not in ("half-normal", "uniform"):
             raise ValueError(f"law is {self.law!r}; expected 'half-normal' or 'uniform'")
         for name in ("severity", "something_else", "model_error"):
@@ -110,12 +108,7 @@ class Cause:
 
 
 def read_causes(
-    model: Any,
-    groups: Sequence[str] | Mapping[str, Sequence[str]] | None,
-    stiffening: bool | Iterable[str] | None,
-    parameters: Iterable[str] | None,
-    added_mass: Mapping[str, MatrixLike] | None,
-    added_stiffness: Mapping[str, MatrixLike] | None,
+    model: Any, groups: Any, stiffening: Any, parameters: Any, added_mass: Any, added_stiffness: Any
 ) -> list[Cause]:
     """Causes that are asked for, and an even loss in all groups."""
     members = read_groups(model, groups)
@@ -250,12 +243,7 @@ def place_of(structure: Structure, members: Sequence[Hashable], group: Sequence[
 
 
 def stretches(
-    structure: Structure,
-    cause: Cause,
-    lines: Sequence[Sequence[MemberLine]],
-    names: Sequence[str],
-    *,
-    whole: float = 0.25,
+    structure: Structure, cause: Cause, lines: Sequence[Sequence[MemberLine]], names: Sequence[str]
 ) -> list[Cause]:
     """The whole group, and each run of pieces of its lines, which have these names in the divided model, as causes.
 
@@ -284,5 +272,5 @@ def stretches(
             )
         first += len(line)
     total = sum(one.share for one in found)
-    found = [replace(one, share=(1 - whole) * one.share / total) for one in found]
-    return [replace(cause, rows=members, share=whole if found else 1.0), *found]
+    found = [replace(one, share=0.75 * one.share / total) for one in found]
+    return [replace(cause, rows=members, share=0.25 if found else 1.0), *found]

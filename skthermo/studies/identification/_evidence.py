@@ -202,14 +202,10 @@ class Evidence:
         # an error of the effects by the same factor in all modes shows in no misfit
         factors = np.exp(self.prior.model_error * random.standard_normal((DRAWS_EACH, 1)))
         likely = errors[logs.argmax()]
-        return DamageExplanation(
-            tuple(self.causes[place] for place in columns),
-            bool(errors[0]),
-            probability,
-            np.clip(draws * factors, lowest, highest),
-            weight.change[likely] @ self.rotation.T,
-            float(((self.change - weight.change[likely]) ** 2 / self.variances[likely]).sum()),
-        )
+        causes, change = tuple(self.causes[place] for place in columns), weight.change[likely]
+        misfit = float(((self.change - change) ** 2 / self.variances[likely]).sum())
+        amounts = np.clip(draws * factors, lowest, highest)
+        return DamageExplanation(causes, bool(errors[0]), probability, amounts, change @ self.rotation.T, misfit)
 
 
 def truncated(mean: Array, covariance: Array, lowest: Array, highest: Array, uniform: Array) -> tuple[Array, Array]:

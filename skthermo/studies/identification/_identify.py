@@ -192,20 +192,22 @@ def identify_damage(
     causes = read_causes(fem.model, groups, stiffening, parameters, added_mass, added_stiffness)
     check_kind(kind)
     measured = {"kind": kind, "shapes": shapes, "dofs": dofs, "shape_noise": shape_noise}
+
+    def weighed(chain: Any) -> tuple[FrequencyShift, Evidence]:
+        shift = measured_shift(chain, T, F, noise)
+        seen = observed(chain, chain.model, shift, **measured)
+        return shift, Evidence(seen, causes, effects_of(seen, causes), prior, shift.freedom)
+
     with collected() as findings:
-        shift = measured_shift(fem, T, F, noise)
-        seen = observed(fem, fem.model, shift, **measured)
-    evidence = Evidence(seen, causes, effects_of(seen, causes), prior, shift.freedom)
+        shift, evidence = weighed(fem)
+    seen = evidence.observed
     if models is None:
         whole = evidence.explanations(random)
     else:
 
         def with_model(model: Any, seed: int) -> list[DamageExplanation]:
             with collected():  # as those of the chain itself
-                chain = refitted(fem, model=model)
-                seen = observed(chain, model, measured_shift(chain, T, F, noise), **measured)
-            one = Evidence(seen, causes, effects_of(seen, causes), prior, shift.freedom)
-            return one.explanations(np.random.RandomState(seed))
+                return weighed(refitted(fem, model=model))[1].explanations(np.random.RandomState(seed))
 
         models = checked_models(fem, models)
         seeds = random.randint(np.iinfo(np.int32).max, size=len(models))

@@ -67,16 +67,9 @@ def measured_shift(fem: Any, T: ArrayLike, F: ArrayLike, noise: Any) -> Frequenc
     counts |= {reason: int(some.sum()) for reason, some in left_out.items() if some.any()}
     counts |= {"independent": n_independent[known].min(), "trained": len(healthy)}
     counts |= {"independent of trained": errors.n_trained[known].min()}
-    return FrequencyShift(
-        mean,
-        covariance,
-        freedom,
-        n_records,
-        np.where(known, n_independent, 0.0),
-        as_floats(fem.predict_parameters(T))[rows].mean(axis=0, keepdims=True),
-        pd.Series(counts),
-        _findings(counts, left_out),
-    )
+    numbers = n_records, np.where(known, n_independent, 0.0)
+    theta = as_floats(fem.predict_parameters(T))[rows].mean(axis=0, keepdims=True)
+    return FrequencyShift(mean, covariance, freedom, *numbers, theta, pd.Series(counts), _findings(counts, left_out))
 
 
 def _stated(noise: Any, n_modes: int, *, what: str, **options: Any) -> Array | None:
@@ -127,14 +120,12 @@ def _findings(counts: dict[str, Any], left_out: dict[str, Array]) -> list[Skther
             text += ". The last records are among them: the structure may have just changed. Identify these alone"
         found.append(UnevaluatedRowsWarning(text, "not-evaluated"))
     if counts["independent"] < 3 or counts["independent of trained"] < 20:
-        found.append(
-            FewRecordsWarning(
-                f"the records are worth {counts['independent']:.3g} independent ones (expected 3 or more), the "
-                f"training records {counts['independent of trained']:.3g} (expected 20 or more). Probabilities and "
-                "standard errors are rough. Take records over a longer time",
-                "few-records",
-            )
+        text = (
+            f"the records are worth {counts['independent']:.3g} independent ones (expected 3 or more), the training "
+            f"records {counts['independent of trained']:.3g} (expected 20 or more). Probabilities and standard errors "
+            "are rough. Take records over a longer time"
         )
+        found.append(FewRecordsWarning(text, "few-records"))
     return found
 
 
@@ -175,51 +166,37 @@ def observed(
     """Shifts of the measured frequencies, and of mode shapes if there are any; ``model`` may be a divided one."""
     known = ~np.isnan(shift.mean)
     model = getattr(model, "full", model)
+    change, covariance, findings = shift.mean[known], shift.covariance[np.ix_(known, known)], []
+    if shapes is not None:
+        compared, moved, variances, findings = _shape_changes(
+            model, shift.theta, shapes, dofs, shape_noise, fem.mode_names_
+        )
+        change, covariance = np.append(change, moved), block_diag(covariance, np.diag(variances))
 
-    def frequencies(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
+    def state(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
         after, theta = changed(model, shift.theta, causes, amounts, kind)
-        return np.log(as_floats(fem.aligner_.inverse_transform(after.frequencies(theta))))[0, known]
+        logs = np.log(as_floats(fem.aligner_.inverse_transform(after.frequencies(theta))))[0, known]
+        return logs if shapes is None else np.append(logs, compared(after.modes(theta)[1][0]))
 
-    before, covariance = frequencies([], []), shift.covariance[np.ix_(known, known)]
-    if shapes is None:
-        return ObservedChange(shift.mean[known], covariance, lambda *change: frequencies(*change) - before, [])
-    compared, change, variances, findings = _shape_changes(
-        model, shift.theta, shapes, dofs, shape_noise, fem.mode_names_
-    )
-
-    def both(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
-        after, theta = changed(model, compared.theta, causes, amounts, kind)  # the model's own components are 0
-        components = compared.components(after.modes(theta)[1][0][compared.dofs])
-        return np.append(frequencies(causes, amounts) - before, components)
-
-    everything = block_diag(covariance, np.diag(variances))
-    return ObservedChange(np.append(shift.mean[known], change), everything, both, findings)
+    before = state([], [])
+    return ObservedChange(change, covariance, lambda *causes: state(*causes) - before, findings)
 
 
-@dataclass(frozen=True)
-class ComparedShapes:
-    """Mode shapes of a model at theta, (n_sensors, n_modes), with which others are compared where both are ``known``.
+def components_of(shapes: NDArray, reference: Array, known: NDArray[np.bool_]) -> Array:
+    """Components of real or complex shapes (..., n_sensors, n_modes), mode after mode, (..., n_observed), beside a
+    reference (n_sensors, n_modes), where both are ``known``.
 
     Scale, sign and phase of a shape mean nothing: each is turned to the reference and scaled to its length; what
     remains are its components along unit vectors at right angles to the reference. Independent errors of the sensors
     are independent errors of these components.
     """
-
-    theta: Array
-    dofs: NDArray[np.intp]
-    reference: Array
-    known: NDArray[np.bool_]
-
-    def components(self, shapes: NDArray) -> Array:
-        """Components of real or complex shapes (..., n_sensors, n_modes), mode after mode, (..., n_observed)."""
-        found = []
-        for mode in np.flatnonzero(self.known.any(axis=0)):
-            rows = self.known[:, mode]
-            reference, shape = self.reference[rows, mode], shapes[..., rows, mode]
-            turned = np.real(shape * np.exp(-1j * np.angle(shape @ reference))[..., np.newaxis])
-            turned *= np.linalg.norm(reference) / np.linalg.norm(turned, axis=-1, keepdims=True)
-            found.append(turned @ np.linalg.svd(reference[np.newaxis])[2][1:].T)
-        return np.concatenate(found, axis=-1)
+    found = []
+    for mode in np.flatnonzero(known.any(axis=0)):
+        along, shape = reference[known[:, mode], mode], shapes[..., known[:, mode], mode]
+        turned = np.real(shape * np.exp(-1j * np.angle(shape @ along))[..., np.newaxis])
+        turned *= np.linalg.norm(along) / np.linalg.norm(turned, axis=-1, keepdims=True)
+        found.append(turned @ np.linalg.svd(along[np.newaxis])[2][1:].T)
+    return np.concatenate(found, axis=-1)
 
 
 def similarity(shapes: NDArray, reference: Array) -> Array:
@@ -232,8 +209,8 @@ def similarity(shapes: NDArray, reference: Array) -> Array:
 
 def _shape_changes(
     model: Any, theta: Array, shapes: Any, dofs: ArrayLike | None, noise: Any, names: Sequence[Any]
-) -> tuple[ComparedShapes, Array, Array, list[SkthermoWarning]]:
-    """The model's shapes, the measured change of their components, and its variances."""
+) -> tuple[Callable[[NDArray], Array], Array, Array, list[SkthermoWarning]]:
+    """Components of a model's shapes, the measured change of these, and its variances."""
     if not hasattr(model, "modes"):
         raise ValueError(f"{model!r} has no method 'modes'; expected a model with one, to compare mode shapes")
     stated, whole = _stated(noise, len(names), what="shape_noise", most=1), model.modes(theta)[1][0]
@@ -243,32 +220,29 @@ def _shape_changes(
     present = [(~np.isnan(one)).mean(axis=0) for one in records]  # at least in half of the records of its mode
     known = np.logical_and(*(share >= np.maximum(share.max(axis=0) / 2, 1e-9) for share in present))
     foreign = (similarity(healthy, reference) < 0.5) & known.any(axis=0)
-    compared = ComparedShapes(theta, places, reference, known & ~foreign & (known.sum(axis=0) > 1))
-    if not compared.known.any():
+    known = known & ~foreign & (known.sum(axis=0) > 1)
+    if not known.any():
         raise ValueError("no mode has shapes that can be compared; expected two sensors or more with both states")
-    modes = np.repeat(np.arange(len(names)), np.maximum(compared.known.sum(axis=0) - 1, 0))  # of each component
-    states = [pd.DataFrame(compared.components(one)) for one in (healthy, later)]
+    modes = np.repeat(np.arange(len(names)), np.maximum(known.sum(axis=0) - 1, 0))  # of each component
+    states = [pd.DataFrame(components_of(one, reference, known)) for one in (healthy, later)]
     number = np.array([one.count() for one in states])
     squares = sum(((one - one.mean()) ** 2).sum().to_numpy() for one in states)
     freedom = np.bincount(modes, number.sum(axis=0) - 2)
     if stated is None and (freedom[modes] < 3).any():
-        raise ValueError(
-            'shape_noise is "fitted", which needs several records of shapes in one of the states; expected a standard '
-            f"deviation, such as 0.01, since there are {len(healthy)} and {len(later)} records"
-        )
+        text = f'shape_noise is "fitted" for {len(healthy)} and {len(later)} records of shapes'
+        raise ValueError(f"{text}; expected several of one state, or a standard deviation, such as 0.01")
     scatter = (np.bincount(modes, squares) / np.maximum(freedom - 2, 1))[modes]
     variances = np.maximum(scatter, 0.0 if stated is None else stated[modes] ** 2) * (1 / number).sum(axis=0)
     findings: list[SkthermoWarning] = []
     if foreign.any():
-        findings.append(
-            RecordsWarning(
-                f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below 0.5 with the "
-                f"model's, {names[np.flatnonzero(foreign)[0]]} the first. They are left out. Give shapes of the same "
-                "modes, with rows in the order of dofs",
-                "doubtful-shapes",
-            )
+        text = (
+            f"measured healthy shapes of {foreign.sum()} of {len(foreign)} modes have a MAC below 0.5 with the "
+            f"model's, {names[np.flatnonzero(foreign)[0]]} the first. They are left out. Give shapes of the same "
+            "modes, with rows in the order of dofs"
         )
-    return compared, (states[1].mean() - states[0].mean()).to_numpy(), variances, findings
+        findings.append(RecordsWarning(text, "doubtful-shapes"))
+    change = (states[1].mean() - states[0].mean()).to_numpy()
+    return lambda shapes: components_of(shapes[places], reference, known), change, variances, findings
 
 
 def read_shapes(shapes: Any, expected: tuple[int, ...]) -> list[NDArray]:
