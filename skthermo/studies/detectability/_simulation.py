@@ -40,23 +40,16 @@ def side_by_side(fem: DataInformedFEM, T: Table, F: Table) -> pd.DataFrame:
 
 def named(fem: DataInformedFEM, records: Table, what: str) -> pd.DataFrame:
     """A table of modes, or of temperatures and modes, with the chain's names."""
-    sensors, modes = sensors_of(fem), list(fem.mode_names_)
-    if isinstance(records, pd.DataFrame):
-        unknown = [name for name in records.columns if name not in (*sensors, *modes)]
-        if unknown or not set(records.columns) & set(modes):
-            raise ValueError(
-                f"{what} has the columns {list(records.columns)}; expected modes {modes}, alone or beside temperatures "
-                f"{sensors}, as in the fit of the chain"
-            )
-        return records
-    columns = {len(names): names for names in (modes, sensors + modes)}
+    sensors, modes, is_frame = sensors_of(fem), list(fem.mode_names_), isinstance(records, pd.DataFrame)
     n_columns = np.shape(records)[1] if np.ndim(records) == 2 else 0
-    if n_columns not in columns:
+    by_number = {len(names): names for names in (modes, sensors + modes)}
+    names = list(records.columns) if is_frame else by_number.get(n_columns, range(n_columns))
+    if not set(names) & set(modes) or not {*sensors, *modes}.issuperset(names):
         raise ValueError(
-            f"{what} has shape {np.shape(records)}; expected {len(modes)} columns of frequencies, or {len(sensors)} of "
-            f"temperatures and {len(modes)} of frequencies side by side"
+            f"{what} has the columns {list(names)}; expected modes {modes}, alone or beside temperatures {sensors}, as "
+            "in the fit of the chain"
         )
-    return pd.DataFrame(as_floats(records), columns=columns[n_columns])
+    return records if is_frame else pd.DataFrame(as_floats(records), columns=names)
 
 
 def baseline_table(fem: DataInformedFEM, baseline: Table | None) -> pd.DataFrame:
