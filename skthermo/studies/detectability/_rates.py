@@ -317,29 +317,25 @@ def in_words(table: pd.DataFrame, limit: float, confidence: float) -> str:
     failed, ranked = table[table["error"] != ""], table[table["error"] == ""]
     quiet, loud = ranked[ranked["within_limit"]], ranked[~ranked["within_limit"]]
     best = (quiet if len(quiet) else ranked).iloc[0]
-    lines = [
-        f"{best.name!r} detects {best['pod']:.1%} of the damaged records at a false-alarm rate of "
-        f"{best['false_alarms']:.1%}."
-    ]
+
+    def named(text: str, rows: pd.DataFrame, form: str) -> list[str]:
+        found = [f"{name!r} {form.format(**row)}" for name, row in rows.iterrows()]
+        return [f"{text}: {', '.join(found)}."] if found else []
+
+    text = f"{best.name!r} detects {best['pod']:.1%} of the damaged records at a false-alarm rate of"
+    lines = [f"{text} {best['false_alarms']:.1%}."]
     if not len(quiet):
         lines = [f"All false-alarm rates exceed the limit of {limit:.1%}. With the lowest one, {lines[0]}"]
-    behind = quiet.drop(index=best.name, errors="ignore")
+    behind, both = quiet.drop(index=best.name, errors="ignore"), "({pod:.1%} at {false_alarms:.1%})"
     if len(behind) and behind["pod_deficit_ci_low"].isna().all():
         lines.append("One repeat does not show which detectors are significantly worse; expected two or more.")
-    else:
+    elif len(behind):
         is_worse = behind["significantly_worse"]
-        for text, some in (("Not significantly worse", behind[~is_worse]), ("Significantly worse", behind[is_worse])):
-            rates = [f"{name!r} ({row['pod']:.1%} at {row['false_alarms']:.1%})" for name, row in some.iterrows()]
-            lines += [f"{text} at {confidence:.0%} confidence: {', '.join(rates)}."] if rates else []
-        if len(behind):
-            lines.append(
-                "These comparisons include noise only: another year, baseline or FE model may change the order."
-            )
+        lines += named(f"Not significantly worse at {confidence:.0%} confidence", behind[~is_worse], both)
+        lines += named(f"Significantly worse at {confidence:.0%} confidence", behind[is_worse], both)
+        lines.append("These comparisons include noise only: another year, baseline or FE model may change the order.")
     if len(quiet):
-        shares = [f"{name!r} ({row['false_alarms']:.1%})" for name, row in loud.iterrows()]
-        lines += [f"False-alarm rates above the limit of {limit:.1%}: {', '.join(shares)}."] if shares else []
-    not_evaluated = ranked.loc[ranked["not_evaluated"] > 0, "not_evaluated"]
-    shares = [f"{name!r} {share:.1%}" for name, share in not_evaluated.items()]
-    lines += [f"Records not evaluated (neither healthy nor damaged): {', '.join(shares)}."] if shares else []
-    lines += [f"Stopped by an error: {name!r} ({row['error']})." for name, row in failed.iterrows()]
-    return "\n".join(lines)
+        lines += named(f"False-alarm rates above the limit of {limit:.1%}", loud, "({false_alarms:.1%})")
+    silent = ranked[ranked["not_evaluated"] > 0]
+    lines += named("Records not evaluated (neither healthy nor damaged)", silent, "{not_evaluated:.1%}")
+    return "\n".join(lines + [f"Stopped by an error: {name!r} ({text})." for name, text in failed["error"].items()])

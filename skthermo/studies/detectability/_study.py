@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -27,8 +27,6 @@ from skthermo.studies.detectability._rates import EvaluatedRecords, in_words, ra
 from skthermo.studies.detectability._replicates import ReplicateRates, Replicates, in_sentences
 from skthermo.studies.detectability._simulation import Candidate, Decided, Simulation, by_detector, scatter_of
 from skthermo.surrogate import DataInformedFEM
-
-Reference: TypeAlias = Mapping[str, Any] | Callable[[Any, int], Any]
 
 
 class DetectabilityStudy(BaseEstimator):
@@ -267,7 +265,7 @@ class DetectabilityStudy(BaseEstimator):
         T: ArrayLike | Sequence[ArrayLike],
         baseline: ArrayLike | None = None,
         *,
-        reference: Reference | None = None,
+        reference: Mapping[str, Any] | Callable[[Any, int], Any] | None = None,
         confidence: float = 0.95,
     ) -> pd.DataFrame:
         """Simulate all scenarios, and count alarms.

@@ -20,9 +20,6 @@ from skthermo.preprocessing.checks import set_aside
 from skthermo.residuals.mean_errors import MeanErrors
 from skthermo.studies.identification._causes import Cause, changed
 
-Response = Callable[[Sequence[Cause], Sequence[float]], Array]
-"""Change of what is observed by some amounts of causes, (n_observed,)."""
-
 
 @dataclass(frozen=True)
 class FrequencyShift:
@@ -152,11 +149,12 @@ def _checked(fem: Any, T: ArrayLike, F: ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class ObservedChange:
-    """Measured changes of what is observed, (n_observed,), the covariance of their errors, and the model's response."""
+    """Measured changes of what is observed, (n_observed,), the covariance of their errors, and the model's response:
+    changes by some amounts of causes."""
 
     change: Array
     covariance: Array
-    response: Response
+    response: Callable[[Sequence[Cause], Sequence[float]], Array]
     findings: list[SkthermoWarning]
 
 
