@@ -18,8 +18,6 @@ from skthermo.fem import FEModel
 from skthermo.fem.damage import LossKind, check_kind, direction_name
 from skthermo.surrogate import DataInformedFEM
 
-LOWEST_SEVERITY = -10.0  # lowest severity accepted; a lower number is probably meant in percent
-
 
 class BaseScenario:
     """What changes in a structure from the onset on; scenarios of one family differ in severity only.
@@ -116,14 +114,14 @@ def severities_of(damage: Any, name: str) -> dict[str, float]:
     return {group: float(severity) for group, severity in damage.items()}
 
 
-def check_severities(severities: ArrayLike, group: Any, name: str) -> None:
-    """Raise an error for severities that no structure can have."""
+def check_severities(severities: ArrayLike, group: Any, name: str, *, lowest: float = -10.0) -> None:
+    """Raise an error for severities that no structure can have; a lower one is probably meant in percent."""
     values = real_array(severities, f"severity of {group!r} in scenario {name!r}")
-    wrong = values[~(np.isfinite(values) & (values < 1) & (values >= LOWEST_SEVERITY))]
+    wrong = values[~(np.isfinite(values) & (values < 1) & (values >= lowest))]
     if wrong.size:
         raise ValueError(
             f"scenario {name!r} has severities of {group!r} such as {wrong[0]:g}; expected finite shares of the "
-            f"stiffness below 1, not percent (0.2 means 20 %), and not below {LOWEST_SEVERITY:g}"
+            f"stiffness below 1, not percent (0.2 means 20 %), and not below {lowest:g}"
         )
 
 

@@ -199,10 +199,6 @@ class Contender:
             return np.empty(0)
         return n * self.pod(limit) - (n - 1) * np.array([self.pod(limit, number) for number in range(n)])
 
-    def has_noise(self) -> bool:
-        """Whether any decision differs from repeat to repeat."""
-        return not all(map(is_constant, self.damaged))
-
     def auc(self) -> float:
         """Area under the ROC curve, the chance that a damaged record is further off than a healthy one; mean over the
         damaged scenarios."""
@@ -253,7 +249,7 @@ def rank(
     pseudo = {name: one.jackknife(None if by == "pod" else limit) for name, one in contenders.items()}
     table["pod_deficit"] = table[by].iloc[0] - table[by]
     margin = [_margin(pseudo[table.index[0]], pseudo[name], confidence, len(names) - 1) for name in table.index]
-    if not any(one.has_noise() for one in contenders.values()):
+    if all(is_constant(decisions) for one in contenders.values() for decisions in one.damaged):
         margin = [np.nan] * len(names)
     table["pod_deficit_ci_low"] = table["pod_deficit"] - margin
     table["pod_deficit_ci_high"] = table["pod_deficit"] + margin

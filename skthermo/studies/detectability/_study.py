@@ -372,9 +372,8 @@ class DetectabilityStudy(BaseEstimator):
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
-        kept, self.indices_ = (
-            {key: one for key, one in part.items() if key[0] in left} for part in (decided.decisions, decided.indices)
-        )
+        kept = {key: one for key, one in decided.decisions.items() if key[0] in left}
+        self.indices_ = {key: one for key, one in decided.indices.items() if key[0] in left}
         self.decisions_ = {key: one for key, one in kept.items() if key[1] is not None}
         self.calibration_ = {(name, source): one for (name, of, source), one in kept.items() if of is None}
         self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()

@@ -15,16 +15,7 @@ from numpy.typing import ArrayLike
 
 from skthermo._core.arrays import Array, RandomState, as_random_state, check_jobs, check_probability
 from skthermo._core.parallel import run_jobs
-from skthermo._core.text import (
-    SPACE,
-    Sentences,
-    chance_text,
-    counted,
-    listed,
-    probability_text,
-    share_text,
-    significant,
-)
+from skthermo._core.text import Sentences, chance_text, counted, listed, probability_text, share_text, significant
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
@@ -590,7 +581,7 @@ class IdentifiedDamage(Sentences):
         if best.is_healthy:
             bounds = self.groups["highest_if_damaged"].drop(self.unobservable)
             losses = [f"{share_text(bound)} in {name}" for name, bound in bounds[bounds > 0].items()]
-            yield f"95{SPACE}% upper bounds on undetected losses of {self.kind}: {listed(losses)}."
+            yield f"{share_text(0.95)} upper bounds on undetected losses of {self.kind}: {listed(losses)}."
         else:
             yield f"Probability of no change: {chance_text(1 - self.probability_of_damage)}."
         yield (
@@ -609,7 +600,7 @@ class IdentifiedDamage(Sentences):
         text += f", {cause.place}" if cause.place else ""
         low, high = sorted((row["ci_low"], row["ci_high"]), key=abs)
         bounds = f"up to {_size(cause, high)}" if abs(low) < 5e-4 else f"{_size(cause, low)} to {_size(cause, high)}"
-        return f"{text} (90{SPACE}% interval {bounds})"
+        return f"{text} ({share_text(0.9)} interval {bounds})"
 
     @property
     def _open(self) -> list[str]:
