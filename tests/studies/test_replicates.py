@@ -13,7 +13,7 @@ from skthermo.detection import MahalanobisDetector
 from skthermo.studies import Scenario, UncertainDamage, sweep
 from skthermo.surrogate import refitted, resampled
 from tests.studies import studies as shared
-from tests.studies.studies import WEATHER, YEAR
+from tests.studies.studies import LATER, WEATHER, YEAR
 
 PARTS = ("noise", "weather", "baseline", "model")
 MODELS = [make_truss().damaged({"bottom": loss}) for loss in (-0.03, 0.04, 0.0)]
@@ -113,6 +113,17 @@ def test_replicates_that_fail_are_counted(fem, monkeypatch):
     monkeypatch.setattr(Failing, "limit", WEATHER.iloc[0, 0] + 0.05)
     with pytest.raises(ValueError, match="3 of 4 replicates failed"):
         study.run(years)
+
+
+def test_other_years_are_matched_by_the_season(fem):
+    daily, rates = LATER.temperatures, []
+    study = shared.study_of(fem, MahalanobisDetector(), [{"bottom": 0.2}], uncertainty="weather", n_replicates=2)
+    for other in (WEATHER, daily.set_axis(daily.index + pd.Timedelta(days=365))):
+        study.run([WEATHER, other])
+        rates += study.replicates_.rates.values()
+    np.testing.assert_array_equal(*rates)
+    with pytest.raises(ValueError, match="year 1 of T has no record within a day of the season"):
+        study.run([WEATHER, daily.set_axis(daily.index + pd.Timedelta(days=100))])
 
 
 def test_uncertain_damage_differs_from_replicate_to_replicate(fem):

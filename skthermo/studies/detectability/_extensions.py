@@ -122,7 +122,7 @@ def compare_extensions(
     measurement = scatter_of(fem, study.noise, study.gaps, study.outliers)
     scenarios, trials, rows = scenarios_of(study, name), [], []
     with collected() as findings, single_blas_thread():
-        findings += fem.thermal_.doubts(fem.weather(T)) + _doubtful_modes(fem, ranks)
+        findings += fem.thermal_.doubts(fem.weather(T)) + (_doubtful_modes(fem, ranks) if ranks else [])
         scatter = check_noise(_scatter(study) if noise is None else noise, len(ranks), names)
         compared = [(fem, T, candidates, dict(zip(ranks, scatter, strict=True)))] if candidates else []
         for chain, weather, others, further in compared + _with_sensors(fem, present, sensors):
@@ -270,16 +270,13 @@ def _further_modes(model: FEModel, modes: Sequence[int] | None) -> list[int]:
 
 def _doubtful_modes(fem: DataInformedFEM, ranks: Sequence[int], *, most: float = 2.0) -> list[ResultWarning]:
     """Modes whose frequencies, predicted from one record, scatter more than ``most`` times as much as the measured."""
-    if not ranks:
-        return []
-    theta, doubtful = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True), []
+    theta = np.nanmean(as_floats(fem.parameters_), axis=0, keepdims=True)
     models = fem.model, fem.model.with_modes(ranks)
     measured, further = (linearise(model, theta, relative=True)[1][0] for model in models)
-    for rank, slope in zip(ranks, further, strict=True):
-        weights = slope @ np.linalg.pinv(measured)
-        ratio = np.linalg.norm(weights) if np.allclose(weights @ measured, slope, atol=1e-6) else np.inf
-        if ratio > most:
-            doubtful.append(f"{mode_name(rank)} ({ratio:.1f} times)")
+    weights = further @ np.linalg.pinv(measured)
+    is_known = np.isclose(weights @ measured, further, atol=1e-6).all(axis=1)
+    ratios = dict(zip(ranks, np.where(is_known, np.linalg.norm(weights, axis=1), np.inf), strict=True))
+    doubtful = [f"{mode_name(rank)} ({ratio:.1f} times)" for rank, ratio in ratios.items() if ratio > most]
     text = (
         f"frequencies of further modes, predicted from one record, scatter more than {most:g} times as much as those "
         f"of the measured modes: {', '.join(doubtful)}. Their gain is doubtful. Measure such a mode once before its "

@@ -454,8 +454,8 @@ class IdentifiedDamage(Sentences):
         """
         rows = {}
         for one in self._listed:
-            severities = [self.estimates.loc[(one.name, cause.name), "severity"] for cause in one.causes]
-            texts = [f"{cause.name} {_size(cause, size)}" for cause, size in zip(one.causes, severities, strict=True)]
+            amounts = zip(one.causes, one.draws.mean(axis=0), strict=True)
+            texts = [f"{cause.name} {_size(cause, amount)}" for cause, amount in amounts]
             text = ", ".join(texts + [SOMETHING_ELSE] * one.has_else) or NO_DAMAGE
             rows[one.name] = {"probability": one.probability, "misfit": one.misfit, "text": text}
         return pd.DataFrame.from_dict(rows, orient="index")
