@@ -236,7 +236,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("Bonferroni in the ranking", "/ 2 / max(n_comparisons, 1)", "/ 2"),
         (
             "a threshold moved on all repeats",
-            "known = _without(self.calibration, left_out)",
+            "known = np.delete(self.calibration, left_out, axis=0)",
             "known = self.calibration",
         ),
     ],
@@ -246,8 +246,8 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("false alarms that pay", "limit / max(self.false_alarms().ci_low, limit)", "1.0"),
         (
             "records that are not evaluated",
-            "np.mean(self.values[rows] < raised)",
-            "np.mean(~(self.values[rows] >= raised))",
+            "np.where(np.isnan(self.values), 0.0,",
+            "np.where(np.isnan(self.values), -1.0,",
         ),
         ("fresh noise that is that of the task", "random_state)[:, 1]", "random_state)[:, 0]"),
         ("a search whose best learns all records", "clone(detector).fit(self.baseline)", "clone(detector).fit(self.X)"),
@@ -256,7 +256,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("gaps that end by chance", "if passes[row] and joint_of[record]:", "if passes[row]:"),
     ],
     ("studies/detectability/_rates.py", "studies/test_pod_curve.py"): [
-        ("length of the blocks of a rate", "BLOCK = 10", "BLOCK = 1"),
+        ("length of the blocks of a rate", "length: int = 10", "length: int = 1"),
     ],
     ("metrics/_detectability.py", "metrics/test_metrics.py"): [
         ("first alarm", "np.flatnonzero(index[first:] > limit)", "np.flatnonzero(index[first:] >= limit)"),
