@@ -66,7 +66,7 @@ class Decisions:
         healthy = self.values[self.healthy()]
         evaluated = np.sort(healthy[~np.isnan(healthy)])
         if not evaluated.size:
-            raise ValueError(f"none of {len(healthy)} healthy records is evaluated; expected a detector of some")
+            raise ValueError(f"none of {len(healthy)} healthy records is evaluated; expected one or more")
         return float(min(evaluated[int(limit * len(evaluated) + 1e-9)], 0.0))
 
     def false_alarms(self, confidence: float = 0.95) -> Rate:
@@ -334,7 +334,8 @@ class DetectionTask(Bunch):
         states = pd.DataFrame({"scenario": names, "repeat": np.r_[before, repeat]}, X.index)
         groups = np.array_split(np.arange(n_repeats), n_splits)
         cv = [(np.arange(n_baseline), n_baseline + np.flatnonzero(np.isin(repeat, group))) for group in groups]
-        scoring = TaskScorer(y[n_baseline:], repeat * n_scenarios + scenario, n_scenarios, sensors_of(self.fem), limit)
+        state, sensors = repeat * n_scenarios + scenario, sensors_of(self.fem)
+        scoring = TaskScorer(y.iloc[n_baseline:], state, n_scenarios, sensors, limit)
         simulated = {"X": X, "y": y, "cv": cv, "scoring": scoring, "states": states, "T": T, "seeds": seeds}
         return DetectionTask(**{**self, **simulated}), findings
 

@@ -388,8 +388,8 @@ class IdentifiedDamage(Sentences):
         which it then does not exceed with a probability of 95 %. Of causes also ``error_alone``, the standard error if
         nothing else could have changed, ``error_together``, if all others may have changed as much as is likely
         beforehand, and ``kind``: "damage", "stiffening", "parameter", "mass" or "spring". Of members also ``group``,
-        ``line`` of connected members of the group, ``element``, the number along the line, ``x``, ``y`` and ``z`` of
-        its middle, and ``is_likely``, whether it is among `likely_members`.
+        ``line`` of connected members of the group, ``element``, the number in it by coordinates, ``x``, ``y`` and
+        ``z`` of its middle, and ``is_likely``, whether it is among `likely_members`.
     groups : DataFrame
         The same by cause, also with a structure.
     shifts : DataFrame
