@@ -10,19 +10,19 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy.special import ndtri
 
 from skthermo._core.arrays import Array, as_random_state, check_noise, is_real, positive_integer
 from skthermo.datasets._fleet_site import (
     ATYPICAL_LAWS,
     Law,
     SiteClimate,
-    Thermometer,
-    columns_for,
     draw_law,
     draw_thermometers,
     drawn_by_hour,
     measured,
-    readings,
+    part_temperature,
+    persistent,
     stream,
 )
 from skthermo.datasets._fleet_structures import KINDS, Design, Kind
@@ -98,7 +98,7 @@ class FleetBridge:
     @cached_property
     def roles(self) -> dict[str, str]:
         """Name of each thermometer's column and its role, "air" or "deck"."""
-        return {thermometer.name: thermometer.role for thermometer in self._thermometers}
+        return {one.name: one.role for one in draw_thermometers(self._random("thermometers"))}
 
     @cached_property
     def noise(self) -> Array:
@@ -217,24 +217,23 @@ class FleetBridge:
 
         offsets = 0.8 * self._random("zones").standard_normal(len(self.laws))
         theta = {
-            zone: np.exp(law.log_multiplier(means(law.temperature(weather)) + offset))
+            zone: np.exp(law.log_multiplier(means(part_temperature(weather, law.hours, law.sun)) + offset))
             for (zone, law), offset in zip(self.laws.items(), offsets, strict=True)
         }
         clean = model.frequencies(np.column_stack(list(theta.values())))
-        drawn = drawn_by_hour(years, columns_for(len(modes)), for_frequencies)
+        drawn = drawn_by_hour(years, 5 * len(modes) + 1, for_frequencies)
         disturbed = measured(clean, level, gaps, outliers, rows, drawn)
-        reader = drawn_by_hour(years, 2 * len(self.roles), for_temperatures)
-        read = readings(self._thermometers, weather, means, 0.2 * gaps, rows, reader)
+        noises, missing = np.split(drawn_by_hour(years, 2 * len(self.roles), for_temperatures), 2, axis=1)
+        read = {
+            one.name: means(one.offset + part_temperature(weather, one.hours, one.sun)) + one.noise * own_noise
+            for one, own_noise in zip(draw_thermometers(self._random("thermometers")), noises[rows].T, strict=True)
+        }
         return FleetRecords(
-            temperatures=pd.DataFrame(read, index),
+            temperatures=pd.DataFrame(read, index).mask(persistent(missing, 18.0)[rows] < ndtri(0.2 * gaps)),
             frequencies=pd.DataFrame(disturbed, index, modes),
             clean_frequencies=pd.DataFrame(clean, index, modes),
             theta=pd.DataFrame(theta, index),
         )
-
-    @cached_property
-    def _thermometers(self) -> list[Thermometer]:
-        return draw_thermometers(self._random("thermometers"))
 
     @cached_property
     def _design(self) -> Design:
@@ -271,20 +270,17 @@ def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.D
     days, samples_per_day = positive_integer(days, "days"), positive_integer(samples_per_day, "samples_per_day")
     if 24 % samples_per_day:
         raise ValueError(f"samples_per_day is {samples_per_day}; expected a divisor of 24, such as 1, 4 or 24")
-    try:
-        first = pd.Timestamp(start)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"start is {start!r}; expected a time such as '2025-01-01' ({error})") from error
-    if first is pd.NaT or first.tz is not None or first != first.floor("h"):
+    first = pd.Timestamp(start)
+    if first.tz is not None or first != first.floor("h"):
         raise ValueError(f"start is {start!r}; expected a full hour without time zone, such as '2025-01-01'")
     step = pd.Timedelta(hours=24 // samples_per_day)
     return pd.date_range(first, periods=days * samples_per_day, freq=step, name="time")
 
 
-def check_share(value: float, what: str) -> float:
-    """A share of records."""
-    if not is_real(value) or not 0 <= value <= 0.5:
-        raise ValueError(f"{what} is {value!r}; expected a share from 0 to 0.5, such as 0.05 for 5 %")
+def check_share(value: float, what: str, most: float = 0.5) -> float:
+    """A share of records or bridges."""
+    if not is_real(value) or not 0 <= value <= most:
+        raise ValueError(f"{what} is {value!r}; expected a share from 0 to {most:g}, such as 0.05 for 5 %")
     return float(value)
 
 
@@ -347,8 +343,7 @@ def make_fleet(
     n_bridges = positive_integer(n_bridges, "n_bridges")
     if isinstance(kinds, str) or not kinds or not set(kinds) <= set(KINDS):
         raise ValueError(f"kinds is {kinds!r:.200}; expected some of {tuple(KINDS)}")
-    if not is_real(atypical) or not 0 <= atypical <= 1:
-        raise ValueError(f"atypical is {atypical!r}; expected a share from 0 to 1")
+    atypical = check_share(atypical, "atypical", 1.0)
     root = int(as_random_state(random_state).randint(2**31 - 1))
     first = stream(root).uniform()
     bridges = []
@@ -356,6 +351,6 @@ def make_fleet(
         round_, turn = divmod(k, len(kinds))
         phase = first + turn / len(kinds)
         is_atypical = np.floor((round_ + 1) * atypical + phase) > np.floor(round_ * atypical + phase)
-        atypical_law = ATYPICAL_LAWS[stream(root, k).randint(len(ATYPICAL_LAWS))] if is_atypical else None
+        atypical_law = [*ATYPICAL_LAWS][stream(root, k).randint(len(ATYPICAL_LAWS))] if is_atypical else None
         bridges.append(FleetBridge(f"bridge {k:03d}", kinds[turn], (root, k), atypical_law))
     return {bridge.name: bridge for bridge in bridges}

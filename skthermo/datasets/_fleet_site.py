@@ -1,6 +1,6 @@
 """The site of a bridge of a fleet: its climate, its thermal law and its thermometers."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,7 +61,10 @@ class SiteClimate:
             + self.scatter * (1 + 0.25 * coldness) * anomaly
             + self.swing * (0.5 + clear) * (1 - 0.4 * coldness) * np.cos(2 * np.pi * (hour - 15.0) / 24)
         )
-        sun = clear * np.maximum(sine_of_elevation(self.latitude, day, hour), 0.0)
+        declination = -np.deg2rad(23.44) * np.cos(2 * np.pi * (day + 10) / 365.25)
+        phi, angle = np.deg2rad(self.latitude), 2 * np.pi * (hour - 12) / 24
+        height = np.sin(phi) * np.sin(declination) + np.cos(phi) * np.cos(declination) * np.cos(angle)  # of the sun
+        sun = clear * np.maximum(height, 0.0)
         return pd.DataFrame({"air": air, "sun": sun}, index=index)
 
 
@@ -70,13 +73,6 @@ def drawn_by_hour(years: Iterable[int], n_columns: int, key: tuple[int, ...]) ->
     hours = [24 * (pd.Timestamp(year + 1, 1, 1) - pd.Timestamp(year, 1, 1)).days for year in years]
     drawn = [stream(*key, year).standard_normal((n, n_columns)) for year, n in zip(years, hours, strict=True)]
     return np.concatenate(drawn)
-
-
-def sine_of_elevation(latitude: float, day: Array, hour: Array) -> Array:
-    """Sine of the sun's angle above the horizon, from latitude, day of the year and solar time."""
-    declination = -np.deg2rad(23.44) * np.cos(2 * np.pi * (day + 10) / 365.25)
-    phi, angle = np.deg2rad(latitude), 2 * np.pi * (hour - 12) / 24
-    return np.sin(phi) * np.sin(declination) + np.cos(phi) * np.cos(declination) * np.cos(angle)
 
 
 def persistent(noise: Array, hours: float) -> Array:
@@ -103,13 +99,10 @@ class Law:
         below = self.width * np.logaddexp(0.0, (self.knee - temperature) / self.width)
         return self.slope * (temperature - 10.0) + self.limit * np.tanh(self.gain * below / self.limit)
 
-    def temperature(self, weather: pd.DataFrame) -> Array:
-        """Hourly temperature of the part in C, from hourly "air" and "sun"."""
-        return part_temperature(weather, self.hours, self.sun)
-
 
 def part_temperature(weather: pd.DataFrame, hours: float, sun: float) -> Array:
-    """Hourly temperature in C of a part with thermal inertia that full sunshine warms by ``sun`` K."""
+    """Hourly temperature in C of a part with thermal inertia that full sunshine warms by ``sun`` K, from hourly "air"
+    and "sun"."""
     return memory((weather["air"] + sun * weather["sun"]).to_numpy(), hours)
 
 
@@ -122,11 +115,16 @@ LAWS = {
     "soil": Law(slope=-0.5e-3, gain=2.5e-2, knee=0.0, width=1.0, limit=0.15, hours=96.0),
 }
 LAW_SCATTER = {"steel": 0.10, "concrete": 0.15, "composite": 0.15, "pavement": 0.25, "bearings": 0.30, "soil": 0.30}
-ATYPICAL_LAWS = ("reversed", "doubled", "knee elsewhere")
+ATYPICAL_LAWS: dict[str, Callable[[Law], dict[str, float]]] = {
+    "reversed": lambda law: {"slope": -law.slope, "gain": -law.gain},
+    "doubled": lambda law: {"slope": 2 * law.slope, "gain": 2 * law.gain, "limit": 2 * law.limit},
+    "knee elsewhere": lambda law: {"slope": law.slope / 4, "gain": law.gain + abs(law.slope), "knee": law.knee + 14.0},
+}
+"""How a law may differ from its family's."""
 
 
 def draw_law(material: str, atypical_law: str | None, random: np.random.RandomState) -> Law:
-    """The law of one part of a bridge: its family's with its own coefficients."""
+    """The law of one part of a bridge: its family's with its own coefficients, and perhaps of another kind."""
     family, scatter = LAWS[material], LAW_SCATTER[material]
     law = replace(
         family,
@@ -136,16 +134,7 @@ def draw_law(material: str, atypical_law: str | None, random: np.random.RandomSt
         hours=family.hours * np.exp(0.2 * random.standard_normal()),
         sun=family.sun * np.exp(0.2 * random.standard_normal()),
     )
-    return law if atypical_law is None else estranged(law, atypical_law)
-
-
-def estranged(law: Law, how: str) -> Law:
-    """A law that is not the family's: reversed, doubled, or with its knee elsewhere."""
-    if how == "reversed":
-        return replace(law, slope=-law.slope, gain=-law.gain)
-    if how == "doubled":
-        return replace(law, slope=2 * law.slope, gain=2 * law.gain, limit=2 * law.limit)
-    return replace(law, slope=law.slope / 4, gain=law.gain + abs(law.slope), knee=law.knee + 14.0)
+    return law if atypical_law is None else replace(law, **ATYPICAL_LAWS[atypical_law](law))
 
 
 @dataclass(frozen=True)
@@ -158,10 +147,6 @@ class Thermometer:
     noise: float  # in C
     hours: float  # thermal inertia of its place
     sun: float  # warming by full sunshine in K
-
-    def temperature(self, weather: pd.DataFrame) -> Array:
-        """Hourly temperature of its place in C, as it would read it without noise."""
-        return self.offset + part_temperature(weather, self.hours, self.sun)
 
 
 def draw_thermometers(random: np.random.RandomState) -> list[Thermometer]:
@@ -184,10 +169,8 @@ def draw_thermometers(random: np.random.RandomState) -> list[Thermometer]:
 
 
 def measured(clean: Array, level: Array, gaps: float, outliers: float, rows: NDArray[np.intp], drawn: Array) -> Array:
-    """Frequencies with noise, outliers and gaps; ``rows`` are the places of the records in the hourly noise ``drawn``.
-
-    `columns_for` says how many columns ``drawn`` has.
-    """
+    """Frequencies with noise, outliers and gaps; ``rows`` are the places of the records in the hourly noise ``drawn``,
+    which has five columns for each mode, and one for outages."""
     n_modes = clean.shape[1]
     white, lasting, missing, is_wrong, error = np.split(drawn[:, : 5 * n_modes], 5, axis=1)
     lasting, missing = persistent(lasting, 48.0)[rows], persistent(missing, 18.0)[rows]
@@ -199,30 +182,3 @@ def measured(clean: Array, level: Array, gaps: float, outliers: float, rows: NDA
     share = gaps * (1 - share_of_outages) / (1 - gaps * share_of_outages)  # of what is measured at all
     is_missing = (missing < ndtri(share)) | (outage < ndtri(gaps * share_of_outages))
     return np.where(is_missing, np.nan, values)
-
-
-def columns_for(n_modes: int) -> int:
-    """Columns of hourly noise that `measured` needs: five for each mode, and one for outages."""
-    return 5 * n_modes + 1
-
-
-def readings(
-    thermometers: Sequence[Thermometer],
-    weather: pd.DataFrame,
-    means: Callable[[Array], Array],
-    gaps: float,
-    rows: NDArray[np.intp],
-    drawn: Array,
-) -> dict[str, Array]:
-    """Readings of the thermometers: ``means`` of hourly temperatures over each record, with noise and gaps.
-
-    ``drawn`` is hourly noise with two columns for each thermometer.
-    """
-    noise, missing = np.split(drawn, 2, axis=1)
-    is_missing = persistent(missing, 18.0)[rows] < ndtri(gaps)
-    return {
-        thermometer.name: np.where(
-            is_missing[:, i], np.nan, means(thermometer.temperature(weather)) + thermometer.noise * noise[rows, i]
-        )
-        for i, thermometer in enumerate(thermometers)
-    }

@@ -61,12 +61,16 @@ def draw_weather(n_hours: int, random: np.random.RandomState) -> pd.DataFrame:
     steady = 13.2 + 7.75 * season
     anomaly = (3.5 + 0.9 * season) * 2.5 * np.tanh(anomaly / 2.5)  # at most 2.5 standard deviations
     first_winter = slice(1236, 5424)  # from the first temperature to the retrofit
-    steady += anomaly * scale_for_scatter(steady[first_winter], anomaly[first_winter])
+    (a, b), (_, c) = np.cov(steady[first_winter], anomaly[first_winter])
+    scale = (np.sqrt(max(b**2 + c * (4.2**2 - a), 0.0)) - b) / c  # with which both together scatter by 4.2 C
+    steady += anomaly * np.clip(scale, 0.7, 1.3)
     clear = 0.4 + 1.2 * norm.cdf(cloud)
     swing = clear * (1.0 + 4.0 * (1 + season) / 2)  # from 1 C in winter to 5 C in summer
     hour = index.hour.to_numpy()
     steel = steady + swing * cycle(hour)
-    spell = cold_spell(index, steel, for_spell)
+    january = np.flatnonzero((index.month == 1) & (index.year == index[0].year + 1))
+    coldest, wanted = january[steel[january].argmin()], -2.9 + 0.3 * for_spell.standard_normal()
+    spell = (wanted - steel[coldest]) * np.exp(-(((np.arange(len(index)) - coldest) / 60.0) ** 2))  # fades over days
     steel += spell
     sun = steady + spell + 1.4 * swing * cycle(hour + 2.0)
     weather = {
@@ -83,22 +87,6 @@ def cycle(hour: Array) -> Array:
     """Daily cycle of mean 0, which is higher in the afternoon (1.25) than low at night (-0.75)."""
     angle = 2 * np.pi * (hour - 16.0) / 24
     return np.cos(angle) + np.cos(2 * angle) / 4
-
-
-def scale_for_scatter(season: Array, anomaly: Array, scatter: float = 4.2) -> float:
-    """Factor of the anomalies with which season and anomalies together scatter by 4.2 C, within limits."""
-    (a, b), (_, c) = np.cov(season, anomaly)
-    scale = (np.sqrt(max(b**2 + c * (scatter**2 - a), 0.0)) - b) / c
-    return float(np.clip(scale, 0.7, 1.3))
-
-
-def cold_spell(index: pd.DatetimeIndex, steel: Array, random: np.random.RandomState) -> Array:
-    """Change that brings the coldest hour of the first January to about -3 C, fading over days before and after it."""
-    january = np.flatnonzero((index.month == 1) & (index.year == index[0].year + 1))
-    coldest = january[steel[january].argmin()]
-    wanted = -2.9 + 0.3 * random.standard_normal()
-    hours = np.arange(len(index)) - coldest
-    return (wanted - steel[coldest]) * np.exp(-((hours / 60.0) ** 2))
 
 
 def smooth_noise(n_hours: int, n_columns: int, hours: float, random: np.random.RandomState) -> Array:
@@ -154,11 +142,6 @@ def truth_structure() -> Structure:
     return Structure(bridge.nodes, bridge.members | bearings, bridge.supports, groups)
 
 
-def truth_model() -> AffineModel:
-    """The healthy bridge, updated, with the parameters ``KW51_TRUTH``."""
-    return updated_model(truth_structure(), KW51_TRUTH, 6)
-
-
 def retrofit_mass() -> Array:
     """Mass at the joints, in kg at each degree of freedom."""
     return np.array(
@@ -166,10 +149,8 @@ def retrofit_mass() -> Array:
     )
 
 
-def progress_of(index: pd.DatetimeIndex, retrofit: bool) -> pd.DataFrame:
+def progress_of(index: pd.DatetimeIndex) -> pd.DataFrame:
     """Shares of the retrofit's mass and stiffness that are there in each hour."""
-    if not retrofit:
-        return pd.DataFrame(0.0, index, ["mass", "stiffness"])
     days = ["2019-05-15", "2019-06-06", "2019-06-20", "2019-06-28", "2019-09-06", "2019-09-16"]
     shares = {"mass": [0.0, 0.0, 0.5, 0.5, 0.5, 1.0], "stiffness": [0.0, 0.0, 0.0, 0.5, 0.5, 1.0]}
     knots, hours = (pd.to_datetime(days) - index[0]) / pd.Timedelta(hours=1), np.arange(len(index))
@@ -177,7 +158,7 @@ def progress_of(index: pd.DatetimeIndex, retrofit: bool) -> pd.DataFrame:
 
 
 def simulate(
-    truth: AffineModel, theta: pd.DataFrame, mass: pd.Series, factors: pd.DataFrame, dofs: NDArray[np.intp] | None
+    truth: AffineModel, theta: pd.DataFrame, mass: pd.Series, factors: pd.DataFrame, dofs: list[int] | None
 ) -> tuple[Array, Array | None]:
     """Frequencies (n, 6) in Hz and, at ``dofs``, mode shapes (n, 6, n_dofs).
 
@@ -191,10 +172,14 @@ def simulate(
     for rows, changes in ((~is_changed, (0 * mass, factors.iloc[:, :0])), (is_changed, (mass, factors))):
         if rows.any():
             model, values = with_changes(truth, theta[rows], *(one[rows] for one in changes))
-            if shapes is None or dofs is None:
+            if shapes is None:
                 frequencies[rows] = model.frequencies(values)
-            else:
-                frequencies[rows], shapes[rows] = _modes_at(model, values, dofs)
+                continue
+            places = np.flatnonzero(rows)
+            for start in range(0, len(values), 200):  # rows whose shapes are in memory together
+                some = slice(start, start + 200)
+                frequencies[places[some]], everywhere = model.modes(values[some])
+                shapes[places[some]] = everywhere[:, dofs].transpose(0, 2, 1)
     return frequencies, shapes
 
 
@@ -215,21 +200,6 @@ def with_changes(
     return model.reduced(box, tol=1e-4, random_state=0), values
 
 
-def _modes_at(model: ReducedModel, theta: Array, dofs: NDArray[np.intp]) -> tuple[Array, Array]:
-    frequencies, shapes = np.empty((len(theta), 6)), np.empty((len(theta), 6, len(dofs)))
-    for start in range(0, len(theta), 200):  # rows whose shapes are in memory together
-        rows = slice(start, start + 200)
-        frequencies[rows], everywhere = model.modes(theta[rows])
-        shapes[rows] = everywhere[:, dofs].transpose(0, 2, 1)
-    return frequencies, shapes
-
-
-def missing_temperatures(index: pd.DatetimeIndex, random: np.random.RandomState) -> NDArray[np.bool_]:
-    """Hours without temperature: until the sensor was installed, and a few blocks later."""
-    block = smooth_noise(len(index), 1, 8.0, random)[:, 0] < ndtri(0.0122)
-    return block | (index < pd.Timestamp("2018-11-21 12:00"))
-
-
 def missing_modes(n_hours: int, random: np.random.RandomState) -> NDArray[np.bool_]:
     """Hours (n_hours, 6) in which a mode was not identified: in blocks, lateral modes of the arches together."""
     coverage, by_wind = np.array([0.30, 0.344, 0.950, 0.503, 0.879, 0.965]), np.array([0.55, 0.55, 0.0, 0.55, 0.0, 0.0])
@@ -237,14 +207,6 @@ def missing_modes(n_hours: int, random: np.random.RandomState) -> NDArray[np.boo
     wind, outage, *own = smooth_noise(n_hours, 2 + len(coverage), 4.0, random).T
     excitation = np.sqrt(by_wind) * wind[:, np.newaxis] + np.sqrt(1 - by_wind) * np.array(own).T
     return (excitation < ndtri(1 - coverage / (1 - outages))) | (outage < ndtri(outages))[:, np.newaxis]
-
-
-def draw_damping(steel: Array, random: np.random.RandomState) -> Array:
-    """Damping ratios (n_hours, 6), lower when it is warm, with the scatter of an identification."""
-    at_ten_degrees, deviation = np.array([0.009, 0.007, 0.008, 0.006, 0.005, 0.004]), 0.25
-    mean = at_ten_degrees * (1 - 0.006 * (steel[:, np.newaxis] - 10.0))
-    scatter = deviation * random.standard_normal(mean.shape)
-    return mean * np.exp(scatter - deviation**2 / 2)
 
 
 def measured_shapes(clean: Array, random: np.random.RandomState) -> NDArray[np.complex128]:
@@ -375,20 +337,23 @@ def make_kw51_campaign(
     seeds = as_random_state(random_state).randint(2**31 - 1, size=6)
     for_weather, for_noise, for_damping, for_sensor, for_gaps, for_shapes = map(np.random.RandomState, seeds)
 
-    sensors, truth = kw51_sensors(), truth_model()
+    sensors, truth = kw51_sensors(), updated_model(truth_structure(), KW51_TRUTH, 6)
     weather = draw_weather(n_hours, for_weather)
     index, theta = weather.index, thermal_multipliers(weather)
-    progress = progress_of(index, retrofit)
+    progress = retrofit * progress_of(index)
     strengthened = {group: share * progress["stiffness"] for group, share in STIFFENED.items()}
     factors = stiffness_factors(index, 8766.0, truth.groups, drift, damage, damage_from, strengthened)  # hours a year
     clean, clean_shapes = simulate(truth, theta, progress["mass"], factors, list(sensors.values()) if shapes else None)
 
     frequencies = clean * (1 + deviations * identification_noise(clean.shape, correlation, for_noise))
-    damping = draw_damping(weather["steel"].to_numpy(), for_damping)
+    at_ten_degrees, deviation = np.array([0.009, 0.007, 0.008, 0.006, 0.005, 0.004]), 0.25
+    damping = at_ten_degrees * (1 - 0.006 * (weather[["steel"]].to_numpy() - 10.0))  # lower when it is warm
+    damping *= np.exp(deviation * for_damping.standard_normal(damping.shape) - deviation**2 / 2)
     temperatures = weather["steel"].to_frame("tBD31A")
     missing = np.zeros(clean.shape, dtype=bool)
     if gaps:
-        temperatures[missing_temperatures(index, for_sensor)] = np.nan
+        is_lost = smooth_noise(n_hours, 1, 8.0, for_sensor)[:, 0] < ndtri(0.0122)
+        temperatures[is_lost | (index < "2018-11-21 12:00")] = np.nan  # the sensor was not there yet
         missing = missing_modes(n_hours, for_gaps)
     frequencies[missing], damping[missing] = np.nan, np.nan
     modes, ratios = [[f"{letter}{mode + 1}" for mode in range(6)] for letter in ("f", "xi")]

@@ -94,10 +94,8 @@ def load_kw51(path: str | PathLike) -> KW51Monitoring:
         raise FileNotFoundError(f"{file} is not a file; expected trackedmodes.zip or trackedmodes.mat")
     data, findings = _data(read_matlab(file), file)
     stored = file.read_bytes()
-    is_published = None  # of the unpacked file there is no checksum
-    if stored[126:128] not in (b"IM", b"MI"):
-        md5 = hashlib.md5(stored, usedforsecurity=False).hexdigest()
-        is_published = md5 == PUBLISHED_MD5
+    md5, is_unpacked = hashlib.md5(stored, usedforsecurity=False).hexdigest(), stored[126:128] in (b"IM", b"MI")
+    is_published = None if is_unpacked else md5 == PUBLISHED_MD5  # of the unpacked file there is no checksum
     if is_published is False:
         text = (
             f"{file} has the MD5 checksum {md5}, the published trackedmodes.zip has {PUBLISHED_MD5}. Its content may "

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from skthermo._core.arrays import check_flag, positive_integer
+from skthermo._core.arrays import check_flag, check_names, positive_integer
 from skthermo.fem import AffineModel, Beam, Membrane, Structure
 
 Section = dict[str, float]
@@ -62,11 +62,6 @@ def of_rectangles(*rectangles: tuple[float, float, float, float]) -> Section:
         "I_yy": float((area * (depth**2 / 12 + z**2)).sum()),
         "I_zz": float((area * (width**2 / 12 + y**2)).sum()),
     }
-
-
-def times(number: float, section: Section) -> Section:
-    """Several members side by side that bend independently."""
-    return {name: number * value for name, value in section.items()}
 
 
 Node = tuple[object, ...]
@@ -137,11 +132,18 @@ def kw51_structure() -> Structure:
     sides = (0, N_PANELS)
     stations = sorted({*range(N_BAYS + 1), *(N_BAYS * x for x in PIPE_PLACES)})  # of an arch
     feet = range(2, N_BAYS, 4)
-    hangers = [hanger(foot, head, line) for line in sides for foot in feet for head in heads(foot)]
-    connection = rectangle(0.31, 0.045)
+    hangers = [  # a V-pair of braces reaches the arch at least one bay away from the supports
+        hanger(foot, head, line)
+        for line in sides
+        for foot in feet
+        for head in (max(foot - 2, 1), min(foot + 2, N_BAYS - 1))
+    ]
+    connection, t_beam = rectangle(0.31, 0.045), tee(1.235, 0.6, 0.08)
+    across = [[("deck", station, line) for line in range(N_PANELS + 1)] for station in range(N_BAYS + 1)]
     parts = {
-        "girders": beams("girder", (along_deck(line) for line in sides), t_beam()),
-        "transverse_beams": transverse_beams(),
+        "girders": beams("girder", (along_deck(line) for line in sides), t_beam),
+        "transverse_beams": beams("transverse beam", across[1:-1], t_beam)
+        | beams("transverse beam", across[::N_BAYS], t_beam, 1.4),  # those at the ends are stiffer
         "stiffeners": stiffeners(),
         "plate": membranes("plate", E=210e9, t=0.015, density=7850.0),
         "ballast": membranes("ballast", E=550e6, t=0.6, density=1500.0),
@@ -187,11 +189,6 @@ def along_deck(line: int) -> list[Node]:
     return [("deck", station, line) for station in range(N_BAYS + 1)]
 
 
-def heads(foot: int) -> tuple[int, int]:
-    """Stations of the arch that a V-pair of braces reaches, at least one bay away from the supports."""
-    return max(foot - 2, 1), min(foot + 2, N_BAYS - 1)
-
-
 def hanger(foot: int, head: int, line: int) -> list[Node]:
     """Nodes of a connection, a brace and a connection in line, from deck to arch."""
     joints = [("joint", foot, head, line, end) for end in ("deck", "arch")]
@@ -208,24 +205,13 @@ def beams(part: str, chains: Iterable[Sequence[Node]], section: Section, stiffne
     }
 
 
-def transverse_beams() -> dict[Node, Beam]:
-    """Across the deck at every station; those at the ends are stiffer."""
-    lines = [[("deck", station, line) for line in range(N_PANELS + 1)] for station in range(N_BAYS + 1)]
-    first, *inner, last = lines
-    return beams("transverse beam", inner, t_beam()) | beams("transverse beam", [first, last], t_beam(), 1.4)
-
-
-def t_beam() -> Section:
-    """Of girders and transverse beams."""
-    return tee(1.235, 0.6, 0.08)
-
-
 def stiffeners() -> dict[Node, Beam]:
     """All stiffeners, lumped at the lines of the mesh in proportion to the tributary width of each."""
     gathered = {}
     for line in range(N_PANELS + 1):
-        width = 12.4 / N_PANELS / (2 if line in (0, N_PANELS) else 1)
-        gathered |= beams("stiffener", [along_deck(line)], times(width / 0.5, channel(0.25, 0.25, 0.008)))
+        number = 12.4 / N_PANELS / (2 if line in (0, N_PANELS) else 1) / 0.5
+        section = {name: number * value for name, value in channel(0.25, 0.25, 0.008).items()}
+        gathered |= beams("stiffener", [along_deck(line)], section)
     return gathered
 
 
@@ -300,18 +286,16 @@ def make_kw51(
            [0.487, 1.146],
            [0.459, 1.07 ]])
     """
-    if parameters is None:
-        names = ("E_bot", "E_arc", "E_br", "E_con", "E_pip")
-    elif isinstance(parameters, str):
-        names = tuple(KW51_PARAMETERS) if parameters == "all" else (parameters,)
-    else:
-        names = tuple(parameters) if isinstance(parameters, Collection) else ()
-    if not names or len(set(names)) < len(names) or not set(names) <= set(KW51_PARAMETERS):
-        raise ValueError(f"parameters is {parameters!r}; expected 'all' or some, each once, of {list(KW51_PARAMETERS)}")
+    thermal = ["E_bot", "E_arc", "E_br", "E_con", "E_pip"]
+    names = thermal if parameters is None else parameters
+    if isinstance(names, str):
+        names = list(KW51_PARAMETERS) if names == "all" else [names]
+    names = check_names(names, "parameters", KW51_PARAMETERS)
+    bound = {name: KW51_PARAMETERS[name] for name in names}
     n_modes = positive_integer(n_modes, "n_modes")
-    if not check_flag(updated, "updated"):
-        return kw51_structure().assemble({name: KW51_PARAMETERS[name] for name in names}, n_modes=n_modes, track=True)
-    return updated_model(kw51_structure(), {name: KW51_PARAMETERS[name] for name in names}, n_modes)
+    if check_flag(updated, "updated"):
+        return updated_model(kw51_structure(), bound, n_modes)
+    return kw51_structure().assemble(bound, n_modes=n_modes, track=True)
 
 
 def updated_model(structure: Structure, parameters: Mapping[str, Any], n_modes: int) -> AffineModel:

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from skthermo._core.arrays import as_random_state, is_real, positive_integer, real_array
+from skthermo._core.arrays import as_random_state, is_real, mapping_of, positive_integer, real_array
+from skthermo._core.frames import check_stamp
 from skthermo.datasets._results import TrussCampaign
 from skthermo.fem import AffineModel, Bar, Structure, add_noise
 from skthermo.fem.damage import LossKind
@@ -83,11 +84,6 @@ def truss_structure() -> Structure:
         supports=sheet["supports"],
         groups={group: [str(member) for member in members] for group, members in groups.items()},
     )
-
-
-def truss_of_zones() -> AffineModel:
-    """The truss whose parameters are Young's moduli in the thermal zones."""
-    return truss_structure().assemble(TRUSS_ZONES, groups=TRUSS_GROUPS)
 
 
 def steel_modulus(temperature: ArrayLike) -> NDArray[np.float64]:
@@ -222,7 +218,7 @@ def make_truss_campaign(
         index=index,
         columns=TRUSS_ZONES,
     )
-    model = truss_of_zones()
+    model = truss_structure().assemble(TRUSS_ZONES, groups=TRUSS_GROUPS)
     theta = steel_modulus(temperatures)
     if drift is None and damage_from is None:
         clean = model.damaged({} if damage is None else damage, kind=kind).frequencies(theta)
@@ -250,38 +246,17 @@ def stiffness_factors(
     strengthened: Mapping[str, pd.Series] | None = None,
 ) -> pd.DataFrame:
     """Factor of the stiffness of each changed group in every record."""
-    years = pd.Series(np.arange(len(index)) / records_per_year, index)
-    is_damaged = pd.Series(index >= _onset(index, damage_from), index)
-    lost = {
-        "drift": {group: rate * years for group, rate in _by_group(drift, "drift", groups).items()},
-        "damage": {group: severity * is_damaged for group, severity in _by_group(damage, "damage", groups).items()},
-    }
+    onset = index[0] if damage_from is None else check_stamp(damage_from, index, "damage_from")
+    if not index[0] <= onset <= index[-1]:
+        raise ValueError(f"damage_from is {damage_from!r}; expected a time from {index[0]} to {index[-1]}")
+    years = np.arange(len(index)) / records_per_year
     factors = {group: 1 + share for group, share in (strengthened or {}).items()}
-    for what, shares in lost.items():
-        for group, share in shares.items():
-            if share.max() >= 1:
+    for what, lost, course in (("drift", drift, years), ("damage", damage, index >= onset)):
+        expected = f"a mapping whose keys are some of {sorted(groups)}, to finite numbers"
+        for group, rate in mapping_of({} if lost is None else lost, what, expected).items():
+            if group not in groups or not is_real(rate) or not np.isfinite(rate):
+                raise ValueError(f"{what} is {lost!r:.200}; expected {expected}")
+            if (share := rate * course).max() >= 1:
                 raise ValueError(f"{what} of group {group!r} takes away {share.max():g} of its stiffness; expected < 1")
             factors[group] = factors.get(group, 1.0) * (1 - share)
     return pd.DataFrame(factors, index)
-
-
-def _by_group(values: Mapping[str, float] | None, what: str, groups: Collection[str]) -> Mapping[str, float]:
-    values = {} if values is None else values
-    if not isinstance(values, Mapping) or not set(values) <= set(groups):
-        raise ValueError(f"{what} is {values!r:.200}; expected a mapping whose keys are some of {sorted(groups)}")
-    for group, value in values.items():
-        if not is_real(value) or not np.isfinite(value):
-            raise ValueError(f"{what} of group {group!r} is {value!r}; expected a finite number")
-    return values
-
-
-def _onset(index: pd.DatetimeIndex, damage_from: Stamp) -> pd.Timestamp:
-    if damage_from is None:
-        return index[0]
-    try:
-        onset = pd.Timestamp(damage_from)
-        if index[0] <= onset <= index[-1]:
-            return onset
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"damage_from is {damage_from!r}; expected a time without time zone ({error})") from error
-    raise ValueError(f"damage_from is {damage_from!r}; expected a time from {index[0]} to {index[-1]}")

@@ -1345,7 +1345,7 @@ REFUSED = [  # what is called, what is wrong, the call, and a word of the error
     ("MahalanobisDetector", "a constant", lambda: MahalanobisDetector().fit(F.assign(f2=7.0)), "'f2'"),
     ("identify_damage", "rad/s", lambda: studies.identify_damage(CHAIN, T, F * 2 * np.pi), "rad/s"),
     ("DataInformedFEM", "scored on another index", lambda: CHAIN.score(T, LATE), "indices"),
-    ("datasets.load_z24", "not that file", lambda: datasets.load_z24(__file__), "header"),
+    ("datasets.load_z24", "not that file", lambda: datasets.load_z24(__file__), "readable CSV"),
     ("fem.read_triplets", "infinite values", lambda: fem.read_triplets(FOLDER / "infinite.sti"), "finite"),
     ("fem.AffineModel.frequencies", "1e308", lambda: TRUSS.frequencies([[1e308, 1, 1, 1]]), "theta"),
     ("fem.Structure", "1e308", lambda: truss_of(BARS | {"tie": Bar("left", "right", 1e308, 1.0)}), "E"),

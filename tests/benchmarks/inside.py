@@ -3,7 +3,7 @@
 import importlib
 
 PLACES = {
-    "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "persistent", "stream"],
+    "datasets._fleet_site": ["Law", "SiteClimate", "drawn_by_hour", "part_temperature", "persistent", "stream"],
     "datasets._kw51_campaign": ["memory"],
     "fem.external._files": ["form_of", "read_file"],
     "monitoring._fleet": ["KnownBridge"],

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 import scipy.io
 from harness import DATA, autoregression, joined
-from inside import Law, SiteClimate, drawn_by_hour, memory, persistent, stream
+from inside import Law, SiteClimate, drawn_by_hour, memory, part_temperature, persistent, stream
 from scipy.signal import lfilter
 from scipy.special import ndtri
 from sklearn.pipeline import make_pipeline
@@ -318,7 +318,10 @@ def slow_soil(
         return hourly[rows[0] : rows[-1] + HOURS].reshape(len(index), HOURS).mean(axis=1)
 
     soil = means(memory(weather["air"].to_numpy(), 24 * SOIL_DAYS))
-    zones = {name: soil if law is SOIL_LAW else means(law.temperature(weather)) for name, law in LAWS.items()}
+    zones = {
+        name: soil if law is SOIL_LAW else means(part_temperature(weather, law.hours, law.sun))
+        for name, law in LAWS.items()
+    }
     theta = np.exp(np.column_stack([LAWS[name].log_multiplier(values) for name, values in zones.items()]))
     box = np.column_stack([0.99 * theta.min(axis=0), 1.01 * theta.max(axis=0)])
     clean = truth_model().damaged(damage or {}).reduced(box, random_state=0).frequencies(theta)
@@ -373,7 +376,7 @@ class Site:
         weather = CLIMATE.weather(self.index[0], self.index[-1] + pd.Timedelta(hours=3), (seed, WEATHER))
         rows = weather.index.get_indexer(self.index)
         self.weather = {
-            part: Law(slope=0.0, hours=hours, sun=sun).temperature(weather)[rows]
+            part: part_temperature(weather, hours, sun)[rows]
             for part, (hours, sun) in {
                 "air": (0.0, 0.5),
                 "steel": (3.0, 5.0),

@@ -92,7 +92,7 @@ def test_drift_and_sudden_damage_are_those_of_the_damaged_model():
         ({"damage": {"deck": 0.2}}, "unknown damage group 'deck'"),
         ({"drift": {"deck": 0.01}}, "drift is .*'deck'.*expected a mapping whose keys are some of .*'bottom'"),
         ({"drift": {"top": 0.6}, "n_years": 2}, "drift of group 'top' takes away"),
-        ({"damage": {"top": 0.1}, "damage_from": "2025-01-05T00:00Z"}, "without time zone"),
+        ({"damage": {"top": 0.1}, "damage_from": "2025-01-05T00:00Z"}, "without a time zone"),
         ({"damage": {"top": 0.1}, "damage_from": "2024-12-31"}, "damage_from is '2024-12-31'; expected a time from"),
     ],
 )

@@ -83,10 +83,12 @@ LINES = csv_text().splitlines()
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"the header has the fields \[\]; expected \['record'"),
+        ("", "not a readable CSV file"),
+        (LINES[0], "the header has the fields .* and records"),
         ("\n".join(LINES).replace("Tair", "Tsea"), r"expected \['Tair'\] once"),
         ("\n".join(LINES)[:-3], "field 'state', row 11 is 'dama'"),
-        ("\n".join(LINES).replace(str(F["f2"][3]), "5,2"), "row 3 has 14 fields"),
+        ("\n".join(LINES).replace(str(F["f2"][3]), "5,2"), "Expected 13 fields in line 5, saw 14"),
+        ("\n".join(LINES)[:-12], "field 'state', row 11 is nan"),
         ("\n".join(LINES).replace(str(F["f2"][3]), "5.2x"), "field 'f2', row 3 is '5.2x'"),
         ("\n".join(LINES).replace(str(T["TS"][7]), "999"), "field 'TS', row 7 is 999.0; expected -60 to 80"),
         ("\n".join(LINES).replace("\n5,", "\n2,"), "field 'record', row 3 repeats 2"),
@@ -114,12 +116,6 @@ def test_bad_matlab_names_file_and_field(tmp_path, changes, message):
     scipy.io.savemat(tmp_path / "broken.mat", fields)
     with pytest.raises(ValueError, match=rf"broken\.mat.*{message}"):
         load_z24(tmp_path / "broken.mat")
-
-
-def test_a_table_far_too_large_is_refused(tmp_path):
-    (tmp_path / "large.csv").write_text(csv_text() + "0,1\n" * 4_000_000)
-    with pytest.raises(ValueError, match=r"large\.csv: \d+ MB; expected at most 13 MB"):
-        load_z24(tmp_path / "large.csv")
 
 
 FUZZ = settings(max_examples=50)
