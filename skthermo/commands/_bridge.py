@@ -59,7 +59,6 @@ class Bridge:
         self.identified: Any = None
         self.written: list[Path] = []
         self.errors: list[str] = []
-        self.said = ""
 
     def attempt(self, command: str) -> Exception | None:
         """Do the work of a command, which fails on this bridge alone; the error."""
@@ -91,10 +90,10 @@ class Bridge:
     def monitor_file(self) -> Path:
         return self.file if self.settings is None else self.settings.path(self.settings.files.monitor)
 
-    @property
-    def taken_file(self) -> Path:
-        """What was taken in from which files; named after the monitor, whose lock it is under."""
-        return self.monitor_file.with_name(f"{self.monitor_file.name}.taken.json")
+    @cached_property
+    def taken(self) -> Taken:
+        """What was taken in from which files, in a file named after the monitor, whose lock it is under."""
+        return Taken.read(self.monitor_file.with_name(f"{self.monitor_file.name}.taken.json"))
 
     def alone(self) -> Any:
         """Be the only process that changes the monitor."""
@@ -147,8 +146,7 @@ class Bridge:
             self.state, reason = "not evaluated", doubt
         self.code = FAILED if self.errors and CODES[self.state] != ALARM else CODES[self.state]
         newest = f" (newest record {monitor.last_})" if len(monitor.days_) else ""
-        self.said = f"state: {self.state}{newest}{f'; {reason}' if reason else ''}"
-        self.lines.append(self.said)
+        self.lines.append(f"state: {self.state}{newest}{f'; {reason}' if reason else ''}")
         if opened := [event for event in self.status_.events if event["kind"] != "watch"]:
             from skthermo.reporting.answers import acknowledgement, event_sentences  # of what a quiet job needs none
 
@@ -157,7 +155,7 @@ class Bridge:
                 if not event["acknowledged"]:
                     self.lines.append(f"when you know what it was: {acknowledgement(event['event'], self.call)}")
         self.lines += monitor.summary().splitlines()[1:]
-        before = None if self.settings is None else Taken.read(self.taken_file).settings
+        before = None if self.settings is None else self.taken.settings
         if before is not None and (changed := self.settings.changed_since(before)):
             text = (
                 f"{self.file}: {counted(len(changed), 'setting')} changed since the monitor was fitted: "
@@ -201,7 +199,8 @@ class Bridge:
                 shutil.copy2(file, file.with_name(f"{file.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{file.suffix}"))
             monitor.save(file)
             fitted = datetime.now(UTC).isoformat(timespec="seconds")
-            Taken(self.taken_file, layouts, {}, fitted, settings.of_a_fit).write()
+            self.taken = Taken(self.taken.file, layouts, {}, fitted, settings.of_a_fit)
+            self.taken.write()
         settings.path(settings.records.folder).mkdir(exist_ok=True)
         self.written.append(file)
         self.lines += [f"code that the settings name was run: {name}" for name in settings.code]
@@ -214,8 +213,8 @@ class Bridge:
     def update(self) -> None:
         """Evaluate what is new, and save the monitor."""
         with self.alone():
-            monitor, taken = self.load(), Taken.read(self.taken_file)
-            before, n_known, new = monitor.counts_, len(monitor.transitions()), self._new_files(monitor, taken)
+            monitor = self.load()
+            before, n_known, new = monitor.counts_, len(monitor.transitions()), self._new_files(monitor)
             read = list(self.lines)  # that a file is empty, or holds no records
             with collected() as findings:
                 evaluated, handed = self._take_in(monitor, new)
@@ -225,7 +224,7 @@ class Bridge:
             if not self.options.records:
                 for file in new:
                     if file.path in handed:
-                        taken.note(file, handed[file.path])
+                        self.taken.note(file, handed[file.path])
             self.identify_open(monitor)
             is_usual = self._describe_update(monitor, evaluated, before)
             self.append_transitions(monitor)
@@ -235,15 +234,20 @@ class Bridge:
                 if is_usual and not (changed or self.errors or read):
                     unknown = (evaluated["state"] == "not evaluated").sum()
                     came = counted(len(evaluated), "new record") + (f" ({unknown} not evaluated)" if unknown else "")
-                    self.lines = [f"{self.said}; {came}, nothing has changed".replace("\N{NO-BREAK SPACE}", " ")]
-            taken.state = self.state
-            taken.write()
+                    (state,) = [line for line in self.lines if line.startswith("state: ")]
+                    self.lines = [f"{state}; {came}, nothing has changed".replace("\N{NO-BREAK SPACE}", " ")]
+            self._keep_state()
         self.write_page(monitor)
 
-    def _new_files(self, monitor: Monitor, taken: Taken) -> list[NewFile]:
+    def _keep_state(self) -> None:
+        """Keep what was said and taken in for the next call."""
+        self.taken.state = self.state
+        self.taken.write()
+
+    def _new_files(self, monitor: Monitor) -> list[NewFile]:
         """Files with rows to take in: those that are named, or those of the folder, and of the baseline's files after
         its end, that were not taken in yet."""
-        settings, named = self.settings, self.options.records
+        settings, named, taken = self.settings, self.options.records, self.taken
         given = {name: getattr(self.options, name) for name in ("separator", "decimal", "stamps")}
         form = CsvFormat() if settings is None else settings.csv
         form = replace(form, **{name: value for name, value in given.items() if value is not None})
@@ -256,25 +260,26 @@ class Bridge:
                 try:
                     table = read_columns(file, form, settings.records, **options)
                 except ValueError:
-                    if settings.has_text_baseline or file.suffix.lower() in NO_TEXT_FILES:
-                        raise
+                    of_baseline = {Path(name).suffix.lower() for name in settings.records.baseline}
+                    if not of_baseline <= {*NO_TEXT_FILES} or file.suffix.lower() in NO_TEXT_FILES:
+                        raise  # [csv] was found in text files, and not in workbooks, which say nothing of texts
                     own = look_at(file, form.time_zone, wanted=settings.records.columns).form
                     table = read_columns(file, replace(own, missing=form.missing), settings.records, **options)
                 check_layout(table, file, settings.records, taken.layouts)
             table = in_zone(table, monitor.last_.tz, file).rename_axis(monitor.baseline_.index.name)
             return table if after is None else table[table.index > after]
 
-        sources: list[tuple[Path, pd.Timestamp | None]] = [(file, None) for file in named]
+        sources: dict[Path, pd.Timestamp | None] = dict.fromkeys(named)
         if not named:
-            later = settings.records.baseline if settings.records.until else []
             for file in files_in(settings.path(settings.records.folder)):
                 if why := taken.no_records(file, settings.records.columns):
                     self.lines += [f"no records in {file}: {why}"] if taken.is_first_seen(file) else []
                 else:
-                    sources.append((file, None))
-            sources += [(settings.path(name), monitor.baseline_.index[-1]) for name in later]
+                    sources[file] = None
+            later = settings.records.baseline if settings.records.until else []
+            sources |= {settings.path(name): monitor.baseline_.index[-1] for name in later}
         found = []
-        for file, after in sources:
+        for file, after in sources.items():
             with self.noting_errors_of(file):
                 reader = partial(read, after=after)
                 found.append(NewFile(file, reader(file), pd.DataFrame(), {}) if named else taken.new_in(file, reader))
@@ -346,14 +351,14 @@ class Bridge:
             doubt = "no new record could be evaluated" if len(new) else "no new record has come"
         self.describe(monitor, doubt, bool((evaluated["state"] == "alarm").any()))
         is_usual = len(new) == len(evaluated) and not (n_ahead or any(counts[name] for name in COUNTS))
-        return is_usual and self.state == Taken.read(self.taken_file).state
+        return is_usual and self.state == self.taken.state
 
     def append_transitions(self, monitor: Monitor) -> None:
         """Append what has changed to the file of transitions, for whoever holds the lock of the monitor."""
         name = self.settings.files.transitions if self.settings else ""
         if not name:
             return
-        own = {"bridge": self.name, "fitted": Taken.read(self.taken_file).fitted}
+        own = {"bridge": self.name, "fitted": self.taken.fitted}
         try:
             self.transitions = append_lines(self.settings.path(name), monitor.transitions(), own)
         except (OSError, ValueError) as error:
@@ -371,7 +376,6 @@ class Bridge:
         try:
             options = {} if self.settings is None else self.settings.page()
             options |= {"title": self.options.title} if self.options.title else {}
-            options.pop("fdr", None)
             options |= {"identified": self.identified, "settings": self.call}
             self.written.append(owner_report(monitor, page, now=self.options.now, **options))
         except Exception as error:  # it does not hide an alarm
@@ -442,9 +446,7 @@ class Bridge:
             if refused:
                 self.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
             self.append_transitions(monitor)
-            taken = Taken.read(self.taken_file)
-            taken.state = self.state
-            taken.write()
+            self._keep_state()
 
 
 def _is_news(line: str, changed: Collection[str]) -> bool:
@@ -523,10 +525,8 @@ class Taken:
     def read(cls, file: Path) -> Taken:
         """What an earlier call has left in a file beside the monitor; nothing if that cannot be read."""
         try:
-            content = json.loads(file.read_text(encoding="utf-8"))
-            names = ("layouts", "files", "fitted", "settings", "state", "others")
-            return cls(file, *(content[name] for name in names))
-        except (OSError, ValueError, KeyError, TypeError):
+            return cls(file, **json.loads(file.read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
             return cls(file)
 
     def write(self) -> None:

@@ -105,11 +105,10 @@ class Proposal:
         """Outages of a day or more, and of ten records or more, the longest first."""
         index = self.baseline.index
         steps = pd.Series(index[1:] - index[:-1], index[:-1])
-        long = steps[steps >= max(pd.Timedelta("1D"), 10 * self.step)].nlargest(3)
-        n_long = int((steps >= max(pd.Timedelta("1D"), 10 * self.step)).sum())
-        listed = "; ".join(f"{start} to {start + step} ({duration_text(step)})" for start, step in long.items())
-        if n_long:
-            yield f"outages: {n_long}, {'the longest ' if n_long > 3 else ''}{listed}"
+        long = steps[steps >= max(pd.Timedelta("1D"), 10 * self.step)].sort_values(ascending=False, kind="stable")
+        listed = [f"{start} to {start + step} ({duration_text(step)})" for start, step in long[:3].items()]
+        if listed:
+            yield f"outages: {len(long)}, {'the longest ' if len(long) > 3 else ''}{'; '.join(listed)}"
 
     @cached_property
     def detectors(self) -> list[TriedDetector]:

@@ -15,7 +15,7 @@ import sys
 import tomllib
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
@@ -28,8 +28,9 @@ from sklearn.base import clone
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import CompensatedDetector, DirectionalDetector
+from skthermo.fem import load_affine
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, unit_called
+from skthermo.preprocessing.loggers.logger_files import CsvFormat, unit_called
 
 HOW_TO_BEGIN = "skthermo init T.csv F.csv --into {}"
 REQUIRED = inspect.Parameter.empty  # the default of what has none
@@ -196,11 +197,6 @@ class Settings:
         return [name for name in now | then if now.get(name) != then.get(name) and name != "[records] folder"]
 
     @property
-    def has_text_baseline(self) -> bool:
-        """Whether [csv] was found in text files, and not in workbooks, which say nothing of the form of texts."""
-        return not all(Path(name).suffix.lower() in NO_TEXT_FILES for name in self.records.baseline)
-
-    @property
     def code(self) -> list[str]:
         """Functions of Python files that the settings name: programs, which a command runs."""
         named = {"fem": "model", "page": "structure"}
@@ -216,7 +212,9 @@ class Settings:
         steps = [*self.parts["features"], self.parts["regression"]]
         regression = make_pipeline(*steps) if len(steps) > 1 else steps[0]
         targets, reference = list(self.records.responses), list(self.records.reference) or None
-        last = with_directions_of(fem, self.parts["detector"])
+        last = self.parts["detector"]
+        if fem is not None and isinstance(last, DirectionalDetector) and isinstance(last.directions, str):
+            last = clone(last).set_params(directions=fem)  # which knows more than "softening"
         detector = CompensatedDetector(last, regression, targets=targets, **self.options["compensator"])
         return Monitor(detector, reference=reference, fem=fem, **self.options["monitor"])
 
@@ -225,7 +223,10 @@ class Settings:
         options = dict(self.options["fem"])
         if not options:
             return None
-        return called_by("fem")[0](_model(self.path(options.pop("model")), self.file), **options).fit(T, F)
+        path = self.path(options.pop("model"))
+        is_code = ".py:" in str(path)  # or matrices that other programs exported
+        model = _made_by(path, f"{self.file}: [fem] model", "a model") if is_code else load_affine(path)
+        return called_by("fem")[0](model, **options).fit(T, F)
 
     def page(self) -> dict[str, Any]:
         """Arguments of the owner's page."""
@@ -238,65 +239,39 @@ class Settings:
         return options
 
 
-def with_directions_of(fem: Any, detector: Any) -> Any:
-    """The detector, which takes the directions of damage from a fitted chain where it knows none but "softening"."""
-    if fem is None or not isinstance(detector, DirectionalDetector) or not isinstance(detector.directions, str):
-        return detector
-    return clone(detector).set_params(directions=fem)
-
-
-def _model(path: Path, settings: Path) -> Any:
-    """An FE model: what a function of a Python file gives, or matrices that other programs exported."""
-    if ".py:" in str(path):
-        return _made_by(path, f"{settings}: [fem] model", "a model")
-    from skthermo.fem import load_affine
-
-    return load_affine(path)
-
-
 def _made_by(path: Path, setting: str, what: str) -> Any:
-    """What a function of a Python file gives, as in "bridge.py:make_model"."""
+    """What a function of a Python file gives, as in "bridge.py:make_model".
+
+    It can import the files beside it, as when Python runs a script; another bridge may have files with the same names.
+    """
     file, _, function = str(path).rpartition(":")
     if not file.endswith(".py") or not Path(file).is_file():
         raise ValueError(
             f"{setting} is {str(path)!r}; expected a Python file and its function, such as 'bridge.py:make'"
         )
-    try:
-        with imports_from(Path(file).resolve().parent):
-            names = runpy.run_path(file, run_name=Path(file).stem)
-            if callable(names.get(function)):
-                return names[function]()
-    except Exception as error:  # code of users may raise anything
-        raise ValueError(f"{setting}: {_place_of(error, Path(file))}: {type(error).__name__}: {error}") from error
-    raise ValueError(f"{setting}: {file} has no function {function!r}; expected one that gives {what}")
-
-
-@contextmanager
-def imports_from(folder: Path) -> Iterator[None]:
-    """Files of a folder can be imported, as when Python runs a script in it; another bridge may have files with the
-    same names."""
-    before = set(sys.modules)
+    folder, before = Path(file).resolve().parent, set(sys.modules)
     sys.path.insert(0, str(folder))
     try:
-        yield
+        names = runpy.run_path(file, run_name=Path(file).stem)
+        if callable(names.get(function)):
+            return names[function]()
+    except Exception as error:  # code of users may raise anything
+        raise ValueError(f"{setting}: {_place_of(error, file)}: {type(error).__name__}: {error}") from error
     finally:
         sys.path.remove(str(folder))
         for name in set(sys.modules) - before:
             if Path(getattr(sys.modules[name], "__file__", None) or "").parent == folder:
                 del sys.modules[name]
+    raise ValueError(f"{setting}: {file} has no function {function!r}; expected one that gives {what}")
 
 
-def _place_of(error: BaseException, file: Path) -> str:
+def _place_of(error: Exception, file: str) -> str:
     """File and line of an error in a Python file, or in one beside it: the last line there that was run."""
-    folder, own, cause = file.resolve().parent, [], error
-    while cause is not None:
-        steps = traceback.extract_tb(cause.__traceback__)
-        own += [(step.filename, step.lineno) for step in steps if Path(step.filename).resolve().parent == folder]
-        cause = cause.__cause__
     if isinstance(error, SyntaxError):
-        own.append((error.filename, error.lineno))
-    name, line = own[-1] if own else (str(file), None)
-    return f"{name}, line {line}" if line else name
+        return f"{error.filename}, line {error.lineno}"
+    steps, folder = traceback.extract_tb(error.__traceback__), Path(file).resolve().parent
+    own = [step for step in steps if Path(step.filename).resolve().parent == folder]
+    return f"{own[-1].filename}, line {own[-1].lineno}" if own else file
 
 
 class SettingError(ValueError):
@@ -343,10 +318,10 @@ def _checked(file: Path, content: Mapping[str, Any]) -> Settings:
         if name in content or name not in ("fem", "page")
     }
     for name in ("files", "records", "csv"):
-        kinds = {key: setting.kind for key, setting in settings_of(called_by(name)[0]).items()}
-        if wrong := [key for key, value in values[name].items() if not fits(value, kinds[key])]:
-            got = f"[{name}] {wrong[0]} is {values[name][wrong[0]]!r:.100}"
-            raise SettingError(f"{got}; expected {kinds[wrong[0]]}", name, wrong[0])
+        known_settings = settings_of(called_by(name)[0])
+        for key, value in values[name].items():
+            if not fits(value, kind := known_settings[key].kind):
+                raise SettingError(f"[{name}] {key} is {value!r:.100}; expected {kind}", name, key)
     files, records, form = (called_by(name)[0](**values[name]) for name in ("files", "records", "csv"))
     parts: dict[str, Any] = {name: _made(name, content[name]) for name in ("regression", "detector")}
     parts["features"] = [_made("features", one, number) for number, one in enumerate(content.get("features", ()))]

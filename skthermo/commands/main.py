@@ -154,7 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {sentence(error)}", file=sys.stderr)
         facts["errors"].append(sentence(error))
     if options.json:
-        _print(json.dumps(plain(facts), indent=1, ensure_ascii=False, allow_nan=False))
+        _print([json.dumps(plain(facts), indent=1, ensure_ascii=False, allow_nan=False)])
     return facts["exit_code"]
 
 
@@ -174,10 +174,12 @@ def _run(options: argparse.Namespace, facts: dict[str, Any]) -> None:
     logger.info("%s ends with exit code %s", options.name, facts["exit_code"])
 
 
-def _print(text: str) -> None:
-    """Print a text, or nothing more once its reader has gone, as ``head`` does."""
+def _print(lines: Sequence[str], options: argparse.Namespace | None = None) -> None:
+    """Print lines, unless the options ask for JSON; nothing more once their reader has gone, as ``head`` does."""
+    if options is not None and options.json:
+        return
     try:
-        print(text, flush=True)
+        print("\n".join(lines), flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -269,8 +271,8 @@ def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
 
 def _say(bridge: Bridge, options: argparse.Namespace, number: int, error: Exception | None) -> None:
     heading, end = ([f"[{bridge.name}]"], [""]) if number > 1 else ([], [])
-    if not options.json and bridge.lines:
-        _print("\n".join([*heading, *bridge.lines, *end]))
+    if bridge.lines:
+        _print([*heading, *bridge.lines, *end], options)
     for text in bridge.errors:
         logger.error("%s%s", f"{bridge.name}: " if number > 1 else "", text)
     if error is not None and not isinstance(error, EXPLAINED):
@@ -296,8 +298,7 @@ def _as_fleet(
             found = fleet.discoveries(options.fdr)
             facts["fleet"]["summary"] += f"\n{found.summary()}"
             facts["fleet"]["discoveries"] = found.table.to_dict("records")
-        if not options.json:
-            _print(facts["fleet"]["summary"])
+        _print([facts["fleet"]["summary"]], options)
         if options.report is not None:
             from skthermo.reporting import owner_report
 
@@ -325,17 +326,14 @@ def _look(options: argparse.Namespace, facts: dict[str, Any]) -> int:
         file = found.write(options.into, options.bridge)
         facts["settings"] = str(file)
         lines += [f"chosen: {found.detectors[0]}", f"written: {file}", f"read it, then: skthermo fit {file}"]
-    if not options.json:
-        _print("\n".join(lines))
+    _print(lines, options)
     return HEALTHY if options.name == "init" or found.findings.table.empty else ALARM
 
 
 def _demonstrate(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     from skthermo.commands._demo import write_demo
 
-    lines = write_demo(options.folder, facts["time"])
-    if not options.json:
-        _print("\n".join(lines))
+    _print(write_demo(options.folder, facts["time"]), options)
     return HEALTHY
 
 
