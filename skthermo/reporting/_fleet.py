@@ -89,7 +89,7 @@ def write_fleet(
         back = {"title": title, "address": f"../{quote(file.name)}", "warnings": messages, "errors": errors}
         facts = {"title": str(name), "written": written, "fleet": back}
         if monitor is not None:
-            standing = Standing.at(monitor, now, limit, stages)
+            standing = Standing(monitor, now, limit, stages)
             unexplained = ended.loc[ended["bridge"] == name, "event"].tolist()
             bridge = watched(standing, name in found.bridges, unexplained)
             page = rendered("monitor", monitor_facts(standing) | facts, templates)

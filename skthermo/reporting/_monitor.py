@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from typing import Any, TypeAlias
@@ -13,7 +12,7 @@ import pandas as pd
 
 from skthermo._core.frames import DAY, YEAR, as_moment, midnight, midnights_between
 from skthermo.fem import Structure
-from skthermo.monitoring import Monitor, MonitorStatus
+from skthermo.monitoring import Monitor
 from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 from skthermo.reporting._page import Drawing, Row, draw, draw_structure, rows_of, settings_of
 from skthermo.reporting.answers import acknowledgement, event_sentences
@@ -21,37 +20,31 @@ from skthermo.reporting.answers import acknowledgement, event_sentences
 Time: TypeAlias = str | datetime | None
 
 
-@dataclass(frozen=True, eq=False)
 class Standing:
-    """A monitor, the time at which its page is written, in the time zone of the records, a limit of slow loss, and what
-    the monitor says at that time.
+    """What a monitor says at the time at which its page is written, by the clock where none is given.
 
-    ``errors`` are the stages that failed, such as "update" where the newest records could not be evaluated.
+    ``errors`` are the stages that failed, such as "update" where the newest records could not be evaluated; ``worn``
+    are groups whose slow loss of stiffness has reached the limit; ``opened`` are events that have not ended, but for
+    those to be watched; ``known`` are those that the owner has acknowledged as damage; ``waiting`` are numbers of
+    events that have ended and were not acknowledged: nobody has to explain a watch, or a sensor. ``drift`` is None
+    where it is not followed, and ``faults`` of sensors begin with the newest.
     """
 
-    monitor: Monitor
-    now: pd.Timestamp
-    limit: float
-    errors: tuple[str, ...]
-    status: MonitorStatus
-    events: pd.DataFrame
-    days: pd.DataFrame
-    evaluations: pd.DataFrame
-
-    @classmethod
-    def at(cls, monitor: Monitor, now: Time, limit: float, errors: Iterable[str] = ()) -> Standing:
-        """Now is by the clock where no time is given."""
-        now = as_moment(now, monitor.last_.tz)
-        facts = monitor.status(now), monitor.events_, monitor.days_, monitor.evaluations_
-        return cls(monitor, now, limit, tuple(dict.fromkeys(errors)), *facts)
-
-    @property
-    def has_records(self) -> bool:
-        return self.status.records.newest is not None
-
-    @property
-    def last(self) -> pd.Timestamp:
-        return self.monitor.last_
+    def __init__(self, monitor: Monitor, now: Time, limit: float, errors: Iterable[str] = ()):
+        self.monitor, self.limit, self.errors = monitor, limit, tuple(dict.fromkeys(errors))
+        self.now, self.last = as_moment(now, monitor.last_.tz), monitor.last_
+        self.status, self.days, self.evaluations = monitor.status(self.now), monitor.days_, monitor.evaluations_
+        self.has_records = self.status.records.newest is not None
+        self.years = (self.last - self.days.index[0]) / YEAR if self.has_records else 0.0
+        self.faults = rows_of(monitor.faults_[::-1])
+        self.drift = None if monitor.drift_ is None else rows_of(monitor.drift_)
+        self.worn = [one["name"] for one in self.drift or () if one["significant"] and one["change"] <= -limit]
+        self.opened = [event for event in self.status.events if event["kind"] != "watch"]
+        self.events = events = monitor.events_
+        is_explained = events["acknowledged"].astype(bool)
+        self.known = events[is_explained & ~events["harmless"].astype(bool)]
+        is_open = events["end"].isna() | ~events["kind"].isin(["damage", "drift"])
+        self.waiting = events.index[~is_open & ~is_explained].tolist()
 
     @property
     def state(self) -> str:
@@ -75,51 +68,14 @@ class Standing:
         return ends.max() if len(ends) else self.days.index[0]
 
     @property
-    def known(self) -> pd.DataFrame:
-        """Events that the owner has acknowledged as damage."""
-        events = self.events
-        return events[events["acknowledged"].astype(bool) & ~events["harmless"].astype(bool)]
-
-    @property
-    def drift(self) -> list[Row] | None:
-        """Change of the stiffness of each group; None where it is not followed."""
-        return None if self.monitor.drift_ is None else rows_of(self.monitor.drift_)
-
-    @property
-    def worn(self) -> list[str]:
-        """Groups whose slow loss of stiffness has reached the limit."""
-        return [one["name"] for one in self.drift or () if one["significant"] and one["change"] <= -self.limit]
-
-    @property
-    def opened(self) -> list[Row]:
-        """Events that have not ended, but for those to be watched."""
-        return [event for event in self.status.events if event["kind"] != "watch"]
-
-    @property
-    def faults(self) -> list[Row]:
-        """Faults of sensors, the newest first."""
-        return rows_of(self.monitor.faults_[::-1])
-
-    @property
     def history(self) -> list[Row]:
         """Events, the newest first, each with the sensors that failed in its time, before the monitor had noticed."""
-        rows, faults = rows_of(self.events[::-1]), self.faults
+        rows = rows_of(self.events[::-1])
         for event in rows:
             start, end = event["start"] - DAY, event["end"] or self.last
-            failing = [one for one in faults if one["since"] <= end and one["detected"] > start]
+            failing = [one for one in self.faults if one["since"] <= end and one["detected"] > start]
             event["failed"] = sorted({str(one["column"]) for one in failing})
         return rows
-
-    @property
-    def waiting(self) -> list[int]:
-        """Numbers of events that have ended and were not acknowledged; nobody has to explain a watch, or a sensor."""
-        events = self.events[self.events["kind"].isin(["damage", "drift"])]
-        return events.index[events["end"].notna() & ~events["acknowledged"].astype(bool)].tolist()
-
-    @property
-    def years(self) -> float:
-        """Time in service."""
-        return (self.last - self.days.index[0]) / YEAR if self.has_records else 0.0
 
     @property
     def recent(self) -> Row:

@@ -126,7 +126,7 @@ def owner_report(
         write_fleet(subject, file, title, now, limit, fdr, folder)
         return file
     if kind == "Monitor":
-        facts = monitor_facts(Standing.at(subject, now, limit), structure) | {"call": settings}
+        facts = monitor_facts(Standing(subject, now, limit), structure) | {"call": settings}
         facts["identified"] = None if identified is None else identified_facts(identified)
     else:
         from skthermo.reporting._study import study_facts

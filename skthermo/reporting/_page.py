@@ -68,10 +68,10 @@ def rendered(name: str, facts: Mapping[str, Any], folder: str = "") -> str:
     jinja2 = import_optional("jinja2", extra="pages")
     try:
         return environment_of(folder).get_template(f"{name}.html.j2").render(facts)
-    except ImportError:  # of what draws
-        raise
     except Exception as error:
-        place = _place(error, folder)
+        frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
+        inside = [(file, line) for file, line in frames if file.startswith(folder) and file.endswith(".html.j2")]
+        place = "{}, line {}".format(*inside[-1]) if inside else ""
         if not folder or not (place or isinstance(error, jinja2.TemplateError | UnicodeDecodeError)):
             raise
         raise ValueError(f"{place or folder}: {error}") from error
@@ -106,7 +106,7 @@ def environment_of(folder: str = "") -> Environment:
         loader=jinja2.ChoiceLoader([*changed, own, jinja2.PrefixLoader({"skthermo": own})]),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
-        finalize=_printable,
+        finalize=lambda value: "" if value is None else value if hasattr(value, "__html__") else printable(value),
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -130,20 +130,6 @@ def rows_of(table: pd.DataFrame) -> list[Row]:
 def sections_of(page: str) -> list[tuple[str, str]]:
     """Anchors and headings of the sections of a page, as HTML."""
     return re.findall(r'<section id="([^"]+)"[^>]*>\s*<h2[^>]*>(.*?)</h2>', page, re.DOTALL)
-
-
-def _printable(value: Any) -> Any:
-    """What a template writes: nothing for None, and text without control characters."""
-    if value is None:
-        return ""
-    return value if hasattr(value, "__html__") else printable(value)
-
-
-def _place(error: Exception, folder: str = "") -> str:
-    """File and line of the innermost template, perhaps of those in a folder, through which an error came."""
-    frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
-    found = [(file, line) for file, line in frames if file.startswith(folder) and file.endswith(".html.j2")]
-    return f"{found[-1][0]}, line {found[-1][1]}" if found else ""
 
 
 @lru_cache(maxsize=1)
@@ -223,22 +209,19 @@ def draw(
         plt = import_optional("matplotlib.pyplot", extra="plot")
     except ImportError:
         return drawn
-    others = set(plt.get_fignums())
     settings = {"svg.hashsalt": "skthermo", "figure.facecolor": "white", "savefig.dpi": 150}
-    try:
-        with plt.style.context("default"), plt.rc_context(settings):
-            figure = make().figure_
-            own_width, own_height = figure.get_size_inches()
-            figure.set_size_inches(width, own_height / own_width * width + 0.5 if height is None else height)
-            _fold_legend(figure, legend)
-            if title:
-                shown = textwrap.shorten(printable(title), 50, placeholder=" ...")
-                figure.axes[0].set_title(shown, fontsize="medium", parse_math=False)
-            drawn = drawn._replace(source=f"data:image/svg+xml;base64,{b64encode(_svg(figure)).decode()}")
-            return drawn if table is None else drawn._replace(**_places(figure.axes[0], table, is_scatter))
-    finally:
-        for number in set(plt.get_fignums()) - others:
-            plt.close(number)
+    with plt.style.context("default"), plt.rc_context(settings):
+        figure = make().figure_
+        own_width, own_height = figure.get_size_inches()
+        figure.set_size_inches(width, own_height / own_width * width + 0.5 if height is None else height)
+        _fold_legend(figure, legend)
+        if title:
+            shown = textwrap.shorten(printable(title), 50, placeholder=" ...")
+            figure.axes[0].set_title(shown, fontsize="medium", parse_math=False)
+        drawn = drawn._replace(source=f"data:image/svg+xml;base64,{b64encode(_svg(figure)).decode()}")
+        drawn = drawn if table is None else drawn._replace(**_places(figure.axes[0], table, is_scatter))
+        plt.close(figure)
+        return drawn
 
 
 def _fold_legend(figure: Figure, place: str | None) -> None:
