@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
 import skthermo.plotting._display as shared
-from skthermo._core.arrays import Array, as_columns, is_real, real_array
+from skthermo._core.arrays import Array, as_columns, real_array
 from skthermo._core.estimators import check_is_fitted, last_step
 from skthermo._core.frames import check_same_rows, check_stamp, midnights_between
 from skthermo._core.warnings import collected, warn_each
@@ -473,12 +473,10 @@ class DamageIndexDisplay(Display):
             raise ValueError(f"{estimator!r:.200} has no method 'score_samples'; expected an outlier detector")
         threshold = getattr(last, "threshold_", -getattr(last, "offset_", np.nan))
         tables = X if isinstance(X, Mapping) else {"records": X}
-        indices = {}
-        for label, records in tables.items():
-            if hasattr(estimator, "damage_index"):
-                indices[label] = estimator.damage_index(records)
-            else:
-                indices[label] = pd.Series(-estimator.score_samples(records), getattr(records, "index", None))
+        indices = {
+            label: pd.Series(-estimator.score_samples(one), one.index if isinstance(one, pd.DataFrame) else None)
+            for label, one in tables.items()
+        }
         name = "damage index (Mahalanobis, unsquared)" if isinstance(last, MahalanobisDetector) else "damage index"
         return cls.from_predictions(indices, threshold, **{"label": name, **options})
 
@@ -517,12 +515,12 @@ class DamageIndexDisplay(Display):
         for title, by_label in by_title.items():
             if not isinstance(by_label, Mapping) or not by_label:
                 raise ValueError(f"damage index is {by_label!r:.200}; expected one or more by label")
-            own = {str(label): as_table(one, f"damage index {label!r}", is_one=True) for label, one in by_label.items()}
-            tables[title] = own
-            value = given.get(title)
-            is_known = is_real(value) or (isinstance(value, pd.Series) and len(value) > 0)
-            if not is_known or not np.isfinite(np.asarray(value, dtype=float)).all():
-                raise ValueError(f"threshold{f' of {title!r}' if title else ''} is {value!r}; expected a number")
+            tables[title] = {
+                str(label): as_table(one, f"damage index {label!r}", is_one=True) for label, one in by_label.items()
+            }
+            value, what = given.get(title), f"threshold{f' of {title!r}' if title else ''}"
+            if not (values := real_array(value, what)).size or not np.isfinite(values).all():
+                raise ValueError(f"{what} is {value!r}; expected a number")
         return cls._drawn(tables, {title: given[title] for title in tables}, **options)
 
     def plot(

@@ -251,7 +251,7 @@ class StructureDisplay(Display):
             place = {"location": "top", "shrink": 0.5, "aspect": 40} if is_low else {"shrink": 0.8, "pad": 0.02}
             self.colorbar_ = self.figure_.colorbar(shown, ax=self.ax_, label=shared.plain(self.label or ""), **place)
         else:
-            self._draw_groups(rest, linewidth if isinstance(linewidth, Mapping) else {}, linewidth)
+            self._draw_groups(rest, 2.5 if linewidth is None else linewidth)
         for one in self.axes_:
             draw_supports(one, self.structure, rest, axes, size=7.0 if moved else 11.0)
             one.set_axis_off()
@@ -287,15 +287,16 @@ class StructureDisplay(Display):
                 clim = limits or ((min(known), max(known)) if known else (0.0, 1.0))
                 self.members_[kind].set(array=array, cmap=colours, clim=clim)
 
-    def _draw_groups(self, rest: Places, widths: Mapping[str, float], width: Any) -> None:
+    def _draw_groups(self, rest: Places, width: Any) -> None:
         """Members of each group in its colour, in the order of the groups, over all others."""
         names = self.groups or ()
         others = set(self.structure.members).difference(*(self.structure.groups[name] for name in names))
         parts = [("other members", others, LIGHT if names else GREY)]
         parts += [(name, self.structure.groups[name], COLOURS[n % len(COLOURS)]) for n, name in enumerate(names)]
         for name, members, colour in parts:
-            own = widths.get(name, 2.5 if width is None or width is widths else width)
-            for kind, some in by_number_of_nodes(self.structure, members).items():
+            own = width.get(name, 2.5) if isinstance(width, Mapping) else width
+            in_order = [one for one in self.structure.members if one in members]
+            for kind, some in by_number_of_nodes(self.structure, in_order).items():
                 if kind != "points" or name in names:
                     label = shared.shortened(name) if names else None
                     self.members_[name] = self._add(self.ax_, rest, kind, some, colour, width=own, label=label)
@@ -331,8 +332,6 @@ def shapes_of(structure: Structure, model: FEModel | None, modes: Sequence[int] 
     if not structure.dofs:
         raise ValueError(f"{structure!r} has no labels of degrees of freedom; expected (node, direction) of each")
     if model is None:
-        if not structure.groups:
-            raise ValueError("structure has no groups; expected model, such as structure.assemble(...)")
         model = structure.assemble(sorted(structure.groups), n_modes=max(modes or [0]) + 1)
     if not hasattr(model, "modes"):
         raise ValueError(f"{model!r:.200} has no method 'modes'; expected a model assembled from the structure")
@@ -386,9 +385,7 @@ def axes_of_view(structure: Structure, view: tuple[float, float] | None) -> Arra
         return unit
     moving = {direction for _, direction in dofs_of(structure)}
     extent = np.ptp(list(structure.nodes.values()), axis=0)
-    for normal in (
-        "yzx" if view is None else ""
-    ):  # a structure along one line is drawn with z upwards, if it moves there
+    for normal in "yzx" if view is None else "":  # a structure along one line has z upwards, if it moves there
         plane = "xyz".replace(normal, "")
         if extent["xyz".index(normal)] == 0 and moving <= {*plane, f"r{normal}"}:
             return unit[:, ["xyz".index(direction) for direction in plane]]
