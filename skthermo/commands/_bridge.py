@@ -272,10 +272,11 @@ class Bridge:
         sources: dict[Path, pd.Timestamp | None] = dict.fromkeys(named)
         if not named:
             for file in files_in(settings.path(settings.records.folder)):
-                if why := taken.no_records(file, settings.records.columns):
-                    self.lines += [f"no records in {file}: {why}"] if taken.is_first_seen(file) else []
-                else:
+                why = taken.why_no_records(file, settings.records.columns)
+                if why is None:
                     sources[file] = None
+                elif why:
+                    self.lines.append(f"no records in {file}: {why}")
             later = settings.records.baseline if settings.records.until else []
             sources |= {settings.path(name): monitor.baseline_.index[-1] for name in later}
         found = []
@@ -549,19 +550,16 @@ class Taken:
         is_finished = is_as_before or file.suffix.lower() in NO_TEXT_FILES or end in (b"\n", b"\r")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
 
-    def no_records(self, file: Path, columns: Sequence[str]) -> str:
-        """Why a file holds no records, as an empty one, or a text that names no column; "" if it does."""
-        if not file.stat().st_size:
-            return "the file is empty"
-        if file.suffix.lower() != ".txt" or self._key(file) in self.files:
-            return ""
-        return "" if any(name in text_of(file) for name in columns) else "it names no column of the records"
-
-    def is_first_seen(self, file: Path) -> bool:
-        """Whether a file without records is new, or has changed; it is known from now on."""
-        seen = {"size": file.stat().st_size, "changed": file.stat().st_mtime_ns}
-        before, self.others[self._key(file)] = self.others.get(self._key(file)), seen
-        return seen != before
+    def why_no_records(self, file: Path, columns: Sequence[str]) -> str | None:
+        """Why a file holds no records, as an empty one, or a text that names no column; "" once that was said of it,
+        until it changes. None if it may hold some."""
+        seen, key = {"size": file.stat().st_size, "changed": file.stat().st_mtime_ns}, self._key(file)
+        if seen["size"] and (
+            file.suffix.lower() != ".txt" or key in self.files or any(name in text_of(file) for name in columns)
+        ):
+            return None
+        before, self.others[key] = self.others.get(key), seen
+        return "" if seen == before else "it names no column of the records" if seen["size"] else "the file is empty"
 
     def _key(self, file: Path) -> str:
         """How a file is called: by its path from the folder of the monitor, wherever the command is started."""

@@ -7,11 +7,11 @@ import json
 import shutil
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,7 +23,7 @@ from skthermo._core.files import write_when_complete
 from skthermo._core.frames import usual_step
 from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected, warn_each
-from skthermo.preprocessing import ExponentialMeans, RecordFindings, check_records
+from skthermo.preprocessing import ExponentialMeans, check_records
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, PARQUET, CsvFormat, FileLook, read_file
 from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
 from skthermo.surrogate import TemperatureMapper
@@ -32,55 +32,25 @@ BASELINE = "baseline"  # folder to which the files of the baseline are copied
 REGRESSION = "sklearn.linear_model.Ridge"
 
 
-class TriedDetector(NamedTuple):
-    """A detector by its class and settings, what it evaluates, what it finds, and how small changes are that it finds.
-
-    The ``size`` is the geometric mean of the smallest changes of each response alone, infinite where none is found.
-    """
-
-    kind: str
-    compensator: Mapping[str, Any]
-    text: str
-    finds: str
-    size: float
-
-    def __str__(self) -> str:
-        return f"{self.kind}, {self.text}: {self.finds}"
-
-
-@dataclass(frozen=True)
 class Proposal:
-    """What was found in files of records, and the settings that are proposed for them."""
+    """What was found in files of records up to the end of the baseline, and the settings that are proposed for them."""
 
-    read: LoggerRecords
-    form: CsvFormat
-    records: settings.RecordSettings
-    baseline: pd.DataFrame
-    findings: RecordFindings
-    means: ExponentialMeans | None
-
-    @classmethod
-    def found(cls, options: argparse.Namespace) -> Proposal:
-        """Look at files, and at their records up to the end of the baseline."""
+    def __init__(self, options: argparse.Namespace):
         roles = options.temperatures, options.responses, options.reference
-        read = LoggerRecords.read(options.files, *roles, options.zone, options.stamps)
+        self.read = read = LoggerRecords.read(options.files, *roles, options.zone, options.stamps)
         warn_each(finding for look in read.looks for finding in look.findings)
         copies, until = [f"{BASELINE}/{look.file.name}" for look in read.looks], options.until
-        baseline = read.table if until is None else read.table.loc[:until]
-        if not len(baseline):
+        self.baseline = read.table if until is None else read.table.loc[:until]
+        if not len(self.baseline):
             raise ValueError(f"no record is from before {until}; the first is of {read.table.index[0]}")
         others = {"ignore": list(read.ignored), "convert": read.convert, "until": until}
-        records = settings.RecordSettings(copies, **read.roles, **others)
-        T, F = baseline[records.temperatures], baseline[records.responses]
+        self.records = settings.RecordSettings(copies, **read.roles, **others)
+        T, F = self.baseline[self.records.temperatures], self.baseline[self.records.responses]
         units = set(read.units.values())
         chosen = TemperatureMapper().behind_means(T, F)
-        means = chosen[0] if isinstance(chosen, Pipeline) else None
-        findings = check_records(T, F, unit=units.pop() if len(units) == 1 else "")
-        return cls(read, form_of_all(read.looks), records, baseline, findings, means)
-
-    @property
-    def step(self) -> pd.Timedelta:
-        return usual_step(self.baseline.index)
+        self.means: ExponentialMeans | None = chosen[0] if isinstance(chosen, Pipeline) else None
+        self.findings = check_records(T, F, unit=units.pop() if len(units) == 1 else "")
+        self.form, self.step = form_of_all(read.looks), usual_step(self.baseline.index)
 
     def account(self) -> Iterator[str]:
         for look in self.read.looks:
@@ -111,10 +81,11 @@ class Proposal:
             yield f"outages: {len(long)}, {'the longest ' if len(long) > 3 else ''}{'; '.join(listed)}"
 
     @cached_property
-    def detectors(self) -> list[TriedDetector]:
+    def detectors(self) -> list[dict[str, Any]]:
         """Detectors that are possible, the best first; the single record where nothing speaks for another.
 
-        Of natural frequencies, those that know in which direction damage moves them.
+        Of natural frequencies, those that know in which direction damage moves them. The ``size`` is the geometric mean
+        of the smallest changes of each response alone that are found, infinite where none is found.
         """
         parts = {"features": [settings.class_named("features", kind)(**chosen) for kind, chosen, _ in self.features]}
         parts["regression"] = settings.class_named("regression", REGRESSION)()
@@ -131,11 +102,17 @@ class Proposal:
             try:
                 with collected():  # the fit that follows gives them
                     smallest = made.monitor().fit(self.baseline).smallest_changes_
-                size, finds = float(np.exp(np.log(list(smallest.single.values())).mean())), str(smallest)
+                size, finds = np.exp(np.log(list(smallest.single.values())).mean()), str(smallest)
             except ValueError as error:
                 size, finds = np.inf, f"it cannot be fitted to this baseline: {error}"
-            tried.append(TriedDetector(kind, chosen, f"{text}{falls}", finds, size if np.isfinite(size) else np.inf))
-        return sorted(tried, key=lambda one: one.size)
+            one = {
+                "kind": kind,
+                "compensator": chosen,
+                "text": f"{text}{falls}",
+                "said": f"{kind}, {text}{falls}: {finds}",
+            }
+            tried.append(one | {"size": size if np.isfinite(size) else np.inf})
+        return sorted(tried, key=lambda one: one["size"])
 
     @property
     def features(self) -> list[tuple[str, dict[str, Any], str]]:
@@ -179,12 +156,12 @@ class Proposal:
             ("csv", None, asdict(self.form), "How CSV files are written."),
             *(("features", *chosen) for chosen in self.features),
             ("regression", REGRESSION, {}, "Predicts the responses from the inputs: any of scikit-learn's regressors."),
-            ("compensator", None, best.compensator, f"Takes out what the weather explains, of {best.text}."),
-            ("detector", best.kind, {}, "Gives the damage index of what is left."),
+            ("compensator", None, best["compensator"], f"Takes out what the weather explains, of {best['text']}."),
+            ("detector", best["kind"], {}, "Gives the damage index of what is left."),
             ("monitor", None, self.monitor_options, "The detector in service."),
         ]
         written = f"Settings of a monitor, written by skthermo {skthermo.__version__}."
-        found = [*self.account(), *self.findings.summary().splitlines(), *map(str, self.detectors)]
+        found = [*self.account(), *self.findings.summary().splitlines(), *(one["said"] for one in self.detectors)]
         parts = [_comment(f"{written} Lines with # say what else can be set."), _comment("Found in the records:")]
         parts += [*(_comment(f"- {one}") for one in found), *(_section(*call) for call in calls)]
         optional = files("skthermo.commands").joinpath("optional_sections.toml").read_text(encoding="utf-8")

@@ -319,13 +319,13 @@ def _look(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     """Say what files of records hold and, of init, write settings that fit them."""
     from skthermo.commands._proposal import Proposal  # for jobs that look at files
 
-    found = Proposal.found(options)
+    found = Proposal(options)
     facts["findings"] = found.findings.table.to_dict("records")
     lines = [*found.account(), found.findings.summary()]
     if options.name == "init":
         file = found.write(options.into, options.bridge)
         facts["settings"] = str(file)
-        lines += [f"chosen: {found.detectors[0]}", f"written: {file}", f"read it, then: skthermo fit {file}"]
+        lines += [f"chosen: {found.detectors[0]['said']}", f"written: {file}", f"read it, then: skthermo fit {file}"]
     _print(lines, options)
     return HEALTHY if options.name == "init" or found.findings.table.empty else ALARM
 

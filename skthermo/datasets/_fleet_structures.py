@@ -55,19 +55,19 @@ def truss(design: Design, fine: bool) -> Structure:
     of = {name: group for group in ("bottom", "top", "diagonal") for name in sheet.groups[group]}
     members: dict[Hashable, Element] = {}
     for name, bar in sheet.members.items():
-        stiffness = design[f"EA_{of.get(name, 'diagonal')}"]
-        steel = {"E": YOUNG["steel"], "A": stiffness / YOUNG["steel"], "density": 7850.0}
-        members[name] = Bar(*bar.nodes, **steel)
+        area = design[f"EA_{of.get(name, 'diagonal')}"] / YOUNG["steel"]
+        members[name] = Bar(*bar.nodes, E=YOUNG["steel"], A=area, density=7850.0)
     bottom = sorted(sheet.groups["bottom"])
     for name in bottom:
         members["pavement", name] = Bar(*sheet.members[name].nodes, E=YOUNG["steel"], A=design["EA_pavement"] / 210e9)
     for node in map(str, range(1, 7)):
         members["floor", node] = PointMass(node, design["mass"])
     bearings = {
-        ("bearing", "1", "y"): Spring("1", "y", design["k_bearing"]),
-        ("bearing", "6", "y"): Spring("6", "y", design["k_bearing"]),
-        ("bearing", "1", "x"): Spring("1", "x", design["k_bearing"]),
-        ("bearing", "6", "x"): Spring("6", "x", design["k_sliding"]),
+        ("bearing", node, along): Spring(
+            node, along, design["k_sliding" if (node, along) == ("6", "x") else "k_bearing"]
+        )
+        for along in "yx"
+        for node in "16"
     }
     pavement = [("pavement", name) for name in bottom]
     groups = {zone: sheet.groups[zone] for zone in ("T1", "T2", "T3", "top", "bottom")} | {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -18,28 +18,22 @@ from skthermo.datasets._results import KW51Campaign
 from skthermo.datasets._truss import Stamp, stiffness_factors
 from skthermo.fem import AffineModel, Element, ReducedModel, Spring, Structure
 
-KW51_TRUTH = {
-    "E_gir": "deck_beams",
-    "E_pla": "plate",
-    "E_arc": "arch",
-    "E_br": "braces",
-    "E_con": "connections",
-    "E_pip": "pipes",
-    "E_b": "ballast",
-    "I_33g": ("I_yy", "girders"),
-    "K_bea": "bearings",
-    "M_b": ("mass", "ballast"),
+Bounds = float | tuple[float, float]
+KW51_TRUTH: dict[str, tuple[str | tuple[str, str], Bounds, Callable[[pd.DataFrame], pd.Series]]] = {
+    "E_gir": ("deck_beams", 0.02, lambda felt: 1 - 3.6e-4 * felt["steel"]),
+    "E_pla": ("plate", 0.02, lambda felt: 1 - 3.6e-4 * felt["slab"]),
+    "E_arc": ("arch", 0.02, lambda felt: 1 - 3.6e-4 * felt["sun"]),
+    "E_br": ("braces", 0.02, lambda felt: 1 - 3.6e-4 * felt["sun"]),
+    "E_con": ("connections", 0.035, lambda felt: 1 - 8e-4 * felt["sun"]),
+    "E_pip": ("pipes", 0.02, lambda felt: 1 - 3.6e-4 * felt["sun"]),
+    "E_b": ("ballast", (0.9, 1.7), lambda felt: (1 - 1.5e-3 * felt["slab"]) * (1 + 0.5 * felt["frozen"])),
+    "I_33g": (("I_yy", "girders"), (0.9, 2.2), lambda felt: (1 - 1.5e-3 * felt["slab"]) * (1 + 1.0 * felt["frozen"])),
+    "K_bea": ("bearings", (0.6, 1.6), lambda felt: np.exp(-0.012 * felt["steel"])),
+    "M_b": (("mass", "ballast"), 0.025, lambda felt: 1 + 0.0033 * felt["moisture"]),
 }
-"""Parameters of the healthy bridge, as `Structure.assemble` binds them."""
-WEATHER_BOX: dict[str, float | tuple[float, float]] = {
-    **dict.fromkeys(("E_gir", "E_pla", "E_arc", "E_br", "E_pip"), 0.02),
-    "E_con": 0.035,
-    "E_b": (0.9, 1.7),
-    "I_33g": (0.9, 2.2),
-    "K_bea": (0.6, 1.6),
-    "M_b": 0.025,
-}
-"""What weather does to them stays within these bounds."""
+"""Parameters of the healthy bridge: what they are, as `Structure.assemble` binds them, the bounds within which weather
+keeps them, and their multipliers in the weather that is felt: temperatures above 10 C, the mean before the retrofit,
+the share that is frozen, and moisture."""
 STIFFENED = {"arch_connections": 0.906, "deck_connections": 0.430}
 ADDED_MASSES = {"arch": 353.0, "deck": 837.0}  # kg at each joint of brace and connection
 
@@ -108,27 +102,6 @@ def memory(values: Array, hours: float) -> Array:
     return scipy.signal.lfilter([1 - decay], [1, -decay], values, zi=decay * values[:1])[0]
 
 
-def thermal_multipliers(weather: pd.DataFrame) -> pd.DataFrame:
-    """Multipliers of the parameters ``KW51_TRUTH`` in every hour."""
-    warm = weather[["steel", "sun", "slab"]] - 10.0  # near the mean before the retrofit
-    frozen = 1 - np.exp(-weather["frost"] / 2.0)
-    steel, connections, deck = 3.6e-4, 8e-4, 1.5e-3  # softer by 1/K
-    return pd.DataFrame(
-        {
-            "E_gir": 1 - steel * warm["steel"],
-            "E_pla": 1 - steel * warm["slab"],
-            "E_arc": 1 - steel * warm["sun"],
-            "E_br": 1 - steel * warm["sun"],
-            "E_con": 1 - connections * warm["sun"],
-            "E_pip": 1 - steel * warm["sun"],
-            "E_b": (1 - deck * warm["slab"]) * (1 + 0.5 * frozen),
-            "I_33g": (1 - deck * warm["slab"]) * (1 + 1.0 * frozen),
-            "K_bea": np.exp(-0.012 * warm["steel"]),
-            "M_b": 1 + 0.0033 * weather["moisture"],
-        }
-    )
-
-
 def truth_structure() -> Structure:
     """KW51 with bearings that resist sliding and rocking."""
     bridge, ends, lines = kw51_structure(), (0, N_BAYS), (0, N_PANELS)
@@ -188,7 +161,8 @@ def with_changes(
 ) -> tuple[ReducedModel, Array]:
     """A reduced model whose parameters are those of the weather and the changes, with errors below 1e-5, and its
     theta."""
-    model, values, box = truth, np.column_stack([theta, 1 + mass, factors]), dict(WEATHER_BOX)
+    model, values = truth, np.column_stack([theta, 1 + mass, factors])
+    box = {name: bounds for name, (_, bounds, _) in KW51_TRUTH.items()}
     if mass.any():
         model, box = model.with_mass_parameters({"retrofit": retrofit_mass()}), box | {"1 + retrofit": (1.0, 2.0)}
     else:
@@ -337,9 +311,14 @@ def make_kw51_campaign(
     seeds = as_random_state(random_state).randint(2**31 - 1, size=6)
     for_weather, for_noise, for_damping, for_sensor, for_gaps, for_shapes = map(np.random.RandomState, seeds)
 
-    sensors, truth = kw51_sensors(), updated_model(truth_structure(), KW51_TRUTH, 6)
+    sensors, truth = (
+        kw51_sensors(),
+        updated_model(truth_structure(), {name: what for name, (what, _, _) in KW51_TRUTH.items()}, 6),
+    )
     weather = draw_weather(n_hours, for_weather)
-    index, theta = weather.index, thermal_multipliers(weather)
+    index, frozen = weather.index, 1 - np.exp(-weather["frost"] / 2.0)
+    felt = (weather[["steel", "sun", "slab"]] - 10.0).assign(frozen=frozen, moisture=weather["moisture"])
+    theta = pd.DataFrame({name: multiplier(felt) for name, (_, _, multiplier) in KW51_TRUTH.items()})
     progress = retrofit * progress_of(index)
     strengthened = {group: share * progress["stiffness"] for group, share in STIFFENED.items()}
     factors = stiffness_factors(index, 8766.0, truth.groups, drift, damage, damage_from, strengthened)  # hours a year

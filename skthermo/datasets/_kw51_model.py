@@ -69,43 +69,31 @@ Node = tuple[object, ...]
 N_BAYS, N_PANELS = 32, 4  # of the mesh along and across the deck
 PIPE_PLACES = (0.25, 0.385, 0.615, 0.75)  # shares of the span
 KW51_STEEL = {"E": 210e9, "G": 210e9 / 2.6, "density": 7850.0, "I_p": 0.0, "lumped": True}
-KW51_PARAMETERS = {
-    "E_bot": "bottom",
-    "E_arc": "arch",
-    "E_br": "braces",
-    "E_con": "connections",
-    "E_pip": "pipes",
-    "E_b": "ballast",
-    "A_c": ("A", "connections", "stiffness"),
-    "A_p": ("A", "pipes", "stiffness"),
-    "I_33p": ("I_yy", "pipes"),
-    "I_22p": ("I_zz", "pipes"),
-    "A_d": ("A", "braces", "stiffness"),
-    "I_33a": ("I_yy", "arch"),
-    "I_22a": ("I_zz", "arch"),
-    "A_a": ("A", "arch", "stiffness"),
-    "J_a": ("J", "arch"),
-    "M_a": ("mass", "arch"),
-    "I_33g": ("I_yy", "girders"),
-    "I_22g": ("I_zz", "girders"),
-    "M_g": ("mass", "girders"),
-    "A_tb": ("A", "transverse_beams", "stiffness"),
-    "I_22s": ("I_zz", "stiffeners"),
+KW51_PARAMETERS: dict[str, tuple[str | tuple[str, ...], float]] = {
+    "E_bot": ("bottom", 1.3),
+    "E_arc": ("arch", 0.9),
+    "E_br": ("braces", 0.9),
+    "E_con": ("connections", 0.9),
+    "E_pip": ("pipes", 0.942523),
+    "E_b": ("ballast", 1.0),
+    "A_c": (("A", "connections", "stiffness"), 1.5),
+    "A_p": (("A", "pipes", "stiffness"), 1.0),
+    "I_33p": (("I_yy", "pipes"), 1.0),
+    "I_22p": (("I_zz", "pipes"), 0.5),
+    "A_d": (("A", "braces", "stiffness"), 1.031471),
+    "I_33a": (("I_yy", "arch"), 1.0),
+    "I_22a": (("I_zz", "arch"), 1.128122),
+    "A_a": (("A", "arch", "stiffness"), 1.016123),
+    "J_a": (("J", "arch"), 1.0),
+    "M_a": (("mass", "arch"), 0.711763),
+    "I_33g": (("I_yy", "girders"), 1.0),
+    "I_22g": (("I_zz", "girders"), 1.0),
+    "M_g": (("mass", "girders"), 1.0),
+    "A_tb": (("A", "transverse_beams", "stiffness"), 1.0),
+    "I_22s": (("I_zz", "stiffeners"), 1.0),
 }
-KW51_UPDATED = {
-    "E_bot": 1.3,
-    "E_arc": 0.9,
-    "E_br": 0.9,
-    "E_con": 0.9,
-    "E_pip": 0.942523,
-    "A_c": 1.5,
-    "I_22p": 0.5,
-    "A_d": 1.031471,
-    "I_22a": 1.128122,
-    "A_a": 1.016123,
-    "M_a": 0.711763,
-}
-"""Multipliers of the updated model: the optimum of the third fit of examples/plot_kw51_updating.py."""
+"""What parameters are, as `Structure.assemble` binds them, and their multipliers in the updated model: the optimum of
+the third fit of examples/plot_kw51_updating.py."""
 
 
 def kw51_structure() -> Structure:
@@ -291,7 +279,7 @@ def make_kw51(
     if isinstance(names, str):
         names = list(KW51_PARAMETERS) if names == "all" else [names]
     names = check_names(names, "parameters", KW51_PARAMETERS)
-    bound = {name: KW51_PARAMETERS[name] for name in names}
+    bound = {name: KW51_PARAMETERS[name][0] for name in names}
     n_modes = positive_integer(n_modes, "n_modes")
     if check_flag(updated, "updated"):
         return updated_model(kw51_structure(), bound, n_modes)
@@ -300,9 +288,10 @@ def make_kw51(
 
 def updated_model(structure: Structure, parameters: Mapping[str, Any], n_modes: int) -> AffineModel:
     """The model of a structure that has KW51's members, as updated, with parameters bound as `Structure.assemble`."""
-    bound = parameters | {name: KW51_PARAMETERS[name] for name in KW51_UPDATED}
+    updated = {name: factor for name, (_, factor) in KW51_PARAMETERS.items() if factor != 1}
+    bound = parameters | {name: KW51_PARAMETERS[name][0] for name in updated}
     model = structure.assemble(bound, n_modes=n_modes, track=True)
-    theta = [KW51_UPDATED.get(name, 1.0) for name in model.parameter_names]
+    theta = [updated.get(name, 1.0) for name in model.parameter_names]
     return model.rescaled(theta).with_parameters(list(parameters))
 
 

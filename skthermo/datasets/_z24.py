@@ -136,8 +136,15 @@ def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
     data = _matlab_field(content, "data", file)
     if data.ndim != 2 or data.shape[1] != len(Z24_MODES) or not len(data):
         raise ValueError(f"{file}: field 'data' has shape {data.shape}; expected (n, {len(Z24_MODES)})")
-    columns: dict[str, NDArray] = {"record": _matlab_hours(content, len(data), file)}
-    columns |= dict(zip(Z24_MODES, data.T, strict=True))
+    columns = {"record": np.arange(float(len(data)))} | dict(zip(Z24_MODES, data.T, strict=True))
+    if "idx" in content:
+        mask = _matlab_field(content, "idx", file).ravel()
+        if not np.isin(mask, (0, 1)).all() or mask.sum() != len(data):
+            raise ValueError(
+                f"{file}: field 'idx' marks {np.count_nonzero(mask == 1)} of {mask.size} hours; "
+                f"expected a mask of zeros and ones that marks the {len(data)} rows of 'data'"
+            )
+        columns["record"] = np.flatnonzero(mask).astype(float)
     for sensor in Z24_SENSORS:
         values = _matlab_field(content, f"Z24_{sensor}", file)
         if values.size != len(data):
@@ -150,18 +157,6 @@ def _read_matlab(file: Path) -> tuple[pd.DataFrame, list[str]]:
         raise ValueError(f"{file}: field 'nc' is {n_undamaged.tolist()}; expected a number of rows up to {len(data)}")
     count = int(n_undamaged.item())
     return pd.DataFrame(columns), ["undamaged"] * count + ["damaged"] * (len(data) - count)
-
-
-def _matlab_hours(content: dict[str, object], n_records: int, file: Path) -> NDArray[np.float64]:
-    if "idx" not in content:
-        return np.arange(float(n_records))
-    mask = _matlab_field(content, "idx", file).ravel()
-    if not np.isin(mask, (0, 1)).all() or mask.sum() != n_records:
-        raise ValueError(
-            f"{file}: field 'idx' marks {np.count_nonzero(mask == 1)} of {mask.size} hours; "
-            f"expected a mask of zeros and ones that marks the {n_records} rows of 'data'"
-        )
-    return np.flatnonzero(mask).astype(float)
 
 
 def _matlab_field(content: dict[str, object], name: str, file: Path) -> NDArray[np.float64]:

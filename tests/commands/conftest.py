@@ -1,7 +1,5 @@
 """A truss with a monitor made by commands alone, which no test changes."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from tests.commands.folders import made_bridge
@@ -11,8 +9,8 @@ from tests.monitoring.nightly import truss_records
 @pytest.fixture
 def one_detector(monkeypatch):
     """``init`` need not choose a detector where its files are what matters."""
-    one = {"kind": "MahalanobisDetector", "compensator": {}, "text": "each record for itself", "finds": "", "size": 1.0}
-    monkeypatch.setattr("skthermo.commands._proposal.Proposal.detectors", [SimpleNamespace(**one)])
+    one = {"kind": "MahalanobisDetector", "compensator": {}, "text": "each record for itself", "said": "", "size": 1.0}
+    monkeypatch.setattr("skthermo.commands._proposal.Proposal.detectors", [one])
 
 
 @pytest.fixture(scope="session")
