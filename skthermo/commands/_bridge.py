@@ -59,9 +59,10 @@ class Bridge:
         self.identified: Any = None
         self.written: list[Path] = []
         self.errors: list[str] = []
+        self.error: Exception | None = None
 
-    def attempt(self, command: str) -> Exception | None:
-        """Do the work of a command, which fails on this bridge alone; the error."""
+    def attempt(self, command: str) -> None:
+        """Do the work of a command, which fails on this bridge alone."""
         try:
             if self.settings is not None:
                 self.name = self.settings.name
@@ -69,10 +70,8 @@ class Bridge:
                     self.metrics_file = self.settings.path(self.settings.files.metrics)
             getattr(self, command)()
         except Exception as error:  # Python's own exit code of an error would be that of an alarm
-            self.code, self.lines, self.state = FAILED, [], None
+            self.code, self.lines, self.state, self.error = FAILED, [], None, error
             self.errors.append(sentence(error))
-            return error
-        return None
 
     def facts(self) -> dict[str, Any]:
         """What JSON says of it."""

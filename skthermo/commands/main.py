@@ -246,17 +246,14 @@ def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
         raise ValueError(f"no new records are named for {files[0]}; expected their file, such as new.csv")
     of_fleet = {} if len(files) == 1 else {"report": None, "title": None}  # what is named is the fleet's page
     bridges = [Bridge(file, argparse.Namespace(**vars(options) | of_fleet)) for file in files]
-    errors: dict[str, Exception] = {}
     for bridge in bridges:
-        error = bridge.attempt(options.name)
-        _say(bridge, options, len(bridges), error)
-        if bridge.errors:
-            errors[bridge.name] = error or ValueError("; ".join(bridge.errors))
+        bridge.attempt(options.name)
+        _say(bridge, options, len(bridges))
     facts["bridges"] = [bridge.facts() for bridge in bridges]
     codes = {bridge.code for bridge in bridges}
     facts["exit_code"] = next(code for code in (ALARM, FAILED, NOT_EVALUATED, HEALTHY) if code in codes)
     if len(bridges) > 1 and options.name in ("update", "status", "report"):
-        _as_fleet(bridges, errors, options, facts)
+        _as_fleet(bridges, options, facts)
     metrics: dict[Path, list[dict[str, Any]]] = {}
     for bridge, one in zip(bridges, facts["bridges"], strict=True):
         for file in {options.metrics, bridge.metrics_file} - {None}:
@@ -269,20 +266,18 @@ def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     return facts["exit_code"]
 
 
-def _say(bridge: Bridge, options: argparse.Namespace, number: int, error: Exception | None) -> None:
+def _say(bridge: Bridge, options: argparse.Namespace, number: int) -> None:
     heading, end = ([f"[{bridge.name}]"], [""]) if number > 1 else ([], [])
     if bridge.lines:
         _print([*heading, *bridge.lines, *end], options)
     for text in bridge.errors:
         logger.error("%s%s", f"{bridge.name}: " if number > 1 else "", text)
-    if error is not None and not isinstance(error, EXPLAINED):
-        traceback.print_exception(error)
+    if bridge.error is not None and not isinstance(bridge.error, EXPLAINED):
+        traceback.print_exception(bridge.error)
     logger.info("%s %s: state %s, exit code %s", options.name, bridge.name, bridge.state, bridge.code)
 
 
-def _as_fleet(
-    bridges: Sequence[Bridge], errors: dict[str, Exception], options: argparse.Namespace, facts: dict[str, Any]
-) -> None:
+def _as_fleet(bridges: Sequence[Bridge], options: argparse.Namespace, facts: dict[str, Any]) -> None:
     """Say which alarms are significant among those of several bridges, and write their page."""
     from skthermo.monitoring import Fleet  # a job of one bridge needs none
 
@@ -291,6 +286,7 @@ def _as_fleet(
     if len(loaded) < len(working):
         names = [bridge.name for bridge in working]
         raise ValueError(f"bridges are called {names}; expected another name for each, as in [files]")
+    errors = {one.name: one.error or ValueError("; ".join(one.errors)) for one in bridges if one.errors}
     try:
         fleet = Fleet.of_monitors(ReadWhenAsked(loaded), errors)
         facts["fleet"] = {"summary": fleet.summary(), "page": None, "discoveries": []}

@@ -107,14 +107,14 @@ def part_temperature(weather: pd.DataFrame, hours: float, sun: float) -> Array:
 
 
 LAWS = {
-    "steel": Law(slope=-0.8e-3, hours=2.0, sun=3.0),
-    "concrete": Law(slope=-2.6e-3, gain=4e-3, knee=0.0, width=1.5, limit=0.10, hours=15.0, sun=6.0),
-    "composite": Law(slope=-1.6e-3, gain=2e-3, knee=0.0, width=1.5, limit=0.06, hours=8.0, sun=5.0),
-    "pavement": Law(slope=-2.5e-2, gain=4e-2, knee=0.0, width=1.0, limit=0.5, hours=5.0, sun=10.0),
-    "bearings": Law(slope=-3e-3, gain=1.2e-2, knee=-1.0, width=2.0, limit=0.15, hours=6.0),
-    "soil": Law(slope=-0.5e-3, gain=2.5e-2, knee=0.0, width=1.0, limit=0.15, hours=96.0),
+    "steel": (Law(slope=-0.8e-3, hours=2.0, sun=3.0), 0.10),
+    "concrete": (Law(slope=-2.6e-3, gain=4e-3, knee=0.0, width=1.5, limit=0.10, hours=15.0, sun=6.0), 0.15),
+    "composite": (Law(slope=-1.6e-3, gain=2e-3, knee=0.0, width=1.5, limit=0.06, hours=8.0, sun=5.0), 0.15),
+    "pavement": (Law(slope=-2.5e-2, gain=4e-2, knee=0.0, width=1.0, limit=0.5, hours=5.0, sun=10.0), 0.25),
+    "bearings": (Law(slope=-3e-3, gain=1.2e-2, knee=-1.0, width=2.0, limit=0.15, hours=6.0), 0.30),
+    "soil": (Law(slope=-0.5e-3, gain=2.5e-2, knee=0.0, width=1.0, limit=0.15, hours=96.0), 0.30),
 }
-LAW_SCATTER = {"steel": 0.10, "concrete": 0.15, "composite": 0.15, "pavement": 0.25, "bearings": 0.30, "soil": 0.30}
+"""Laws of materials, and how their slopes and gains scatter between bridges (standard deviation of the logarithm)."""
 ATYPICAL_LAWS: dict[str, Callable[[Law], dict[str, float]]] = {
     "reversed": lambda law: {"slope": -law.slope, "gain": -law.gain},
     "doubled": lambda law: {"slope": 2 * law.slope, "gain": 2 * law.gain, "limit": 2 * law.limit},
@@ -125,7 +125,7 @@ ATYPICAL_LAWS: dict[str, Callable[[Law], dict[str, float]]] = {
 
 def draw_law(material: str, atypical_law: str | None, random: np.random.RandomState) -> Law:
     """The law of one part of a bridge: its family's with its own coefficients, and perhaps of another kind."""
-    family, scatter = LAWS[material], LAW_SCATTER[material]
+    family, scatter = LAWS[material]
     law = replace(
         family,
         slope=family.slope * np.exp(scatter * random.standard_normal()),
