@@ -19,7 +19,7 @@ from typing import Any
 
 import pandas as pd
 
-import skthermo
+import skthermo.reporting
 from skthermo._core.files import alone_with, write_when_complete
 from skthermo._core.text import counted, plain
 from skthermo._core.warnings import collected, warn_each
@@ -29,6 +29,7 @@ from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, look_at, read_file, text_of
 from skthermo.preprocessing.loggers.stamps import of_the_right_clock
 from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
+from skthermo.reporting.answers import acknowledgement, event_sentences, identified_in, shifts_of
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {
@@ -146,13 +147,10 @@ class Bridge:
         self.code = FAILED if self.errors and CODES[self.state] != ALARM else CODES[self.state]
         newest = f" (newest record {monitor.last_})" if len(monitor.days_) else ""
         self.lines.append(f"state: {self.state}{newest}{f'; {reason}' if reason else ''}")
-        if opened := [event for event in self.status_.events if event["kind"] != "watch"]:
-            from skthermo.reporting.answers import acknowledgement, event_sentences  # of what a quiet job needs none
-
-            for event in opened:
-                self.lines += event_sentences(monitor, event, self.identified)
-                if not event["acknowledged"]:
-                    self.lines.append(f"when you know what it was: {acknowledgement(event['event'], self.call)}")
+        for event in [one for one in self.status_.events if one["kind"] != "watch"]:
+            self.lines += event_sentences(monitor, event, self.identified)
+            if not event["acknowledged"]:
+                self.lines.append(f"when you know what it was: {acknowledgement(event['event'], self.call)}")
         self.lines += monitor.summary().splitlines()[1:]
         before = None if self.settings is None else self.taken.settings
         if before is not None and (changed := self.settings.changed_since(before)):
@@ -167,8 +165,6 @@ class Bridge:
         """Find what explains an open event by the monitor's model; an error hides no alarm."""
         events = [one["since"] for one in monitor.status(self.options.now).events if one["kind"] in ("damage", "drift")]
         if events and monitor.fem is not None:
-            from skthermo.reporting.answers import identified_in
-
             try:
                 self.identified = identified_in(monitor, min(events))
             except ValueError as error:
@@ -371,13 +367,11 @@ class Bridge:
             page = self.settings.path(self.settings.files.page)
         if page is None:
             return
-        from skthermo.reporting import owner_report  # a job without a page needs no drawings
-
         try:
             options = {} if self.settings is None else self.settings.page()
             options |= {"title": self.options.title} if self.options.title else {}
             options |= {"identified": self.identified, "settings": self.call}
-            self.written.append(owner_report(monitor, page, now=self.options.now, **options))
+            self.written.append(skthermo.reporting.owner_report(monitor, page, now=self.options.now, **options))
         except Exception as error:  # it does not hide an alarm
             self.failed(error, f"{page} was not written: ")
 
@@ -391,8 +385,6 @@ class Bridge:
 
     def identify(self) -> None:
         """Say which damage explains the newest records by the model."""
-        from skthermo.reporting.answers import identified_in, shifts_of
-
         monitor = self.load()
         if monitor.fem is None:
             raise ValueError(f"{self.file} names no FE model; expected one in [fem], and a fit with it")

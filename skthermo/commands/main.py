@@ -39,12 +39,13 @@ from typing import Any, NoReturn
 
 import pandas as pd
 
-import skthermo
+import skthermo.reporting
 from skthermo._core.files import ReadWhenAsked, write_when_complete
 from skthermo._core.text import capital, plain
 from skthermo._core.warnings import collected
 from skthermo.commands._bridge import ALARM, CODES, FAILED, HEALTHY, NOT_EVALUATED, Bridge, sentence
 from skthermo.commands._settings import HOW_TO_BEGIN
+from skthermo.monitoring import Fleet
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
 EXPLAINED = (ValueError, OSError, ImportError)  # errors that need no traceback
@@ -165,9 +166,7 @@ def _run(options: argparse.Namespace, facts: dict[str, Any]) -> None:
             work = _demonstrate if options.name == "demo" else _look if options.name in RECORDS.split() else _on_bridges
             facts["exit_code"] = work(options, facts)
         except Exception as error:  # Python's own exit code of an error would be that of an alarm
-            _complain(error)
-            facts["errors"].append(sentence(error))
-            facts["exit_code"] = FAILED
+            _failed(error, "", facts)
     facts["warnings"] = list(dict.fromkeys(map(str, findings)))
     for text in facts["warnings"]:
         logger.warning("%s", text)
@@ -205,12 +204,6 @@ def _logged(options: argparse.Namespace) -> Iterator[None]:
         for handler in handlers:
             root.removeHandler(handler)
             handler.close()
-
-
-def _complain(error: Exception, what: str = "") -> None:
-    if not isinstance(error, EXPLAINED):
-        traceback.print_exception(error)
-    logger.error("%s%s", what, sentence(error))
 
 
 def _parser() -> Parser:
@@ -279,8 +272,6 @@ def _say(bridge: Bridge, options: argparse.Namespace, number: int) -> None:
 
 def _as_fleet(bridges: Sequence[Bridge], options: argparse.Namespace, facts: dict[str, Any]) -> None:
     """Say which alarms are significant among those of several bridges, and write their page."""
-    from skthermo.monitoring import Fleet  # a job of one bridge needs none
-
     working = [bridge for bridge in bridges if bridge.state is not None]
     loaded = {bridge.name: bridge.load for bridge in working}
     if len(loaded) < len(working):
@@ -296,9 +287,9 @@ def _as_fleet(bridges: Sequence[Bridge], options: argparse.Namespace, facts: dic
             facts["fleet"]["discoveries"] = found.table.to_dict("records")
         _print([facts["fleet"]["summary"]], options)
         if options.report is not None:
-            from skthermo.reporting import owner_report
-
-            page = owner_report(fleet, options.report, title=options.title, fdr=options.fdr, now=options.now)
+            page = skthermo.reporting.owner_report(
+                fleet, options.report, title=options.title, fdr=options.fdr, now=options.now
+            )
             facts["fleet"]["page"] = str(page)
     except Exception as error:  # it does not hide an alarm
         _failed(error, "the fleet was not reported: ", facts)
@@ -306,7 +297,9 @@ def _as_fleet(bridges: Sequence[Bridge], options: argparse.Namespace, facts: dic
 
 def _failed(error: Exception, what: str, facts: dict[str, Any]) -> None:
     """Say that something beside the monitors failed, which does not hide an alarm."""
-    _complain(error, what)
+    if not isinstance(error, EXPLAINED):
+        traceback.print_exception(error)
+    logger.error("%s%s", what, sentence(error))
     facts["errors"].append(f"{what}{sentence(error)}")
     facts["exit_code"] = ALARM if facts["exit_code"] == ALARM else FAILED
 

@@ -111,11 +111,10 @@ class FleetBridge:
     def model(self) -> AffineModel:
         """The user's FE model: a coarser mesh, stiffnesses 2 to 5 % off, parameters across the thermal zones."""
         random, kind = self._random("error"), KINDS[self.kind]
-        off = random.uniform(0.02, 0.05)
-        wrong = {
-            name: value * np.exp(relative_error(name, off) * random.standard_normal())
-            for name, value in self._design.items()
-        }
+        off, wrong = random.uniform(0.02, 0.05), {}
+        for name, value in self._design.items():
+            error = off if name.startswith(("EI", "EA", "GJ", "k_")) else 0.01 if name.startswith("mass") else 0.0
+            wrong[name] = value * np.exp(error * random.standard_normal())
         structure = kind.build(wrong, False)
         return structure.assemble(kind.parameters, groups=kind.groups, n_modes=kind.n_modes)
 
@@ -256,13 +255,6 @@ def assemble_truth(kind: Kind, design: Design, further_modes: int = 0) -> Affine
     """The model whose parameters are the thermal zones."""
     zones, n_modes = list(kind.zones), kind.n_modes + further_modes
     return kind.build(design, True).assemble(zones, groups=kind.groups, n_modes=n_modes)
-
-
-def relative_error(name: str, of_stiffness: float) -> float:
-    """Standard deviation of the logarithm of a quantity of the design in the user's model."""
-    if name.startswith(("EI", "EA", "GJ", "k_")):
-        return of_stiffness
-    return 0.01 if name.startswith("mass") else 0.0
 
 
 def record_times(start: str | datetime, days: int, samples_per_day: int) -> pd.DatetimeIndex:

@@ -233,9 +233,7 @@ class PredictionDisplay(Display):
         ends = () if lowest is None else (like_first(lowest, "lowest"), like_first(highest, "highest"))
         if temperature is not None:
             check_same_rows(temperature, measured, ("temperature", "measured"))
-            table = as_table(temperature, "temperature", is_one=True)
-            is_named = isinstance(temperature, pd.DataFrame) or getattr(temperature, "name", None) is not None
-            options["temperature"] = table.iloc[:, 0].rename(table.columns[0] if is_named else "temperature")
+            options["temperature"] = as_table(temperature, "temperature", is_one=True).iloc[:, 0]
         return cls._drawn(first, tables, *ends, label=labels[0], **options)
 
     def plot(
@@ -741,9 +739,10 @@ def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:
 
 
 def as_table(values: ArrayLike, what: str, prefix: str = "f", *, is_one: bool = False) -> pd.DataFrame:
-    """A frame of floats; the columns of an array are called f1, f2, ... and its rows by their numbers from 0."""
+    """A frame of floats; the columns of an array are called f1, f2, ..., a single one by what it is, and its rows by
+    their numbers from 0."""
     if isinstance(values, pd.Series):
-        values = values.to_frame(f"{prefix}1" if values.name is None else values.name)
+        values = values.to_frame((what if is_one else f"{prefix}1") if values.name is None else values.name)
     real_array(values, what)
     columns = as_columns(values)
     if columns.ndim != 2 or not columns.size or (is_one and columns.shape[1] > 1):
@@ -751,7 +750,7 @@ def as_table(values: ArrayLike, what: str, prefix: str = "f", *, is_one: bool = 
         raise ValueError(f"{what} has shape {np.shape(values)}; expected {expected}")
     if isinstance(values, pd.DataFrame):
         return pd.DataFrame(columns, values.index, values.columns)
-    return pd.DataFrame(columns, columns=[f"{prefix}{i + 1}" for i in range(columns.shape[1])])
+    return pd.DataFrame(columns, columns=[what] if is_one else [f"{prefix}{i + 1}" for i in range(columns.shape[1])])
 
 
 def in_time(table: pd.DataFrame) -> tuple[NDArray, NDArray]:

@@ -342,9 +342,8 @@ def shapes_of(structure: Structure, model: FEModel | None, modes: Sequence[int] 
     chosen = list(range(model.n_modes) if modes is None else modes)
     if not chosen or any(mode not in range(model.n_modes) for mode in chosen):
         raise ValueError(f"modes is {chosen}; expected numbers from 0 to {model.n_modes - 1}")
-    found = {mode: frequencies[0, mode] for mode in chosen}
-    titles = [f"$f_{{{mode + 1}}}$ = {f:.{3 if f < 10 else 2}f} Hz" for mode, f in found.items()]
-    return shapes[0][:, chosen], titles
+    found = zip(chosen, frequencies[0, chosen], strict=True)
+    return shapes[0][:, chosen], [f"$f_{{{mode + 1}}}$ = {f:.{3 if f < 10 else 2}f} Hz" for mode, f in found]
 
 
 def moved_nodes(structure: Structure, shape: Array, amplitude: float, axes: Array) -> dict[Hashable, Array]:

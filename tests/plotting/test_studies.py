@@ -57,7 +57,7 @@ def test_a_panel_for_each_scenario():
     ("index", "threshold", "message"),
     [
         (np.ones((3, 2)), 1.0, "'records' has shape .*expected one column"),
-        ([1.0], None, "threshold is None; expected a number"),
+        ([1.0], None, "threshold is None; expected numbers"),
         ({}, 1.0, "expected one or more by label"),
     ],
 )
