@@ -549,8 +549,9 @@ class Taken:
             file.suffix.lower() != ".txt" or key in self.files or any(name in text_of(file) for name in columns)
         ):
             return None
+        why = "it names no column of the records" if seen["size"] else "the file is empty"
         before, self.others[key] = self.others.get(key), seen
-        return "" if seen == before else "it names no column of the records" if seen["size"] else "the file is empty"
+        return "" if seen == before else why
 
     def _key(self, file: Path) -> str:
         """How a file is called: by its path from the folder of the monitor, wherever the command is started."""

@@ -105,13 +105,9 @@ class Proposal:
                 size, finds = np.exp(np.log(list(smallest.single.values())).mean()), str(smallest)
             except ValueError as error:
                 size, finds = np.inf, f"it cannot be fitted to this baseline: {error}"
-            one = {
-                "kind": kind,
-                "compensator": chosen,
-                "text": f"{text}{falls}",
-                "said": f"{kind}, {text}{falls}: {finds}",
-            }
-            tried.append(one | {"size": size if np.isfinite(size) else np.inf})
+            one = {"kind": kind, "compensator": chosen, "text": f"{text}{falls}"}
+            one |= {"said": f"{kind}, {text}{falls}: {finds}", "size": size if np.isfinite(size) else np.inf}
+            tried.append(one)
         return sorted(tried, key=lambda one: one["size"])
 
     @property

@@ -39,7 +39,8 @@ from typing import Any, NoReturn
 
 import pandas as pd
 
-import skthermo.reporting
+import skthermo
+from skthermo import reporting
 from skthermo._core.files import ReadWhenAsked, write_when_complete
 from skthermo._core.text import capital, plain
 from skthermo._core.warnings import collected
@@ -167,6 +168,7 @@ def _run(options: argparse.Namespace, facts: dict[str, Any]) -> None:
             facts["exit_code"] = work(options, facts)
         except Exception as error:  # Python's own exit code of an error would be that of an alarm
             _failed(error, "", facts)
+            facts["exit_code"] = FAILED
     facts["warnings"] = list(dict.fromkeys(map(str, findings)))
     for text in facts["warnings"]:
         logger.warning("%s", text)
@@ -287,9 +289,7 @@ def _as_fleet(bridges: Sequence[Bridge], options: argparse.Namespace, facts: dic
             facts["fleet"]["discoveries"] = found.table.to_dict("records")
         _print([facts["fleet"]["summary"]], options)
         if options.report is not None:
-            page = skthermo.reporting.owner_report(
-                fleet, options.report, title=options.title, fdr=options.fdr, now=options.now
-            )
+            page = reporting.owner_report(fleet, options.report, title=options.title, fdr=options.fdr, now=options.now)
             facts["fleet"]["page"] = str(page)
     except Exception as error:  # it does not hide an alarm
         _failed(error, "the fleet was not reported: ", facts)

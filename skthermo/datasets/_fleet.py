@@ -203,12 +203,8 @@ class FleetBridge:
         level = self.noise if noise is None else check_noise(noise, len(modes))
         model = self.truth.damaged({} if damage is None else damage, kind=kind)
         own = 0 if random_state is None else 1 + as_random_state(random_state).randint(2**31 - 1)
-
-        def key(what: int) -> tuple[int, ...]:
-            return (*self.seed, what, own)
-
-        hours, (for_weather, for_frequencies, for_temperatures) = 24 // samples_per_day, map(key, (100, 101, 102))
-        weather = self.climate.weather(index[0], index[-1] + pd.Timedelta(hours=hours - 1), for_weather)
+        hours = 24 // samples_per_day
+        weather = self.climate.weather(index[0], index[-1] + pd.Timedelta(hours=hours - 1), (*self.seed, 100, own))
         years, rows = weather.index.year.unique(), weather.index.get_indexer(index)
 
         def means(hourly: Array) -> Array:
@@ -220,9 +216,9 @@ class FleetBridge:
             for (zone, law), offset in zip(self.laws.items(), offsets, strict=True)
         }
         clean = model.frequencies(np.column_stack(list(theta.values())))
-        drawn = drawn_by_hour(years, 5 * len(modes) + 1, for_frequencies)
+        drawn = drawn_by_hour(years, 5 * len(modes) + 1, (*self.seed, 101, own))
         disturbed = measured(clean, level, gaps, outliers, rows, drawn)
-        noises, missing = np.split(drawn_by_hour(years, 2 * len(self.roles), for_temperatures), 2, axis=1)
+        noises, missing = np.split(drawn_by_hour(years, 2 * len(self.roles), (*self.seed, 102, own)), 2, axis=1)
         read = {
             one.name: means(one.offset + part_temperature(weather, one.hours, one.sun)) + one.noise * own_noise
             for one, own_noise in zip(draw_thermometers(self._random("thermometers")), noises[rows].T, strict=True)

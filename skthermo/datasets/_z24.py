@@ -123,10 +123,10 @@ def _read_csv(file: Path) -> tuple[pd.DataFrame, list[str]]:
     table = rows[1:].set_axis(header, axis=1).reset_index(drop=True)
     wrong = {name: pd.to_numeric(table[name], errors="coerce").isna() & table[name].notna() for name in numeric}
     wrong["state"] = ~table["state"].isin(["undamaged", "damaged"])
-    for name, rows in wrong.items():
-        if rows.any():
+    for name, is_wrong in wrong.items():
+        if is_wrong.any():
             expected = "'undamaged' or 'damaged'" if name == "state" else "a number or nothing"
-            found = f"{file}: field {name!r}, row {rows.argmax()} is {table[name][rows.argmax()]!r}"
+            found = f"{file}: field {name!r}, row {is_wrong.argmax()} is {table[name][is_wrong.argmax()]!r}"
             raise ValueError(f"{found}; expected {expected}")
     return table[numeric].astype(float), table["state"].tolist()
 

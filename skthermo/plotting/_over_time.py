@@ -517,7 +517,8 @@ class DamageIndexDisplay(Display):
                 str(label): as_table(one, f"damage index {label!r}", is_one=True) for label, one in by_label.items()
             }
             value, what = given.get(title), f"threshold{f' of {title!r}' if title else ''}"
-            if not (values := real_array(value, what)).size or not np.isfinite(values).all():
+            values = real_array(value, what)
+            if values.ndim != int(isinstance(value, pd.Series)) or not values.size or not np.isfinite(values).all():
                 raise ValueError(f"{what} is {value!r}; expected a number")
         return cls._drawn(tables, {title: given[title] for title in tables}, **options)
 

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import skthermo.reporting
-from skthermo.commands.main import main
+from skthermo.commands.main import COMMANDS, main
 from skthermo.monitoring import Monitor, load_monitor
 from tests.commands.folders import edit, run, write_day, write_pair
 from tests.monitoring.nightly import DAMAGED, FIRST, assert_same_history
@@ -45,6 +45,10 @@ def valid(said):
     jsonschema = pytest.importorskip("jsonschema")
     jsonschema.Draft202012Validator(SCHEMA).validate(said)
     return said
+
+
+def test_the_schema_knows_each_command():
+    assert set(SCHEMA["properties"]["command"]["enum"]) == set(COMMANDS)
 
 
 @pytest.mark.nightly
