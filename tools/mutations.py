@@ -24,7 +24,7 @@ COPIED = ("skthermo", "tests", "conftest.py", "pyproject.toml")
 MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("datasets/_fleet_site.py", "datasets/test_fleet.py"): [
         ("weather of another variance", "np.sqrt(1 - decay**2) * noise[1:]", "(1 - decay) * noise[1:]"),
-        ("a law that is not reversed in frost", "gain=-law.gain)", "gain=law.gain)"),
+        ("a law that is not reversed in frost", '"gain": -law.gain}', '"gain": law.gain}'),
     ],
     ("monitoring/_retraining.py", "monitoring/test_retraining.py"): [
         ("records of an event train", "masked.loc[inside, columns] = np.nan", "pass"),

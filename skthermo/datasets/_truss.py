@@ -251,12 +251,12 @@ def stiffness_factors(
         raise ValueError(f"damage_from is {damage_from!r}; expected a time from {index[0]} to {index[-1]}")
     years = np.arange(len(index)) / records_per_year
     factors = {group: 1 + share for group, share in (strengthened or {}).items()}
-    for what, lost, course in (("drift", drift, years), ("damage", damage, index >= onset)):
+    for what, lost, growth in (("drift", drift, years), ("damage", damage, index >= onset)):
         expected = f"a mapping whose keys are some of {sorted(groups)}, to finite numbers"
         for group, rate in mapping_of({} if lost is None else lost, what, expected).items():
             if group not in groups or not is_real(rate) or not np.isfinite(rate):
                 raise ValueError(f"{what} is {lost!r:.200}; expected {expected}")
-            if (share := rate * course).max() >= 1:
+            if (share := rate * growth).max() >= 1:
                 raise ValueError(f"{what} of group {group!r} takes away {share.max():g} of its stiffness; expected < 1")
             factors[group] = factors.get(group, 1.0) * (1 - share)
     return pd.DataFrame(factors, index)
