@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations
 from numbers import Integral, Real
 from typing import Any, Literal, overload
 
@@ -21,14 +20,12 @@ from skthermo._core.arrays import (
     Array,
     Reduce,
     as_floats,
-    by_mode,
     check_dofs,
     check_flag,
     check_model,
     check_noise,
     check_prior,
     median,
-    real_array,
     robust_deviation,
     spread_evenly,
     tolerance,
@@ -83,14 +80,6 @@ class ThermalPrior:
         """Standard deviations of ln theta, (n_parameters,)."""
         return np.sqrt(np.diag(self.covariance))
 
-    @property
-    def cautious(self) -> ThermalPrior:
-        """The prior by which each parameter may move by itself as far as all together, for standard deviations.
-
-        Parameters that all follow one temperature, each at its own rate, show nearly no movement of their own.
-        """
-        return replace(self, own=np.maximum(self.own, self.common))
-
     def __str__(self) -> str:
         own = listed(
             [f"{name!r} by itself by {percent(size, '.2g')}" for name, size in zip(self.names, self.own, strict=True)]
@@ -116,27 +105,19 @@ class LinearRecords:
         values = residual + np.einsum("smp,sp->sm", slopes, x)
         return cls(np.where(usable, values, np.nan), np.where(usable[:, :, np.newaxis], slopes, 0.0))
 
-    def near(self, prior: ThermalPrior, noise: Array, *, far: float = 5.0) -> LinearRecords:
-        """Records without observations that are ``far`` standard deviations from what prior and noise expect."""
+    def near(self, prior: ThermalPrior, noise: Array) -> LinearRecords:
+        """Records without observations that are five standard deviations from what prior and noise expect."""
         variances = np.einsum("smp,pq,smq->sm", self.slopes, prior.covariance, self.slopes) + noise**2
         with np.errstate(invalid="ignore"):
-            return LinearRecords(np.where(self.values**2 <= far**2 * variances, self.values, np.nan), self.slopes)
+            return LinearRecords(np.where(self.values**2 <= 5.0**2 * variances, self.values, np.nan), self.slopes)
 
     def taught(
-        self,
-        prior: ThermalPrior,
-        noise: Array,
-        least: Array,
-        *,
-        learns_prior: bool,
-        learns_noise: NDArray[np.bool_],
-        moved: tuple[float, float] = (1e-3, 3.0),
+        self, prior: ThermalPrior, noise: Array, least: Array, learns_prior: bool, learns_noise: NDArray[np.bool_]
     ) -> tuple[ThermalPrior, Array, Array]:
         """The most likely prior and noise, by steps from given ones, and the means of ln theta given each record.
 
         ln theta of a record is the sum of a common factor and of one of each parameter, which are independent. Noise is
-        relative, (n_observations,), and no smaller than the least; what the model cannot follow counts as noise. The
-        deviations of the prior lie in the range ``moved``.
+        relative, (n_observations,), and no smaller than the least; what the model cannot follow counts as noise.
         """
         known, deviations = ~np.isnan(self.values), np.append(prior.common, prior.own)
         values, has_size = np.where(known, self.values, 0.0), deviations > 0
@@ -162,9 +143,8 @@ class LinearRecords:
 
         start = np.log(np.append(deviations[has_size], noise))
         learns = np.append(np.full(n_parts, learns_prior), learns_noise & known.any(axis=0))
-        lowest = np.where(learns, np.log(np.append(np.full(n_parts, moved[0]), least)), start)
-        highest = np.where(learns, np.log(np.append(np.full(n_parts, moved[1]), np.full(len(noise), 0.3))), start)
-        bounds = np.column_stack([lowest, highest])
+        lowest, highest = np.append(np.full(n_parts, 1e-3), least), np.repeat([3.0, 0.3], [n_parts, len(noise)])
+        bounds = np.where(learns, np.log([lowest, highest]), start).T
         best = minimize(lambda logs: loss(logs)[:2], start, jac=True, method="L-BFGS-B", bounds=bounds).x
         found = np.exp(best)
         if learns_prior:
@@ -215,31 +195,9 @@ class ThermalPosterior:
         noise[:, :n_modes] = np.maximum(noise[:, :n_modes], np.where(has_gaps, 1e-3, 1e-6))
         return values, np.where(np.isnan(values), 0.0, noise**-2.0)
 
-    def linearised(self, theta: Array, n_jobs: int | None, *, exactly: bool = False) -> tuple[Array, ...]:
-        """The model at rows of theta, relative derivatives included; unless ``exactly``, the reduced one if there is
-        one, in any row."""
-        simulator = Simulator(self.simulator.model) if exactly else self.simulator.approximate
-        return simulator.linearise(theta, n_jobs, None if self.shapes is None else self.shapes.dofs, relative=True)
-
-    def modes(self, values: Array, weights: Array, n_jobs: int | None) -> Bunch:
-        """Posterior modes of rows, and which of them the full model has solved, being outside the box of the reduced
-        one."""
-        precision, n_rows = self.prior.precision, len(values)
-        x, by_full = np.zeros((n_rows, len(self.prior.own))), np.zeros(n_rows, dtype=bool)
-        if self.surface is not None:
-            found = posterior_modes(self.surface.linearise, values, weights, precision, x)
-            x = found.x
-        if self.surface is None or not self.is_program:
-            model = partial(self.linearised, n_jobs=n_jobs)
-            found = posterior_modes(model, values, weights, precision, x)
-            if not getattr(self.simulator.model, "track", False):
-                pass_crossings(model, self.simulator.model.n_modes, values, weights, precision, found)
-            if self.simulator.reduced is not None:
-                by_full = self.simulator.outside(np.exp(found.x))
-        if by_full.any():
-            exact = partial(self.linearised, n_jobs=n_jobs, exactly=True)
-            put(found, by_full, posterior_modes(exact, values[by_full], weights[by_full], precision, found.x[by_full]))
-        return Bunch(**found, by_full_model=by_full)
+    def linearised(self, theta: Array, n_jobs: int | None) -> tuple[Array, ...]:
+        """The model at rows of theta, relative derivatives included."""
+        return self.simulator.linearise(theta, n_jobs, None if self.shapes is None else self.shapes.dofs)
 
 
 def beside(
@@ -258,24 +216,13 @@ def beside(
     return np.where(np.isnan(values[:, : residual.shape[1]]), 0.0, residual), slopes
 
 
-def posterior_modes(
-    linearise: Linearise,
-    values: Array,
-    weights: Array,
-    precision: Array,
-    start: Array,
-    *,
-    n_steps: int = 100,
-    share: float = 0.01,
-    least: float = 1e-6,
-    last_damping: float = 1e8,
-) -> Bunch:
+def posterior_modes(linearise: Linearise, values: Array, weights: Array, precision: Array, start: Array) -> Bunch:
     """Posterior modes of ln theta by Gauss-Newton steps, each damped more where one would raise the objective.
 
     The objective is the sum of the weighted squares of the residuals and of ln theta in its prior. A step is a row's
-    last one if it is less than a share of the posterior standard deviations and curvature along it is less than a tenth
-    of that share of the noise, or if it is less than ``least``, or would gain less than rounding hides. At
-    ``last_damping``, a share of the diagonal of the Hessian, a row stalls.
+    last one if it is less than a hundredth of the posterior standard deviations and curvature along it is less than a
+    thousandth of the noise, or if it is less than 1e-6, or would gain less than rounding hides. At a damping of 1e8, a
+    share of the diagonal of the Hessian, a row stalls.
     """
     x = start.copy()
     residual, slopes = beside(values, *linearise(np.exp(x)))
@@ -286,21 +233,20 @@ def posterior_modes(
         return np.where(np.isfinite(value), value, np.inf)
 
     value, damping = objective(x, residual, weights), np.zeros(len(x))
-    curvature = np.sqrt(0.1 * share / np.sqrt(np.maximum(weights.max(axis=1, keepdims=True), np.finfo(float).tiny)))
+    curvature = np.sqrt(1e-3 / np.sqrt(np.maximum(weights.max(axis=1, keepdims=True), np.finfo(float).tiny)))
     converged, active = np.zeros(len(x), dtype=bool), np.flatnonzero(np.isfinite(value))
-    for _ in range(n_steps):
+    for _ in range(100):
         hessian = information(slopes[active], weights[active], precision)
         pull = np.einsum("smp,sm->sp", slopes[active], weights[active] * residual[active]) - x[active] @ precision
         step = gauss_newton(hessian, pull, np.zeros(len(active)))
         gain = (pull * step).sum(axis=1)
-        smallest = np.maximum(least, np.minimum(share * deviations(hessian), curvature[active]))
+        smallest = np.maximum(1e-6, np.minimum(0.01 * deviations(hessian), curvature[active]))
         is_last = (np.abs(step) <= smallest).all(axis=1) | (gain <= 1e-10 * value[active])
         ended = active[is_last]
         x[ended] += step[is_last]
         residual[ended] -= np.einsum("smp,sp->sm", slopes[ended], step[is_last]) * (weights[ended] > 0)
-        value[ended] -= gain[is_last]
         converged[ended] = True
-        goes_on = ~is_last & (damping[active] < last_damping)
+        goes_on = ~is_last & (damping[active] < 1e8)
         active = active[goes_on]
         if not len(active):
             break
@@ -314,45 +260,7 @@ def posterior_modes(
         x[rows], residual[rows], slopes[rows] = tried[is_lower], there[is_lower], slopes_there[is_lower]
         value[rows] = value_there[is_lower]
     stalled = ~converged & ((damping > 0) | np.isinf(value))
-    return Bunch(x=x, value=value, residual=residual, slopes=slopes, converged=converged, stalled=stalled)
-
-
-def pass_crossings(
-    linearise: Linearise,
-    n_modes: int,
-    values: Array,
-    weights: Array,
-    precision: Array,
-    found: Bunch,
-    *,
-    large: float = 3.0,
-) -> None:
-    """Put better posterior modes in place where two modes of a model that sorts them have crossed.
-
-    A row whose root mean square misfit is ``large``, in standard deviations of the noise, starts again where the two
-    modes fit in exchanged order.
-    """
-    for lower in range(n_modes - 1):
-        misfits = (weights[:, : found.residual.shape[1]] * found.residual**2).mean(axis=1)
-        rows = np.flatnonzero(~found.converged | (misfits > large**2))
-        if not rows.size:
-            return
-        order = np.arange(n_modes)
-        order[[lower, lower + 1]] = lower + 1, lower
-        at, slopes, own = found.x[rows], found.slopes[rows, :n_modes], weights[np.ix_(rows, order)]
-        fitted = values[rows, :n_modes] - found.residual[rows, :n_modes]
-        residual = np.nan_to_num(values[np.ix_(rows, order)] - fitted)
-        pull = np.einsum("smp,sm->sp", slopes, own * residual) - at @ precision
-        start = at + gauss_newton(information(slopes, own, precision), pull, np.zeros(len(rows)))
-        again = posterior_modes(linearise, values[rows], weights[rows], precision, start)
-        is_better = again.value < found.value[rows]
-        put(found, rows[is_better], Bunch(**{name: array[is_better] for name, array in again.items()}))
-
-
-def put(found: Bunch, rows: NDArray, others: Bunch) -> None:
-    """Put other posterior modes of some rows in place."""
-    for name, array in others.items():
-        found[name][rows] = array
+    return Bunch(x=x, residual=residual, slopes=slopes, converged=converged, stalled=stalled)
 
 
 def information(slopes: Array, weights: Array, precision: Array) -> Array:
@@ -360,11 +268,11 @@ def information(slopes: Array, weights: Array, precision: Array) -> Array:
     return slopes.swapaxes(1, 2) @ (slopes * weights[:, :, np.newaxis]) + precision
 
 
-def gauss_newton(hessian: Array, pull: Array, damping: Array, *, longest: float = 0.5) -> Array:
-    """Steps of rows, damped by a share of the diagonal, that change no ln theta by more than the ``longest``."""
+def gauss_newton(hessian: Array, pull: Array, damping: Array) -> Array:
+    """Steps of rows, damped by a share of the diagonal, that change no ln theta by more than a half."""
     diagonal = np.einsum("spp->sp", hessian) * np.maximum(damping, 1e-14)[:, np.newaxis]  # against rounding
     step = np.linalg.solve(hessian + np.eye(pull.shape[1]) * diagonal[:, np.newaxis], pull[:, :, np.newaxis])[:, :, 0]
-    return step * np.minimum(1.0, longest / np.maximum(np.abs(step).max(axis=1, keepdims=True), longest))
+    return step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 0.5))
 
 
 def deviations(hessian: Array) -> Array:
@@ -376,23 +284,30 @@ def deviations(hessian: Array) -> Array:
 
 def inverted(taught_by: Any, inputs: Array, posterior: ThermalPosterior, n_jobs: int | None) -> Bunch:
     """What `PosteriorInverse.invert` gives, for rows of inputs; a memory knows a posterior by what has taught it."""
-    values, weights = posterior.observed(inputs)
-    found = posterior.modes(values, weights, n_jobs)
-    slopes, precision = np.nan_to_num(found.slopes), posterior.prior.precision
+    simulator, (values, weights), prior = posterior.simulator, posterior.observed(inputs), posterior.prior
+    precision, found = prior.precision, Bunch(x=np.zeros((len(inputs), len(prior.own))))
+    ways: list[Linearise] = [] if posterior.surface is None else [posterior.surface.linearise]
+    if not (ways and posterior.is_program):
+        ways.append(partial(posterior.linearised, n_jobs=n_jobs))
+    for linearise in ways:
+        found = posterior_modes(linearise, values, weights, precision, found.x)
+    slopes = np.nan_to_num(found.slopes)
     weights, stated = weights[:, : slopes.shape[1]], posterior.noise[: slopes.shape[1]] ** -2.0
     std = deviations(information(slopes, weights, precision))
     at_best = deviations(information(slopes, np.where(weights > 0, weights, stated), precision))
-    cautious = deviations(information(slopes, weights, posterior.prior.cautious.precision))
+    # by which each parameter may move by itself as far as all together: parameters that all follow one temperature,
+    # each at its own rate, show nearly no movement of their own
+    cautious = replace(prior, own=np.maximum(prior.own, prior.common))
     is_empty = np.isnan(inputs).all(axis=1)
     unknown = (is_empty | found.stalled)[:, np.newaxis]
     theta = np.where(unknown, np.nan, np.exp(found.x))
     return Bunch(
         theta=theta,
-        std=cautious * theta,
-        residuals=np.where(unknown | (weights == 0), np.nan, found.residual)[:, : posterior.simulator.model.n_modes],
+        std=deviations(information(slopes, weights, cautious.precision)) * theta,
+        residuals=np.where(unknown | (weights == 0), np.nan, found.residual)[:, : simulator.model.n_modes],
         weight=np.where(is_empty, 0.0, ((at_best / std) ** 2).mean(axis=1)),
         converged=found.converged & ~is_empty,
-        by_full_model=found.by_full_model,
+        by_full_model=simulator.outside(np.exp(found.x)) & (simulator.reduced is not None),
     )
 
 
@@ -403,16 +318,13 @@ def taught(
     learns_prior: bool,
     learns_noise: NDArray[np.bool_],
     n_jobs: int | None,
-    *,
-    n_teaching: int = 300,
-    n_passes: int = 3,
 ) -> ThermalPosterior:
     """A posterior with prior and noise as records teach them, and a model or surface that suits these records.
 
-    At most ``n_teaching`` records, spread evenly, teach. The model is linearised at its nominal state first, and then
+    At most 300 records, spread evenly, teach. The model is linearised at its nominal state first, and then
     in each pass at what is known of each record, whose ln theta moves by at most 1 from one pass to the next.
     """
-    rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), n_teaching)
+    rows = spread_evenly(np.flatnonzero(~np.isnan(inputs).all(axis=1)), 300)
     if not len(rows):
         return first
     now, x, n_modes = first, np.zeros((len(rows), len(first.prior.own))), first.simulator.model.n_modes
@@ -420,12 +332,11 @@ def taught(
     solved = tuple(np.repeat(part, len(rows), axis=0) for part in first.linearised(np.exp(x[:1]), n_jobs))
     least = first.noise.copy()
     least[:n_modes] = least_noise(np.log(inputs[:, :n_modes]))
-    learns = {"least": least, "learns_prior": learns_prior, "learns_noise": learns_noise}
     runs: list[tuple[Array, Array]] = []
-    for number in range(n_passes):
+    for number in range(3):
         records = LinearRecords.around(x, *beside(values, *solved), np.isnan(values))
         records = records.near(now.prior, now.noise) if number else records
-        prior, noise, means = records.taught(now.prior, now.noise, **learns)
+        prior, noise, means = records.taught(now.prior, now.noise, least, learns_prior, learns_noise)
         x = x + np.clip(means - x, -1.0, 1.0)
         now = replace(now, prior=prior, noise=noise)
         if now.is_program:
@@ -439,18 +350,11 @@ def taught(
 
 
 def with_runs(
-    posterior: ThermalPosterior,
-    x: Array,
-    runs: list[tuple[Array, Array]],
-    n_jobs: int | None,
-    *,
-    fewest: int = 200,
-    most: int = 600,
-    per_term: int = 3,
+    posterior: ThermalPosterior, x: Array, runs: list[tuple[Array, Array]], n_jobs: int | None
 ) -> ThermalPosterior:
-    """A posterior with a surface through further runs of a program near some ln theta, ``per_term`` of a cubic one."""
+    """A posterior with a surface through further runs of a program near some ln theta, three for a cubic one's term."""
     random, n_parameters = np.random.RandomState(len(runs)), x.shape[1]
-    number = int(np.clip(per_term * n_terms(n_parameters, 3), fewest, most))
+    number = int(np.clip(3 * n_terms(n_parameters, 3), 200, 600))
     points = x[random.randint(len(x), size=number)]
     points = points + posterior.prior.deviations * random.standard_normal(points.shape)
     runs.append((points, evaluate(posterior.simulator.model, np.exp(points), n_jobs=n_jobs)))
@@ -484,13 +388,10 @@ class ShapeInputs:
                 f"mode {largest.argmin()} does not move the degrees of freedom {places.tolist()}; expected one that "
                 "it moves, or model.with_modes without this mode"
             )
-        deviations = real_array(by_mode(noise, model.n_modes, None, "shape_noise"), "shape_noise")
-        if deviations.shape not in ((), (model.n_modes,)) or not ((deviations > 0) & (deviations < 1)).all():
-            raise ValueError(
-                f"shape_noise is {deviations}; expected standard deviations between 0 and 1, one number or "
-                f"{model.n_modes}. 0.01 means 1 % of the root mean square of a shape"
-            )
-        return cls(places, shapes[places], np.broadcast_to(deviations, (model.n_modes,)))
+        deviations = check_noise(noise, model.n_modes, what="shape_noise", most=1.0)
+        if not deviations.all():
+            raise ValueError(f"shape_noise is {deviations}; expected standard deviations between 0 and 1")
+        return cls(places, shapes[places], deviations)
 
     @property
     def n_sensors(self) -> int:
@@ -717,8 +618,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         Raises
         ------
         ValueError
-            If there is no model, the number of columns is not the model's, a frequency is not positive, a mode is there
-            twice, or a model that is to be reduced has no method for it.
+            If there is no model, the number of columns is not the model's, a frequency is not positive, or a model that
+            is to be reduced has no method for it.
 
         Warns
         -----
@@ -729,16 +630,14 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         check_model(model)
         tolerance(model, self.reduce)
         names = list(model.parameter_names)
-        self.shape_inputs_ = None if self.dofs is None else ShapeInputs.read(model, self.dofs, self.shape_noise)
-        n_columns = model.n_modes if self.shape_inputs_ is None else self.shape_inputs_.n_columns
+        shapes = None if self.dofs is None else ShapeInputs.read(model, self.dofs, self.shape_noise)
+        n_columns, self.shape_inputs_ = model.n_modes if shapes is None else shapes.n_columns, shapes
         found = validate_data(self, X).shape[1]
         if found != n_columns:
-            sensors = 0 if self.shape_inputs_ is None else self.shape_inputs_.n_sensors
-            more = f" and their shapes at {sensors} sensors, {n_columns} columns" if sensors else ""
+            more = "" if shapes is None else f" and their shapes at {shapes.n_sensors} sensors, {n_columns} columns"
             raise ValueError(f"X has {found} columns; expected the {model.n_modes} modes of {model!r}{more}")
         self.parameter_names_, self.n_parameters_ = names, len(names)
         inputs, first = self._read(X), self._first(getattr(X, "columns", None))
-        self._check_different(inputs[:, : model.n_modes], column_names(X, "f")[: model.n_modes])
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
@@ -748,7 +647,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         self.taught_by_ = None if self.memory is None else asked
         self.simulator_ = replace(known.simulator, model=model)  # not a copy that was read
         self.posterior_ = replace(known, simulator=self.simulator_)
-        self.prior_, self.noise_ = known.prior, known.noise[: model.n_modes]
+        self.prior_, self.noise_, self.n_runs_ = known.prior, known.noise[: model.n_modes], known.n_runs
         n_records = int((~np.isnan(inputs).all(axis=1)).sum())
         if n_records < 10 and (learns_prior or learns_noise.any()):
             self.findings_.append(
@@ -788,7 +687,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         Warns
         -----
         UserWarning
-            If more than 1 % of the rows have not converged, or are solved by the full model beside a reduced one.
+            If more than 1 % of the rows have not converged.
         """
         found = self.invert(X)
         warn_each(found.findings)
@@ -814,8 +713,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
               complete rows and 0 in rows without any mode;
             - ``converged`` (n_samples,): whether the steps have converged. Rows that have run out of steps keep what
               they have reached;
-            - ``by_full_model`` (n_samples,): whether the full model was solved for the row because steps ended outside
-              the box of the reduced one;
+            - ``by_full_model`` (n_samples,): whether the full model was solved for the row, which is outside the box of
+              the reduced one;
             - ``findings``, a list: a warning if more than 1 % of the rows have not converged.
 
         Examples
@@ -833,16 +732,17 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         with collected() as findings:
             asked = self.taught_by_, inputs, self.posterior_, self.n_jobs
             found = remembered(self.memory, inverted, *asked, ignore=["posterior", "n_jobs"])
-        findings += doubts_of(found)
+        if unconverged(found).mean() > 0.01:
+            findings.append(
+                ModelWarning(
+                    "parameters of many records did not converge, and are what was reached in 100 steps (invert says "
+                    "which). Use a model with track=True where modes cross",
+                    "poor-fit",
+                )
+            )
         theta = frame_like(X, found.theta, self.parameter_names_)
         std = frame_like(X, found.std, self.parameter_names_)
         return Bunch(**{**found, "theta": theta, "std": std, "findings": findings})
-
-    @property
-    def n_runs_(self) -> int:
-        """How often a program without derivatives was run."""
-        check_is_fitted(self)
-        return self.posterior_.n_runs
 
     def _first(self, mode_names: Any) -> ThermalPosterior:
         """What is known before the records: what is stated, and first values of the rest."""
@@ -863,30 +763,7 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         inputs = self._positive(X, self.model.n_modes)
         return inputs if self.shape_inputs_ is None else self.shape_inputs_.normalised(inputs)
 
-    def _check_different(self, frequencies: Array, names: Sequence[Any]) -> None:
-        """Refuse a mode that is there twice: all its records would count twice."""
-        for one, other in combinations(range(len(names)) if len(frequencies) > 1 else (), 2):
-            values = frequencies[:, one]
-            if np.array_equal(values, frequencies[:, other], equal_nan=True) and not np.isnan(values).all():
-                raise ValueError(
-                    f"{names[other]!r} has the values of {names[one]!r} in all {len(values)} rows; expected each mode "
-                    "once"
-                )
-
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:
     """Rows with frequencies whose steps have not converged."""
     return ~found.converged & (found.weight > 0)
-
-
-def doubts_of(found: Bunch, *, many: float = 0.01) -> list[ModelWarning]:
-    """The finding that many rows have not converged."""
-    if unconverged(found).sum() <= many * len(found.weight):
-        return []
-    return [
-        ModelWarning(
-            "parameters of many records did not converge, and are what was reached in 100 steps (invert says which). "
-            "Use a model with track=True where modes cross",
-            "poor-fit",
-        )
-    ]

@@ -11,7 +11,6 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
@@ -134,57 +133,44 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
     return np.reshape(y, (-1, 1)), True
 
 
-def doubts_of_order(
-    model: FEModel, F: Table, *, large: float = 15.0, small: float = 5.0, least: float = 2.0, better: float = 0.25
-) -> list[RecordsWarning]:
+def doubts_of_order(model: FEModel, F: Table) -> list[RecordsWarning]:
     """The finding that modes look like others of the model.
 
-    Modes count as swapped if another order reduces the squared offsets to a share of ``better``, all below ``large``
-    percent: modes of other columns, each farther than ``least`` percent from its own, where a factor common to all
-    modes does not count; or modes without a column, if those of a column are farther than ``small`` percent from it.
+    They do if another order reduces the squared offsets to a quarter, all below 15 percent, of modes each farther than
+    2 percent from that of its column; a factor common to all modes does not count.
     """
     nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
-    measured, names, own = np.nanmean(as_floats(F), axis=0), column_names(F, "f"), np.arange(len(nominal))
-    if len(nominal) < 2:
+    table, names = match_modes(model, as_floats(F)), column_names(F, "f")
+    order, logs = table["mode"].to_numpy(), np.log(table["measured"].to_numpy())
+    offsets = 100 * (logs - np.log([nominal, table["model"]]))
+    given, best = offsets - offsets.mean(axis=1, keepdims=True)
+    others = np.flatnonzero(order != getattr(model, "mode_ranks", range(len(order))))
+    is_better = (best**2).sum() < 0.25 * (given**2).sum() and np.abs(best).max() < 15
+    if not is_better or np.abs(given[others]).min(initial=np.inf) < 2:
         return []
-    logs, offsets = 100 * np.log(measured[:, np.newaxis] / nominal), 100 * (measured / nominal - 1)
-    exchanged: NDArray[np.intp] = linear_sum_assignment(logs**2)[1]
-    before, after = (logs[own, order] - logs[own, order].mean() for order in (own, exchanged))
-    exchanged = own if np.abs(before[exchanged != own]).min(initial=np.inf) < least else exchanged
-    table, near = match_modes(model, as_floats(F)), np.abs(offsets) < small
-    others = np.where(near, own, table["mode"])
-    for order, given, best in (
-        (exchanged, before, after),
-        (others, offsets, np.where(near, offsets, table["offset"])),
-    ):
-        is_better = (best**2).sum() < better * (given**2).sum() and np.abs(best).max() < large
-        if is_better and (order != own).any() and len(np.unique(order)) == len(order):
-            return [
-                RecordsWarning(
-                    f"the frequencies {[names[place] for place in np.flatnonzero(order != own)]} look like other modes "
-                    "of the model. They would be learned as those of their columns. Order them as the model does, or "
-                    f"use model.with_modes({order.tolist()}); match_modes compares frequencies and shapes",
-                    "mode-order",
-                )
-            ]
-    return []
+    return [
+        RecordsWarning(
+            f"the frequencies {[names[place] for place in others]} look like other modes of the model. They would be "
+            f"learned as those of their columns. Order them as the model does, or use model.with_modes("
+            f"{order.tolist()}); match_modes compares frequencies and shapes",
+            "mode-order",
+        )
+    ]
 
 
-def measurement_noise(mapper: BaseEstimator, T: Table, F: Table, *, most: int = 3000) -> Array:
+def measurement_noise(mapper: BaseEstimator, T: Table, F: Table) -> Array:
     """Relative standard deviations of frequencies about a regression on what an unfitted mapper sees of the weather.
 
     Out of fold, and by medians, so that outliers and rare weather hardly move them; (n_modes,). At most 0.1 counts as
-    noise; ``most`` so many records, spread evenly, are looked at.
+    noise; 3000 records, spread evenly, are looked at.
     """
-    rows = spread_evenly(np.argsort(row_times(T), kind="stable"), most)
+    rows = spread_evenly(np.argsort(row_times(T), kind="stable"), 3000)
     logs, inputs = np.log(as_floats(F)), T
     if isinstance(mapper, Pipeline):
         with collected():
             inputs = clone(mapper[:-1]).fit_transform(T, np.where(np.isnan(logs), median(logs), logs))
     inputs, changes = as_floats(inputs)[rows], logs[rows] - median(logs)
-    ratios, fold_of = np.exp(changes), np.zeros(len(rows), dtype=np.intp)
-    if len(rows) >= N_FOLDS:
-        fold_of = BlockedKFold(N_FOLDS).fold_of(_safe_indexing(T, rows))
+    ratios, fold_of = np.exp(changes), BlockedKFold(N_FOLDS).fold_of(_safe_indexing(T, rows))
 
     def learn(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
         learned = Discrepancy.fitted(ratio_regressor(), inputs[train], ratios[train], shares=np.ones(ratios.shape[1]))
@@ -340,27 +326,25 @@ class RecordSimulator(SavesFrames):
         is_fitted = isinstance(noise, str)
         if is_fitted and noise != "fitted":
             raise ValueError(f'noise is {noise!r}; expected "fitted" or relative standard deviations')
-        if not is_fitted:
-            values = check_noise(noise, len(names), names) * random.standard_normal(shape)
-        else:
+        if is_fitted and gaps is None and outliers is not None:
+            gaps = "fitted"  # of the records that the noise, which is completed for the outliers, is of
+        missing = False if gaps is None else self.gaps(weather, gaps, outliers, random)[1]
+        if is_fitted:
             order = np.argsort(row_times(weather.given), kind="stable")
             inputs, residuals = weather.inputs[order], self.residuals
-            if gaps is None and outliers is None:
+            if gaps is None:
                 values = residuals.draw(inputs, random)[np.argsort(order)]
             else:
                 values = residuals.draw_complete(inputs, random, outliers is not None)[np.argsort(order)]
-            if gaps is None and outliers is not None:
-                gaps = "fitted"  # of the records that the noise, which was completed for the outliers, is of
-        if are_drawn(gaps) or are_drawn(outliers):
-            service, taken = self._taken(weather, outliers, streams[0])
+        else:
+            values = check_noise(noise, len(names), names) * random.standard_normal(shape)
         if are_drawn(outliers):
+            service, taken = self._taken(weather, outliers, streams[0])
             drawn = service.outliers[taken]
             values = np.where(np.isnan(drawn), values, drawn)
         elif outliers is not None:
             values = values * np.where(streams[2].uniform(size=shape) < outliers, 10.0, 1.0)
-        if are_drawn(gaps):
-            return np.where(service.missing[taken, -len(names) :], np.nan, values)
-        return values if gaps is None else np.where(streams[1].uniform(size=shape) < gaps, np.nan, values)
+        return np.where(missing, np.nan, values)
 
     def gaps(
         self,
@@ -412,14 +396,10 @@ def are_drawn(faults: Any) -> bool:
 
 def check_faults(gaps: Any, outliers: Any) -> None:
     """Raise an error for gaps or outliers that are neither None nor "fitted" nor a share, nor outliers of records."""
-    expected = {
-        "gaps": "'fitted', the share of the values that are missing, such as 0.1, or None",
-        "outliers": "'fitted', the share of the values that are outliers, such as 0.01, the frequencies that the chain "
-        "was fitted on before they were cleaned, or None",
-    }
-    for what, value in (("gaps", gaps), ("outliers", outliers)):
-        is_of_records = what == "outliers" and not isinstance(value, str) and are_drawn(value)
-        is_share = is_real(value) and 0 <= value < 1
-        is_fitted = isinstance(value, str) and value == "fitted"
-        if not (value is None or is_of_records or is_share or is_fitted):
-            raise ValueError(f"{what} is {value!r:.100}; expected {expected[what]}")
+    are_records = isinstance(outliers, ServiceRecords) or np.ndim(outliers) > 0
+    for what, value, other in (("gaps", gaps, ""), ("outliers", outliers, "the frequencies before cleaning, ")):
+        is_fitted, is_share = isinstance(value, str) and value == "fitted", is_real(value) and 0 <= value < 1
+        if not (value is None or is_fitted or is_share or (other and are_records)):
+            raise ValueError(
+                f"{what} is {value!r:.100}; expected 'fitted', the share of the values, such as 0.01, {other}or None"
+            )

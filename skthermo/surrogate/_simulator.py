@@ -78,11 +78,6 @@ class Simulator:
             f"to {self.tol:g}."
         )
 
-    @property
-    def approximate(self) -> Simulator:
-        """The simulator that takes the reduced model, if there is one, outside its box as well."""
-        return self if self.reduced is None else Simulator(self.reduced.quiet())
-
     def changed(self, method: str, *args: Any, **options: Any) -> Simulator:
         """The simulator of the structure that a method of the model gives, such as "damaged"."""
         if not hasattr(self.model, method):
@@ -138,27 +133,23 @@ class Simulator:
             return None
 
     def linearise(
-        self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None, *, relative: bool = False
+        self, theta: Array, n_jobs: int | None = None, dofs: NDArray[np.intp] | None = None
     ) -> tuple[Array, ...]:
-        """Frequencies, (n_samples, n_modes), and d f / d theta, (n_samples, n_modes, n_parameters).
+        """Frequencies, (n_samples, n_modes), and d ln f / d ln theta, (n_samples, n_modes, n_parameters).
 
-        With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d theta. If ``relative``,
-        derivatives are d ln f / d ln theta and d phi / d ln theta.
+        With ``dofs``, also shapes there, (n_samples, n_dofs, n_modes), and d phi / d ln theta.
         """
         outside = self.outside(theta)
         results: list[Array] = []
         for model, rows in ((self.reduced, ~outside), (self.model, outside)):
             if not rows.any():
                 continue
-            quiet = model.quiet() if hasattr(model, "quiet") else model
+            quiet, at = model.quiet() if hasattr(model, "quiet") else model, theta[rows][:, np.newaxis]
             if dofs is None:
-                solved: tuple[Array, ...] = linearise(quiet, theta[rows], relative=relative, n_jobs=n_jobs)
+                solved: tuple[Array, ...] = linearise(quiet, theta[rows], relative=True, n_jobs=n_jobs)
             else:
                 f, jacobian, shapes, slopes = linearise_modes(quiet, theta[rows], dofs, n_jobs=n_jobs)
-                if relative:
-                    jacobian = jacobian * theta[rows][:, np.newaxis] / f[:, :, np.newaxis]
-                    slopes = slopes * theta[rows][:, np.newaxis, np.newaxis]
-                solved = f, jacobian, shapes, slopes
+                solved = f, jacobian * at / f[:, :, np.newaxis], shapes, slopes * at[:, np.newaxis]
             results = results or [np.full((len(theta), *array.shape[1:]), np.nan) for array in solved]
             for result, array in zip(results, solved, strict=True):
                 result[rows] = array

@@ -277,7 +277,7 @@ class ThermalModel(SavesFrames):
     def propagated(self, theta: Array, deviations: Array) -> Array:
         """Relative standard deviations of measured frequencies, (n_rows, n_modes), given those of theta."""
         theta = possible(theta)[0]
-        slopes = self.simulator.linearise(theta, self.n_jobs, relative=True)[1]
+        slopes = self.simulator.linearise(theta, self.n_jobs)[1]
         effects = self.elasticity(theta)[:, :, np.newaxis] * slopes * (deviations / theta)[:, np.newaxis]
         return np.sqrt((effects**2).sum(axis=2))
 

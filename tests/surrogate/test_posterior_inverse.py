@@ -75,16 +75,6 @@ def test_modes_that_swap_come_back_if_tracked_and_give_one_of_both_solutions_if_
     np.testing.assert_allclose((np.abs(found / both - 1).max(axis=2)).min(axis=0), 0, atol=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore:.*mode-order")
-def test_sorted_modes_beyond_a_crossing_come_back():
-    """A third mode tells the order of two that cross: steps from the other side of the crossing must get past it."""
-    terms = {("k0",): np.diag([400.0, 0.0, 900.0]), ("k1",): np.diag([0.0, 420.0, 300.0])}
-    model, theta = AffineModel(terms, np.eye(3), n_modes=3, track=False), drawn(200, 2, lowest=0.9, highest=1.1)
-    found = posterior(model, prior=0.05).invert(model.frequencies(theta))
-    assert found.converged.all()
-    np.testing.assert_allclose(found.theta, theta, rtol=1e-6)
-
-
 def test_steps_that_raise_the_misfit_are_not_taken():
     """Full Gauss-Newton steps on an arctangent jump to and fro between its flat ends."""
 
