@@ -52,7 +52,6 @@ from skthermo._core.estimators import (
 from skthermo._core.frames import (
     DAY_NS,
     Table,
-    check_same_rows,
     column_names,
     frame_like,
     has_stamps,
@@ -304,12 +303,14 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             self.sensors_ = SensorRegression.fitted(T)
             filled, complete = frame_like(T, self.sensors_.fill(T)[0]), usable
             if self.imputer_ is not None:
-                filled, complete = imputed(self.imputer_, T, usable)
+                values = as_floats(self.imputer_.fit_transform(np.hstack([T, usable])))
+                filled, complete, *_ = np.hsplit(values, np.cumsum([T.shape[1], usable.shape[1]]))
+                filled, complete = frame_like(T, filled), frame_like(usable, complete)
             self.mapper_ = mapper = with_means(mapper, filled, usable)
             self.noise_ = measurement_noise(mapper, filled, usable)
         with collected() as findings, stages.stage("inverse", inverse):
-            for part in inverses_within(inverse):
-                if isinstance(part, InverseSurrogate) and isinstance(part.noise, str):
+            for part in parts_within(inverse, InverseSurrogate):
+                if isinstance(part.noise, str):
                     part.set_params(noise=self.noise_)
             has_learned = learn_from_simulations(inverse, self.aligner_, complete)
             aligned = with_shapes(inverse, self.aligner_.fit(complete).transform(complete), shapes)
@@ -430,15 +431,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             and the standard deviations of the mapper, if it states some.
         """
         has_std = check_flag(return_std, "return_std")
-        with collected() as findings:
-            weather = self.weather(X)
-            solved = self.simulator_.frequencies(weather.theta, self.n_jobs)
-            frequencies = self.thermal_.measured(solved, weather)
-            if has_std:
-                residuals = self.recorder_.residuals
-                deviations = np.hypot(residuals.spread(weather.inputs), self.thermal_.known_deviations(weather))
-                findings += residuals.findings
-        warn_each(findings + self.thermal_.doubts(weather))
+        frequencies, deviations = self._predicted(X, has_margins=has_std)
         predicted = self._as_targets(X, frequencies)
         return (predicted, self._as_targets(X, frequencies * deviations)) if has_std else predicted
 
@@ -488,16 +481,27 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """
         if not is_real(confidence) or not 0 < confidence < 1:
             raise ValueError(f"confidence is {confidence!r}; expected a probability between 0 and 1, such as 0.9")
+        frequencies, margins = self._predicted(X, confidence)
+        lowest = frequencies * np.maximum(1 - margins, 0.0)
+        return self._as_targets(X, lowest), self._as_targets(X, frequencies * (1 + margins))
+
+    def _predicted(
+        self, X: ArrayLike, confidence: float | None = None, *, has_margins: bool = True
+    ) -> tuple[Array, Array]:
+        """Frequencies with relative margins of a confidence, by default of a standard deviation; or 0 without."""
+        margins, thermal = np.zeros(1), self.thermal_
         with collected() as findings:
-            weather, residuals = self.weather(X), self.recorder_.residuals
-            solved = self.simulator_.frequencies(weather.theta, self.n_jobs)
-            frequencies = self.thermal_.measured(solved, weather)
-            margin = residuals.quantiles(confidence) * residuals.spread(weather.inputs)
-            margin = np.hypot(margin, norm.ppf((1 + confidence) / 2) * self.thermal_.known_deviations(weather))
-            findings += residuals.findings
-        warn_each(findings + self.thermal_.doubts(weather))
-        lowest = frequencies * np.maximum(1 - margin, 0.0)
-        return self._as_targets(X, lowest), self._as_targets(X, frequencies * (1 + margin))
+            weather = self.weather(X)
+            frequencies = thermal.simulated(weather)
+            if has_margins:
+                residuals, scatter, known = self.recorder_.residuals, 1.0, 1.0
+                if confidence is not None:
+                    scatter, known = residuals.quantiles(confidence), norm.ppf((1 + confidence) / 2)
+                spread = residuals.spread(weather.inputs)
+                margins = np.hypot(scatter * spread, known * thermal.known_deviations(weather))
+                findings += residuals.findings
+        warn_each(findings + thermal.doubts(weather))
+        return frequencies, margins
 
     @overload
     def simulate(self, X: pd.DataFrame, **options: Any) -> pd.DataFrame: ...
@@ -636,9 +640,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             rows, divided by that range (0 inside).
         """
         weather = self.weather(X)
-        excess = pd.DataFrame(self.training_range_.excess(weather.inputs), columns=self.training_range_.names)
-        excess.index = X.index if isinstance(X, pd.DataFrame) else excess.index
-        return excess
+        excess, index = self.training_range_.excess(weather.inputs), X.index if isinstance(X, pd.DataFrame) else None
+        return pd.DataFrame(excess, index, self.training_range_.names)
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
         """Coefficient of determination R2 over complete rows, averaged over modes.
@@ -658,19 +661,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             NaN if fewer than two rows are complete. There is a warning if fewer than half of the rows are scored;
             `~skthermo.metrics.frequency_scorer` reports their share.
         """
-        check_is_fitted(self)
-        check_same_rows(X, y, ("temperatures", "frequencies"))
-        columns = np.shape(y)[1:] or (1,)
-        if columns != (len(self.mode_names_),):
-            raise ValueError(
-                f"frequencies have shape {np.shape(y)}; expected a column for each of {self.mode_names_}, as in fit"
-            )
         predicted = self.predict(X)
+        score = complete_r2(y, predicted, row_weights(sample_weight, X))
         scored = int((~np.isnan(as_columns(y) + as_columns(predicted)).any(axis=1)).sum())
         if 2 * scored < len(predicted):
             text = "the score leaves out most rows, which have gaps. Compare scores of the same rows only"
             warn_each([UnevaluatedRowsWarning(text, "not-evaluated")])
-        return complete_r2(y, predicted, row_weights(sample_weight, X))
+        return score
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -679,13 +676,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return tags
 
     def _default_part(self, name: str) -> BaseEstimator | None:
-        if name == "inverse":
-            return PosteriorInverse(reduce=self.reduce, n_jobs=self.n_jobs)
-        if name == "aligner":
-            return BiasAligner(method="scale")
-        if name == "mapper":
-            return TemperatureMapper()
-        return ratio_regressor() if is_auto(getattr(self, name)) else None
+        defaults = {
+            "inverse": PosteriorInverse(reduce=self.reduce, n_jobs=self.n_jobs),
+            "mapper": TemperatureMapper(),
+            "aligner": BiasAligner(method="scale"),
+            "discrepancy": None if self.discrepancy is None else ratio_regressor(),
+        }
+        return defaults.get(name)
 
     def _part(self, name: str) -> Any:
         """A clone of a part, or the default part."""
@@ -696,10 +693,15 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         """Clone inverse, mapper, aligner and imputer, with model, memory, choice of a reduced model, and seeds."""
         tolerance(self.model, self.reduce)
         self.inverse_, self.mapper_ = self._part("inverse"), self._part("mapper")
-        self.aligner_ = with_reference(None if self.aligner == "passthrough" else self._part("aligner"), self.model)
+        self.aligner_ = FunctionTransformer().set_output(transform="default")  # frequencies stay as they are
+        if self.aligner != "passthrough":
+            self.aligner_ = self._part("aligner")
+        for aligner in parts_within(self.aligner_, BiasAligner):
+            if aligner.reference is None:
+                aligner.set_params(reference=self.model)
         self.imputer_ = None if self.imputer == "passthrough" else clone(self.imputer)
         names = list(self.model.parameter_names)
-        for part in inverses_within(self.inverse_):
+        for part in parts_within(self.inverse_, FrequencyInverse):
             given = {"model": self.model, "memory": self.memory}
             part.set_params(**{name: value for name, value in given.items() if getattr(part, name) is None})
             if list(part.model.parameter_names) != names:
@@ -758,20 +760,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         return like_targets(X, frequencies, self.mode_names_, is_vector=self.y_is_vector_)
 
 
-def with_reference(aligner: BaseEstimator | None, model: FEModel) -> BaseEstimator:
-    """An aligner, whose parts without a reference get the model; without one, frequencies stay as they are."""
-    if aligner is None:
-        return FunctionTransformer().set_output(transform="default")
-    for part in (aligner, *aligner.get_params().values()):
-        if isinstance(part, BiasAligner) and part.reference is None:
-            part.set_params(reference=model)
-    return aligner
-
-
 def learn_from_simulations(inverse: Any, aligner: BaseEstimator, F: Table) -> bool:
     """Whether an aligner asks for simulations; if so, the inverse has learned from them, and it has their means."""
-    parts = [part for part in (aligner, *aligner.get_params().values()) if isinstance(part, BiasAligner)]
-    asking = [part for part in parts if isinstance(part.reference, str)]
+    asking = [part for part in parts_within(aligner, BiasAligner) if isinstance(part.reference, str)]
     if asking and not isinstance(inverse, InverseSurrogate):
         raise ValueError(
             f"the aligner's reference is 'simulations', but {inverse!r:.100} has none; expected an InverseSurrogate"
@@ -783,9 +774,9 @@ def learn_from_simulations(inverse: Any, aligner: BaseEstimator, F: Table) -> bo
     return bool(asking)
 
 
-def inverses_within(inverse: BaseEstimator) -> list[Any]:
-    """The inverses of an FE model in an estimator and its parts."""
-    return [one for one in (inverse, *inverse.get_params().values()) if isinstance(one, FrequencyInverse)]
+def parts_within(estimator: BaseEstimator, kind: type) -> list[Any]:
+    """Estimators of a kind: this one, and parts of it."""
+    return [one for one in (estimator, *estimator.get_params().values()) if isinstance(one, kind)]
 
 
 def invert(inverse: BaseEstimator, aligned: Table, names: list[str]) -> Bunch:
@@ -812,14 +803,6 @@ def with_shapes(inverse: BaseEstimator, F: Table, shapes: ArrayLike | None) -> T
     if shapes is not None:
         raise ValueError("shapes are given, but the inverse has no dofs; expected PosteriorInverse(dofs=...)")
     return F
-
-
-def imputed(imputer: BaseEstimator, T: Table, F: Table) -> tuple[Table, Table]:
-    """Temperatures and frequencies whose gaps an imputer fills, given both side by side."""
-    n_sensors, n_modes = T.shape[1], F.shape[1]
-    values = as_floats(imputer.fit_transform(np.hstack([T, F])))
-    frequencies = values[:, n_sensors : n_sensors + n_modes]
-    return frame_like(T, values[:, :n_sensors]), frame_like(F, frequencies, column_names(F, "f"))
 
 
 def refitted(
