@@ -62,14 +62,13 @@ class FittedRows(SavesFrames):
         missing["a lag reaches into a gap"] = ~np.isnan(temperatures).any(axis=1) & np.isnan(records.inputs).any(axis=1)
         missing["their weight is 0"] = ~records.counted
         missing["no parameters were found"] = ~np.isnan(F).any(axis=1) & without_theta
-        left_out = {}
-        for what, rows in missing.items():
-            if rows.any():
-                left_out[f"{what}, {period_of(index, np.flatnonzero(rows))}"] = int(rows.sum())
+        when = {what: period_of(index, np.flatnonzero(rows)) for what, rows in missing.items() if rows.any()}
+        left_out = {f"{what}, {period}": int(missing[what].sum()) for what, period in when.items()}
+        n_trained = int(trained.sum())
         return cls(
             given=len(F),
-            trained=int(trained.sum()),
-            scored=min(int(trained.sum()), MOST_SCORED),
+            trained=n_trained,
+            scored=min(n_trained, MOST_SCORED),
             left_out=pd.Series(left_out, dtype=int),
             filled=pd.DataFrame.from_dict(filled, orient="index", columns=["rows", "standard deviation", "when"]),
         )
@@ -86,12 +85,9 @@ class FittedRows(SavesFrames):
 
     def doubts(self, expected: int) -> Iterator[SkthermoWarning]:
         """Findings that few rows train, fewer than ``expected`` ones, or that most have a filled sensor."""
-        if 2 * self.trained < self.given or self.trained < expected:
-            few = (
-                "fewer than 10 complete rows for each parameter"
-                if self.trained < expected
-                else "less than half of them"
-            )
+        is_few = self.trained < expected
+        if is_few or 2 * self.trained < self.given:
+            few = "fewer than 10 complete rows for each parameter" if is_few else "less than half of them"
             yield few_rows(f"{few} train the temperature mapper (report_.rows says why)")
         mostly = self.filled.index[2 * self.filled["rows"] > self.given]
         if len(mostly):

@@ -175,10 +175,22 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
             stated = 0.0 if isinstance(self.noise, str) else self.noise
             self.noise_ = check_noise(stated, self.model.n_modes, getattr(X, "columns", None))
         if self.model is not None and y is None:
-            self._check_columns(X)
+            found = validate_data(self, np.ones((1, self.model.n_modes)) if X is None else X).shape[1]
+            if found != self.model.n_modes:
+                raise ValueError(f"X has {found} columns; expected the {self.model.n_modes} modes of {self.model!r}")
+            self.parameter_names_, self.y_is_vector_ = list(self.model.parameter_names), False
+            self.bounds_ = check_bounds(self.bounds, self.parameter_names_)
             with collected() as self.findings_:
-                inputs, theta = self._simulated(random)
-            self.findings_ += self._doubts_of_size()
+                self.samples_ = self._drawn(self.n_samples, random)
+            theta, inputs = self.samples_.theta, add_noise(self.samples_.frequencies, self.noise_, random_state=random)
+            if len(self.parameter_names_) > found:
+                self.findings_.append(
+                    ResultWarning(
+                        "there are more parameters than modes: frequencies cannot distinguish all parameters. Use more "
+                        "modes or fewer parameters, or a PosteriorInverse",
+                        "undetermined",
+                    )
+                )
         else:
             inputs, theta = self._read_xy(X, y, ("frequencies", "theta"))
             self.bounds_, self.samples_ = None, Bunch(theta=theta, frequencies=inputs)
@@ -313,35 +325,11 @@ class InverseSurrogate(FrequencyInverse, MultiplierRegressor):
         nominal = evaluate(model, state if self.bounds_ is None else np.clip(state, *self.bounds_.T))
         return (evaluate(model, self._regress(nominal)[0]) / nominal - 1)[0]
 
-    def _simulated(self, random: np.random.RandomState) -> tuple[Array, Array]:
-        """Noisy frequencies and parameters of simulations in the box."""
-        self.parameter_names_, self.y_is_vector_ = list(self.model.parameter_names), False
-        self.bounds_ = check_bounds(self.bounds, self.parameter_names_)
-        self.samples_ = self._drawn(self.n_samples, random)
-        return add_noise(self.samples_.frequencies, self.noise_, random_state=random), self.samples_.theta
-
     def _drawn(self, n_samples: int, random: np.random.RandomState) -> Bunch:
         """Samples in the box; read from the memory if they are there."""
         seed = random.randint(np.iinfo(np.int32).max)
         settings = self.model, self.bounds_, n_samples, seed, self.n_jobs
         return remembered(self.memory, drawn_samples, *settings, ignore=["n_jobs"])
-
-    def _doubts_of_size(self) -> list[SkthermoWarning]:
-        if len(self.parameter_names_) <= self.model.n_modes:
-            return []
-        return [
-            ResultWarning(
-                "there are more parameters than modes: frequencies cannot distinguish all parameters. Use more modes "
-                "or fewer parameters, or a PosteriorInverse",
-                "undetermined",
-            )
-        ]
-
-    def _check_columns(self, X: ArrayLike | None) -> None:
-        """Check number and names of the columns; without X, they have no names."""
-        found = validate_data(self, np.ones((1, self.model.n_modes)) if X is None else X).shape[1]
-        if found != self.model.n_modes:
-            raise ValueError(f"X has {found} columns; expected the {self.model.n_modes} modes of {self.model!r}")
 
     def _inputs(self, X: ArrayLike) -> Array:
         check_is_fitted(self)
@@ -353,18 +341,13 @@ def drawn_samples(model: FEModel, bounds: Array, n_samples: int, seed: int, n_jo
     return sample(model, bounds, n_samples, n_jobs=n_jobs, random_state=seed)
 
 
-def far_outside(
-    theta: Array, bounds: Array, names: Sequence[str], *, near: float = 2.0, many: float = 0.05
-) -> list[SkthermoWarning]:
-    """The finding that many rows have parameters far outside the bounds, where a regressor extrapolates.
-
-    Parameters are ``near`` up to so many half-widths of the box from its middle; ``many`` is a share of the rows.
-    """
+def far_outside(theta: Array, bounds: Array, names: Sequence[str]) -> list[SkthermoWarning]:
+    """The finding that 5 % of the rows have parameters far outside the bounds, where a regressor extrapolates."""
     known, middle, half = theta[~np.isnan(theta).any(axis=1)], bounds.mean(axis=1), np.diff(bounds, axis=1)[:, 0] / 2
-    least = np.maximum(middle - near * half, bounds[:, 0] / 2)  # positive
-    far = (known < least) | (known > middle + near * half)
+    least = np.maximum(middle - 2 * half, bounds[:, 0] / 2)  # positive
+    far = (known < least) | (known > middle + 2 * half)
     rows = far.any(axis=1)
-    if not rows.size or rows.mean() <= many:
+    if not rows.size or rows.mean() <= 0.05:
         return []
     listed = ", ".join(repr(name) for name, is_far in zip(names, far.any(axis=0), strict=True) if is_far)
     return [

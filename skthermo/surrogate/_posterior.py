@@ -37,7 +37,6 @@ from skthermo._core.estimators import (
     StrOptions,
     _fit_context,
     check_is_fitted,
-    validate_data,
 )
 from skthermo._core.frames import Table, column_names, frame_like, row_times
 from skthermo._core.memory import remembered
@@ -632,12 +631,13 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         names = list(model.parameter_names)
         shapes = None if self.dofs is None else ShapeInputs.read(model, self.dofs, self.shape_noise)
         n_columns, self.shape_inputs_ = model.n_modes if shapes is None else shapes.n_columns, shapes
-        found = validate_data(self, X).shape[1]
-        if found != n_columns:
+        inputs = self._positive(X, model.n_modes, reset=True)
+        if (found := inputs.shape[1]) != n_columns:
             more = "" if shapes is None else f" and their shapes at {shapes.n_sensors} sensors, {n_columns} columns"
             raise ValueError(f"X has {found} columns; expected the {model.n_modes} modes of {model!r}{more}")
         self.parameter_names_, self.n_parameters_ = names, len(names)
-        inputs, first = self._read(X), self._first(getattr(X, "columns", None))
+        inputs = inputs if shapes is None else shapes.normalised(inputs)
+        first = self._first(getattr(X, "columns", None))
         learns_prior, learns_noise = isinstance(self.prior, str), np.zeros(len(first.noise), dtype=bool)
         learns_noise[: model.n_modes] = isinstance(self.noise, str)
         in_order = inputs[np.argsort(row_times(X), kind="stable")]
@@ -728,7 +728,8 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         (array([[0.95, 1.05, 0.9 , 1.  ]]), array([[0.006, 0.009, 0.002, 0.126]]))
         """
         check_is_fitted(self)
-        inputs = self._read(X)
+        inputs = self._positive(X, self.model.n_modes)
+        inputs = inputs if self.shape_inputs_ is None else self.shape_inputs_.normalised(inputs)
         with collected() as findings:
             asked = self.taught_by_, inputs, self.posterior_, self.n_jobs
             found = remembered(self.memory, inverted, *asked, ignore=["posterior", "n_jobs"])
@@ -757,11 +758,6 @@ class PosteriorInverse(FrequencyInverse, Estimator):
         has_derivatives = hasattr(model, "linearised") or hasattr(model, "jacobian")
         is_program = not (has_derivatives if shapes is None else hasattr(model, "linearised_modes"))
         return ThermalPosterior(Simulator(model), prior, noise, shapes, None, is_program)
-
-    def _read(self, X: ArrayLike) -> Array:
-        """Measured columns, with shapes normalised."""
-        inputs = self._positive(X, self.model.n_modes)
-        return inputs if self.shape_inputs_ is None else self.shape_inputs_.normalised(inputs)
 
 
 def unconverged(found: Bunch) -> NDArray[np.bool_]:

@@ -285,10 +285,10 @@ class FrequencyInverse(TransformerMixin):
             raise ValueError(f"{type(self).__name__} has no model; expected an FE model")
         return self.model
 
-    def _positive(self, X: ArrayLike, n_frequencies: int | None) -> Array:
+    def _positive(self, X: ArrayLike, n_frequencies: int | None, *, reset: bool = False) -> Array:
         """Columns as in `fit`, the first ``n_frequencies`` of them, by default all, checked to be positive."""
-        has_names = hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
-        inputs = validate_data(self, X if has_names else as_floats(X), dtype=np.float64, reset=False)
+        has_names = reset or hasattr(self, "feature_names_in_") or not hasattr(X, "columns")
+        inputs = validate_data(self, X if has_names else as_floats(X), dtype=np.float64, reset=reset)
         frequencies = inputs[:, :n_frequencies]
         if (frequencies <= 0).any():
             row, column = np.argwhere(frequencies <= 0)[0]
