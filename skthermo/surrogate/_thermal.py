@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,7 +35,6 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem.damage import LossKind
-from skthermo.preprocessing.folds import BlockedKFold, Rows, out_of_fold
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import TrainingRange, unpredicted_findings
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
@@ -50,26 +49,17 @@ def ratio_regressor() -> TemperatureMapper:
     return TemperatureMapper(default_lines(np.logspace(-1, 5, 7), alpha_per_target=True))
 
 
-class LearnedRatios(NamedTuple):
-    """A fitted regressor of measured over modelled frequencies, for modes that are measured in the same rows."""
-
-    modes: NDArray[np.intp]
-    regressor: BaseEstimator
-    level: Array
-
-
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
-    Regressors have ``learned`` the ratios from inputs of the ``mapper``; changes from their mean ``level`` count by the
-    ``shares`` of the modes (:func:`reliable_shares`). It is 0 for modes with few records, and for all without a
-    ``regressor``.
+    Regressors have ``learned`` the ratios of modes that are measured in the same rows, from inputs of the ``mapper``.
+    It is 0 for modes with few records, and for all without a ``regressor``.
     """
 
     regressor: BaseEstimator | None
-    learned: tuple[LearnedRatios, ...]
-    shares: Array
+    learned: tuple[tuple[NDArray[np.intp], BaseEstimator], ...]
+    n_modes: int
     sensors: SensorRegression | None = None
     mapper: Any = None
 
@@ -81,37 +71,30 @@ class Discrepancy:
         ratios: Array,
         weights: Array | None = None,
         *,
-        shares: Array | None = None,
         sensors: SensorRegression | None = None,
         mapper: Any = None,
-        fewest: int = 30,
-        far: float = 5.0,
-        most: int = 20_000,
     ) -> Discrepancy:
         """Learn from ratios, (n_rows, n_modes), beside inputs of M2.
 
-        A mode with a ratio ``far`` from its median, in robust deviations of its logarithm, leaves out the row. Modes
-        with the ``fewest`` rows learn, from at ``most`` so many, spread evenly. ``shares`` may be known from more rows.
+        A mode with a ratio five robust deviations from its median, of logarithms, leaves out the row. Modes with 30
+        rows learn, from at most 20,000, spread evenly.
         """
-        found = np.zeros(ratios.shape[1])
         usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
         if regressor is None or not usable.any():
-            return cls(None, (), found, sensors, mapper)
+            return cls(None, (), ratios.shape[1], sensors, mapper)
         logs, learned = np.log(np.where(usable[:, np.newaxis], ratios, np.nan)), []
         with np.errstate(invalid="ignore"):
-            is_far = np.abs(logs - median(logs)) > far * robust_deviation(logs)
+            is_far = np.abs(logs - median(logs)) > 5 * robust_deviation(logs)
         present, of_mode = patterns(~np.isnan(logs).T)
         for number, mask in enumerate(present):
             modes = np.flatnonzero(of_mode == number)
-            rows = spread_evenly(np.flatnonzero(mask & ~is_far[:, modes].any(axis=1)), most)
-            if len(rows) < fewest or not np.ptp(inputs[rows], axis=0).all():
+            rows = spread_evenly(np.flatnonzero(mask & ~is_far[:, modes].any(axis=1)), 20_000)
+            if len(rows) < 30 or not np.ptp(inputs[rows], axis=0).all():
                 continue
             values, own = ratios[np.ix_(rows, modes)], None if weights is None else weights[rows]
             values = values[:, 0] if len(modes) == 1 else values
-            fitted, level = fit_outputs(regressor, inputs[rows], values, own), mean_level(values, own)
-            found[modes] = reliable_shares(regressor, inputs[rows], values, own) if shares is None else shares[modes]
-            learned.append(LearnedRatios(modes, fitted, level))
-        return cls(regressor, tuple(learned), found, sensors, mapper)
+            learned.append((modes, fit_outputs(regressor, inputs[rows], values, own)))
+        return cls(regressor, tuple(learned), ratios.shape[1], sensors, mapper)
 
     def __call__(self, X: Table) -> Array:
         """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
@@ -122,31 +105,11 @@ class Discrepancy:
     def at(self, inputs: Array) -> Array:
         """delta at inputs of M2; NaN in rows in which one is missing."""
         known = ~np.isnan(inputs).any(axis=1)
-        delta = np.full((len(inputs), len(self.shares)), np.nan)
+        delta = np.full((len(inputs), self.n_modes), np.nan)
         delta[known] = 0.0
-        for modes, regressor, level in self.learned if known.any() else ():
-            change = np.log(as_columns(regressor.predict(inputs[known]))) - level
-            delta[np.ix_(known, modes)] = level + self.shares[modes] * change
+        for modes, regressor in self.learned if known.any() else ():
+            delta[np.ix_(known, modes)] = np.log(as_columns(regressor.predict(inputs[known])))
         return delta
-
-
-def mean_level(ratios: Array, weights: Array | None) -> Array:
-    """Mean logarithm of ratios, (n_modes,)."""
-    return np.average(np.log(as_columns(ratios)), axis=0, weights=weights)
-
-
-def reliable_shares(regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None) -> Array:
-    """Slopes of changes of ratios over those that a regressor predicts out of fold, from 0 to 1, (n_modes,)."""
-
-    def learn(train: Rows) -> Callable[[Rows], Array]:
-        own = None if weights is None else weights[train]
-        fitted, level = fit_outputs(regressor, inputs[train], ratios[train], own), mean_level(ratios[train], own)
-        return lambda test: np.log(as_columns(fitted.predict(inputs[test]))) - level
-
-    predicted = out_of_fold(learn, BlockedKFold(5).fold_of(inputs))
-    measured = np.log(as_columns(ratios)) - mean_level(ratios, weights)
-    slopes = (predicted * measured).sum(axis=0) / np.maximum((predicted**2).sum(axis=0), np.finfo(float).tiny)
-    return np.clip(slopes, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
