@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -14,35 +12,25 @@ from skthermo.preprocessing import ExponentialMeans
 N_PERIODS = 5  # contiguous ones, so that a season is predicted from others
 
 
-def chosen_means(
-    T: pd.DataFrame,
-    Y: Array,
-    *,
-    half_lives: Sequence[str] = ("6h", "1D", "5D", "30D"),
-    least_fall: float = 0.1,
-    most_rows: int = 2000,
-    most_sensors: int = 8,
-) -> ExponentialMeans | None:
+def chosen_means(T: pd.DataFrame, Y: Array) -> ExponentialMeans | None:
     """Means of one sensor that explain responses, with a half-life or with all of them; None where nothing is gained.
 
     A ridge regression on piecewise-linear functions of the temperatures predicts each response in five contiguous
-    periods from the others. Means are chosen if they lower the mean absolute error of a response by ``least_fall``,
-    in four of the periods at least, and raise that of no other by half as much. The error has to fall half as far, or
-    by ``least_fall``, beside a straight line and a step in time, which would pass for memory of weeks. Nothing is
-    chosen from fewer than 270 days, which lack a season.
+    periods from the others. Means are chosen if they lower the mean absolute error of a response by a tenth, in four of
+    the periods at least, and raise that of no other by half as much. The error has to fall half as far, or by a tenth,
+    beside a straight line and a step in time, which would pass for memory of weeks. Nothing is chosen from fewer than
+    270 days, which lack a season.
     """
     order = np.argsort(T.index, kind="stable")
     T, Y = T.iloc[order], Y[order]
     values, times = T.to_numpy(dtype=float), T.index
-    rows = spread_evenly(np.flatnonzero(~np.isnan(values).any(axis=1) & ~np.isnan(Y).all(axis=1)), most_rows)
-    sensors = T.columns[spread_evenly(np.flatnonzero(np.ptp(values[rows], axis=0) > 0), most_sensors)]
+    rows = spread_evenly(np.flatnonzero(~np.isnan(values).any(axis=1) & ~np.isnan(Y).all(axis=1)), 2000)
+    sensors = T.columns[spread_evenly(np.flatnonzero(np.ptp(values[rows], axis=0) > 0), 8)]
     ages = times[rows] - times[0]
     if len(rows) < 20 * N_PERIODS or ages[-1] < pd.Timedelta(days=270):  # to other seasons means extrapolate wildly
         return None
-    step, tried = np.median(np.diff(times)), []
-    for half_life in half_lives:
-        if step <= pd.Timedelta(half_life) <= ages[-1] / 8:
-            tried.append(half_life)
+    lives = pd.Series(["6h", "1D", "5D", "30D"])
+    tried = lives[pd.to_timedelta(lives).between(pd.Timedelta(np.median(np.diff(times))), ages[-1] / 8)].tolist()
     if not tried or not len(sensors):
         return None
     means = [T[sensors]] + [T[sensors].ewm(halflife=pd.Timedelta(one), times=times).mean() for one in tried]
@@ -60,15 +48,15 @@ def chosen_means(
             candidates.append(ExponentialMeans(half_lives=lives, sensors=[sensors[sensor]]))
             sets.append(np.append(base, places[1:][some, sensor]))
             has_past.append(ages >= 2 * pd.Timedelta(lives[-1]))  # others lack the weather before
-    falls = np.array([falls_of(X, y, sets, np.array(has_past), least_fall) for y in Y[rows].T])
-    score = np.where((falls > least_fall).any(axis=0) & (falls > -0.5 * least_fall).all(axis=0), falls.mean(axis=0), 0)
+    falls = np.array([falls_of(X, y, sets, np.array(has_past)) for y in Y[rows].T])
+    score = np.where((falls > 0.1).any(axis=0) & (falls > -0.05).all(axis=0), falls.mean(axis=0), 0)
     return candidates[score.argmax()] if score.max() > 0 else None
 
 
-def falls_of(X: Array, y: Array, sets: list[NDArray[np.intp]], has_past: NDArray[np.bool_], least: float) -> Array:
+def falls_of(X: Array, y: Array, sets: list[NDArray[np.intp]], has_past: NDArray[np.bool_]) -> Array:
     """Share by which each set of columns lowers the error of a response below that of the first set, (n_sets - 1,).
 
-    It is 0 where it is less than half of it, and than the least, beside a line and a step in time, or where the error
+    It is 0 where it is less than half of it, and than a tenth, beside a line and a step in time, or where the error
     falls in fewer than four periods.
     """
     nothing, known = np.zeros(len(sets) - 1), ~np.isnan(y)
@@ -95,26 +83,23 @@ def falls_of(X: Array, y: Array, sets: list[NDArray[np.intp]], has_past: NDArray
     for number, rows in enumerate(has_past):
         fall, fall_beside = 1 - errors[:, 1 + number, rows].mean(axis=1) / errors[:, 0, rows].mean(axis=1)
         differences = np.bincount(period[rows], (errors[0, 1 + number] - errors[0, 0])[rows], N_PERIODS)
-        is_memory = fall_beside >= min(0.5 * fall, least) and (differences < 0).sum() >= min(
-            4, len(np.unique(period[rows]))
-        )
-        falls[number] = fall if is_memory else min(fall, 0.0)
+        is_steady = (differences < 0).sum() >= min(4, len(np.unique(period[rows])))
+        falls[number] = fall if is_steady and fall_beside >= min(0.5 * fall, 0.1) else min(fall, 0.0)
     return falls
 
 
-def predicted_by_others(X: Array, Y: Array, sets: list[NDArray[np.intp]], *, penalty: float = 1e-3) -> Array:
+def predicted_by_others(X: Array, Y: Array, sets: list[NDArray[np.intp]]) -> Array:
     """Responses of each period predicted from the others by ridge regressions on sets of columns, (n_sets, *Y.shape).
 
     The first column is a constant. All sets share the products of the columns.
     """
     parts = np.array_split(np.arange(len(Y)), N_PERIODS)
     gram, targets = X.T @ X, X.T @ Y
-    ridge = penalty * len(X) * np.diag(np.arange(X.shape[1]) > 0)
+    ridge = 1e-3 * len(X) * np.diag(np.arange(X.shape[1]) > 0)
     predicted = np.empty((len(sets), *Y.shape))
     for rows in parts:
         others, of_others = gram - X[rows].T @ X[rows] + ridge, targets - X[rows].T @ Y[rows]
         for found, columns in zip(predicted, sets, strict=True):
-            found[rows] = X[np.ix_(rows, columns)] @ np.linalg.solve(
-                others[np.ix_(columns, columns)], of_others[columns]
-            )
+            slopes = np.linalg.solve(others[np.ix_(columns, columns)], of_others[columns])
+            found[rows] = X[np.ix_(rows, columns)] @ slopes
     return predicted

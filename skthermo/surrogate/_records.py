@@ -11,7 +11,6 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 from sklearn.base import BaseEstimator, clone
 from sklearn.pipeline import Pipeline
 
@@ -23,7 +22,6 @@ from skthermo._core.arrays import (
     check_noise,
     is_real,
     median,
-    patterns,
     refuse_no_table,
     robust_deviation,
     spread_evenly,
@@ -218,56 +216,18 @@ class ServiceRecords:
         places = pd.DataFrame(places_of(residuals, records.inputs[order])).ffill().bfill()
         return cls(missing[order], outliers[order], places.to_numpy())
 
-    @property
-    def has_faults(self) -> bool:
-        """Whether there is a gap or an outlier."""
-        return bool(self.missing.any() or not np.isnan(self.outliers).all())
-
-    def draw(
-        self, places: Array, random_state: np.random.RandomState, *, mean_length: float = 25, n_similar: int = 25
-    ) -> NDArray[np.intp]:
+    def draw(self, places: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions, (n_rows,), of the records from which rows of weather in order of time take their faults.
 
-        A row takes the record after the one that the row before it took, so that faults last as long as in training.
-        Now and then, after a run of ``mean_length`` records in the mean, one of the ``n_similar`` records with the most
-        similar weather and the same faults takes over: where a run of faults begins, or in records with the most usual
-        faults, which are mostly none. All records are taken equally often.
+        They are successive records, after the last of which the first one comes, so that faults last as long as in
+        training. The first row with known weather takes one of the 25 records with the most similar weather.
         """
-        n_records, n_rows = len(self.places), len(places)
-        if not self.has_faults:
-            return np.zeros(n_rows, dtype=np.intp)  # all records are alike
-        passes = random_state.uniform(size=n_rows) < 1 / mean_length
-        which = random_state.uniform(size=n_rows)
-        taken = np.empty(n_rows, dtype=np.intp)
-        joint_of, joints = self._joints
-        trees: dict[int, cKDTree] = {}
-
-        def similar(joint: int, place: Array, share: float) -> int:
-            rows = joints[joint]
-            if len(rows) > n_similar and not np.isnan(place).any():
-                if joint not in trees:
-                    trees[joint] = cKDTree(self.places[rows])
-                rows = rows[trees[joint].query(place, n_similar)[1]]
-            return int(rows[int(share * len(rows))])
-
-        record = similar(0, places[0], which[0]) if n_rows else 0
-        for row in range(n_rows):
-            if row:
-                if passes[row] and joint_of[record]:
-                    record = similar(joint_of[record], places[row - 1], which[row])
-                record = (record + 1) % n_records
-            taken[row] = record
-        return taken
-
-    @cached_property
-    def _joints(self) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
-        """From 1 on, the number of the faults of records at which others may take over, 0 for the rest; and the records
-        of each number, all of them for 0."""
-        of_row = patterns(np.hstack([self.missing, ~np.isnan(self.outliers)]))[1]
-        begins = np.diff(of_row, prepend=of_row[-1:]) != 0
-        joint_of = np.where(begins | (of_row == np.bincount(of_row).argmax()), of_row + 1, 0)
-        rows = np.split(np.argsort(joint_of, kind="stable"), np.cumsum(np.bincount(joint_of))[:-1])
-        return joint_of, [np.arange(len(self.places)), *rows[1:]]
+        known = np.flatnonzero(~np.isnan(places).any(axis=1))
+        first = random_state.randint(len(self.places))
+        if len(known):
+            distances = ((self.places - places[known[0]]) ** 2).sum(axis=1)
+            first = random_state.choice(np.argsort(distances, kind="stable")[:25]) - known[0]
+        return (first + np.arange(len(places))) % len(self.places)
 
 
 def places_of(residuals: BaselineResiduals, weather: Array) -> Array:

@@ -120,12 +120,12 @@ class Simulator:
                 frequencies[rows] = solve(theta[rows])
         return frequencies
 
-    def _surface(self, n_rows: int, n_jobs: int | None, *, rows_per_solve: int = 4) -> FrequencySurface | None:
+    def _surface(self, n_rows: int, n_jobs: int | None) -> FrequencySurface | None:
         """The surface that saves time for so many rows; None where there is none.
 
-        It has 0.4 of the error that the reduced model may have, and is made of a solve for every few rows at most.
+        It has 0.4 of the error that the reduced model may have, and is made of a solve for four rows at most.
         """
-        degree = FrequencySurface.degree_within(n_rows // rows_per_solve, self.usual.shape[1])
+        degree = FrequencySurface.degree_within(n_rows // 4, self.usual.shape[1])
         solve = partial(replace(self, usual=None).frequencies, n_jobs=n_jobs)
         try:
             return FrequencySurface(solve, self.usual, tol=0.4 * self.tol, highest_degree=degree, bounds=self.box)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -65,23 +65,16 @@ class Discrepancy:
 
     @classmethod
     def fitted(
-        cls,
-        regressor: BaseEstimator | None,
-        inputs: Array,
-        ratios: Array,
-        weights: Array | None = None,
-        *,
-        sensors: SensorRegression | None = None,
-        mapper: Any = None,
+        cls, regressor: BaseEstimator | None, inputs: Array, ratios: Array, weights: Array | None = None, **parts: Any
     ) -> Discrepancy:
-        """Learn from ratios, (n_rows, n_modes), beside inputs of M2.
+        """Learn from ratios, (n_rows, n_modes), beside inputs of M2; sensors and mapper are parts.
 
         A mode with a ratio five robust deviations from its median, of logarithms, leaves out the row. Modes with 30
         rows learn, from at most 20,000, spread evenly.
         """
         usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
         if regressor is None or not usable.any():
-            return cls(None, (), ratios.shape[1], sensors, mapper)
+            return cls(None, (), ratios.shape[1], **parts)
         logs, learned = np.log(np.where(usable[:, np.newaxis], ratios, np.nan)), []
         with np.errstate(invalid="ignore"):
             is_far = np.abs(logs - median(logs)) > 5 * robust_deviation(logs)
@@ -94,7 +87,7 @@ class Discrepancy:
             values, own = ratios[np.ix_(rows, modes)], None if weights is None else weights[rows]
             values = values[:, 0] if len(modes) == 1 else values
             learned.append((modes, fit_outputs(regressor, inputs[rows], values, own)))
-        return cls(regressor, tuple(learned), ratios.shape[1], sensors, mapper)
+        return cls(regressor, tuple(learned), ratios.shape[1], **parts)
 
     def __call__(self, X: Table) -> Array:
         """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
@@ -223,12 +216,10 @@ class ThermalModel(SavesFrames):
 
     def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]], kind: LossKind) -> list[Array]:
         """Frequencies with one damage of the same groups after the other, solved together by one model."""
-        groups, theta = list(draws[0]), np.tile(weather.theta, (len(draws), 1))
-        severities = np.array([[draw[group] for group in groups] for draw in draws])
-        simulator = self.simulator.with_damage_parameters(groups, severities.min(), severities.max(), kind)
-        theta = np.hstack([theta, np.repeat(1 - severities, len(weather), axis=0)])
-        parts = np.split(simulator.frequencies(theta, self.n_jobs), len(draws))
-        return [self.measured(part, weather) for part in parts]
+        numbers = np.tile(np.arange(len(weather)), len(draws))
+        repeated = replace(weather, given=numbers, theta=weather.theta[numbers], delta=weather.delta[numbers])
+        damage = {group: np.repeat([draw[group] for draw in draws], len(weather)) for group in draws[0]}
+        return np.split(self.simulated(repeated, damage=damage, kind=kind), len(draws))
 
     def elasticity(self, theta: Array, *, step: float = 0.01) -> Array:
         """Relative changes of measured frequencies by those of the model's, (n_rows, n_modes), over a relative step;
@@ -262,14 +253,14 @@ class ThermalModel(SavesFrames):
         return np.sqrt(variances)
 
 
-def limits_in_weather(estimates: Array, *, beyond: float = 0.3) -> Array:
+def limits_in_weather(estimates: Array) -> Array:
     """The least and the largest value of each parameter in any weather, given what records have shown, (2, n).
 
-    Other weather may move ln theta ``beyond`` what a record has shown. A mapper would carry a bearing that freezes on
-    to any stiffness.
+    Other weather may move ln theta by 0.3, or as far as a record has shown. A mapper would carry a bearing that freezes
+    on to any stiffness.
     """
     seen = np.nanmin(estimates, axis=0), np.nanmax(estimates, axis=0)
-    return np.stack([np.minimum(np.exp(-beyond), seen[0]), np.maximum(np.exp(beyond), seen[1])])
+    return np.stack([np.minimum(np.exp(-0.3), seen[0]), np.maximum(np.exp(0.3), seen[1])])
 
 
 def possible(theta: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -298,16 +289,16 @@ def factors_of(parameters: Mapping[str, float], names: Sequence[str]) -> Array:
     return np.array(list(factors.values()))
 
 
-def doubts_of_factors(parameters: Mapping[str, float] | None, *, large: float = 10.0) -> list[ModelWarning]:
+def doubts_of_factors(parameters: Mapping[str, float] | None) -> list[ModelWarning]:
     """The finding that a factor was perhaps meant in percent."""
     return [
         ModelWarning(
-            f"the factor of parameter {name!r} is {factor:g} (expected at most {large:g}). Its stiffness is multiplied "
+            f"the factor of parameter {name!r} is {factor:g} (expected at most 10). Its stiffness is multiplied "
             "by that. Give 1.02 for 2 % more",
             "doubtful-factor",
         )
         for name, factor in (as_mapping(parameters) or {}).items()
-        if factor > large
+        if factor > 10
     ]
 
 
