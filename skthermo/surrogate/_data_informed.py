@@ -121,7 +121,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         are there, and other inverses leave them out.
     discrepancy : "auto", regressor or None, default="auto"
         Learns the ratio of measured over modelled frequencies from the inputs of M2, mode by mode, because the FE model
-        cannot follow all of the weather's effects. "auto" is a `TemperatureMapper`; None, as in the paper, none.
+        cannot follow all of the weather's effects. Changes of the ratio count as far as they hold for records left out.
+        "auto" is a `TemperatureMapper`; None, as in the paper, none.
     reduce : "auto", bool or float, default="auto"
         Whether predictions, simulations and a `PosteriorInverse` use a reduced model, as its ``reduce`` says, which
         gets this value if its own is "auto" (:doc:`/guide/costs`). An `InverseSurrogate` learns from the full model.
@@ -912,7 +913,7 @@ def resampled(fem: DataInformedFEM, random_state: int | np.random.RandomState | 
         learned = possible(mapper.predict(filled))[0]
         modelled = fem.thermal_.frequencies(learned)
         known = records.usable[rows] / modelled[rows]
-        parts = {"sensors": fem.sensors_, "mapper": mapper}
+        parts = {"shares": fem.discrepancy_.shares, "sensors": fem.sensors_, "mapper": mapper}
         discrepancy = Discrepancy.fitted(fem.discrepancy_.regressor, records.inputs[rows], known, weights, **parts)
     thermal = replace(fem.thermal_, mapper=mapper, discrepancy=discrepancy)
     records = replace(records, learned=learned, modelled=modelled)

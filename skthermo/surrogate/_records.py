@@ -105,7 +105,8 @@ class TrainingRecords(SavesFrames):
             # ratios to predictions that are out of fold themselves, so that the model is not solved for each fold
             rows = train[has_theta[train]]
             own_weights = None if weights is None else weights[rows]
-            others = Discrepancy.fitted(model.discrepancy.regressor, inputs[rows], ratios[rows], own_weights)
+            known = model.discrepancy.regressor, inputs[rows], ratios[rows], own_weights
+            others = Discrepancy.fitted(*known, shares=model.discrepancy.shares)
             return lambda test: others.at(inputs[test])
 
         predicted = out_of_fold(learn_parameters, fold_of)
@@ -170,7 +171,7 @@ def measurement_noise(mapper: BaseEstimator, T: Table, F: Table) -> Array:
     ratios, fold_of = np.exp(changes), BlockedKFold(N_FOLDS).fold_of(_safe_indexing(T, rows))
 
     def learn(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
-        learned = Discrepancy.fitted(ratio_regressor(), inputs[train], ratios[train])
+        learned = Discrepancy.fitted(ratio_regressor(), inputs[train], ratios[train], shares=np.ones(ratios.shape[1]))
         return lambda test: learned.at(inputs[test])
 
     return np.minimum(robust_deviation(changes - out_of_fold(learn, fold_of)), 0.1)

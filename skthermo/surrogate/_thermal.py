@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,6 +35,7 @@ from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import ModelWarning, SkthermoWarning
 from skthermo.fem.damage import LossKind
+from skthermo.preprocessing.folds import BlockedKFold, Rows, out_of_fold
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import TrainingRange, unpredicted_findings
 from skthermo.surrogate._regression import TemperatureMapper, default_lines
@@ -53,28 +54,36 @@ def ratio_regressor() -> TemperatureMapper:
 class Discrepancy:
     """Logarithm of measured over modelled frequencies in the weather, mode by mode: ``discrepancy_(T)``.
 
-    Regressors have ``learned`` the ratios of modes that are measured in the same rows, from inputs of the ``mapper``.
-    It is 0 for modes with few records, and for all without a ``regressor``.
+    Regressors have ``learned`` the ratios of modes that are measured in the same rows, from inputs of the ``mapper``;
+    changes from their mean logarithm count by the ``shares`` of the modes (:func:`reliable_shares`). It is 0 for modes
+    with few records, and for all without a ``regressor``.
     """
 
     regressor: BaseEstimator | None
-    learned: tuple[tuple[NDArray[np.intp], BaseEstimator], ...]
-    n_modes: int
+    learned: tuple[tuple[NDArray[np.intp], BaseEstimator, Array], ...]
+    shares: Array
     sensors: SensorRegression | None = None
     mapper: Any = None
 
     @classmethod
     def fitted(
-        cls, regressor: BaseEstimator | None, inputs: Array, ratios: Array, weights: Array | None = None, **parts: Any
+        cls,
+        regressor: BaseEstimator | None,
+        inputs: Array,
+        ratios: Array,
+        weights: Array | None = None,
+        shares: Array | None = None,
+        **parts: Any,
     ) -> Discrepancy:
         """Learn from ratios, (n_rows, n_modes), beside inputs of M2; sensors and mapper are parts.
 
         A mode with a ratio five robust deviations from its median, of logarithms, leaves out the row. Modes with 30
-        rows learn, from at most 20,000, spread evenly.
+        rows learn, from at most 20,000, spread evenly. Shares may be known from more rows.
         """
+        found = np.zeros(ratios.shape[1])
         usable = ~np.isnan(inputs).any(axis=1) & (True if weights is None else weights > 0)
         if regressor is None or not usable.any():
-            return cls(None, (), ratios.shape[1], **parts)
+            return cls(None, (), found, **parts)
         logs, learned = np.log(np.where(usable[:, np.newaxis], ratios, np.nan)), []
         with np.errstate(invalid="ignore"):
             is_far = np.abs(logs - median(logs)) > 5 * robust_deviation(logs)
@@ -86,8 +95,9 @@ class Discrepancy:
                 continue
             values, own = ratios[np.ix_(rows, modes)], None if weights is None else weights[rows]
             values = values[:, 0] if len(modes) == 1 else values
-            learned.append((modes, fit_outputs(regressor, inputs[rows], values, own)))
-        return cls(regressor, tuple(learned), ratios.shape[1], **parts)
+            learned.append((modes, fit_outputs(regressor, inputs[rows], values, own), mean_level(values, own)))
+            found[modes] = reliable_shares(regressor, inputs[rows], values, own) if shares is None else shares[modes]
+        return cls(regressor, tuple(learned), found, **parts)
 
     def __call__(self, X: Table) -> Array:
         """delta, (n_samples, n_modes), at temperatures in degrees Celsius; 0 without a discrepancy."""
@@ -98,11 +108,31 @@ class Discrepancy:
     def at(self, inputs: Array) -> Array:
         """delta at inputs of M2; NaN in rows in which one is missing."""
         known = ~np.isnan(inputs).any(axis=1)
-        delta = np.full((len(inputs), self.n_modes), np.nan)
+        delta = np.full((len(inputs), len(self.shares)), np.nan)
         delta[known] = 0.0
-        for modes, regressor in self.learned if known.any() else ():
-            delta[np.ix_(known, modes)] = np.log(as_columns(regressor.predict(inputs[known])))
+        for modes, regressor, level in self.learned if known.any() else ():
+            change = np.log(as_columns(regressor.predict(inputs[known]))) - level
+            delta[np.ix_(known, modes)] = level + self.shares[modes] * change
         return delta
+
+
+def mean_level(ratios: Array, weights: Array | None) -> Array:
+    """Mean logarithm of ratios, (n_modes,)."""
+    return np.average(np.log(as_columns(ratios)), axis=0, weights=weights)
+
+
+def reliable_shares(regressor: BaseEstimator, inputs: Array, ratios: Array, weights: Array | None) -> Array:
+    """Slopes of changes of ratios over those that a regressor predicts out of fold, from 0 to 1, (n_modes,)."""
+
+    def learn(train: Rows) -> Callable[[Rows], Array]:
+        own = None if weights is None else weights[train]
+        fitted, level = fit_outputs(regressor, inputs[train], ratios[train], own), mean_level(ratios[train], own)
+        return lambda test: np.log(as_columns(fitted.predict(inputs[test]))) - level
+
+    predicted = out_of_fold(learn, BlockedKFold(5).fold_of(inputs))
+    measured = np.log(as_columns(ratios)) - mean_level(ratios, weights)
+    slopes = (predicted * measured).sum(axis=0) / np.maximum((predicted**2).sum(axis=0), np.finfo(float).tiny)
+    return np.clip(slopes, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)

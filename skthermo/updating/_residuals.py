@@ -1,16 +1,15 @@
 """Measured modes, the model's modes paired with them, the residuals between them and the search for their minimum."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import Bounds, OptimizeResult, least_squares, linear_sum_assignment, minimize
+from scipy.optimize import OptimizeResult, least_squares, linear_sum_assignment, minimize
 
 from skthermo._core.arrays import (
     Array,
-    Label,
     as_floats,
     by_name,
     central_differences,
@@ -21,6 +20,8 @@ from skthermo._core.arrays import (
 from skthermo._core.parallel import single_blas_thread
 from skthermo.exceptions import RecordsWarning, SkthermoWarning
 from skthermo.fem import FEModel
+
+TOL = 1e-9  # relative change of the loss and of theta at which a search ends
 
 
 @dataclass
@@ -42,7 +43,7 @@ class Measured:
 
     @property
     def has_shape(self) -> NDArray[np.bool_]:
-        return _given(self.shapes)
+        return np.asarray(np.isfinite(self.shapes).any(axis=0))
 
     @property
     def n_residuals(self) -> int:
@@ -52,14 +53,7 @@ class Measured:
 
 
 def read_measured(
-    F: Array,
-    names: list[str],
-    shapes: ArrayLike | None,
-    dofs: ArrayLike | None,
-    frequency_std: ArrayLike | None,
-    shape_weight: ArrayLike,
-    n_dof: int,
-    labels: Sequence[Label] = (),
+    model: Any, F: Array, names: list[str], shapes: Any, dofs: Any, frequency_std: Any, shape_weight: ArrayLike
 ) -> Measured:
     """Means over records, with shapes and weights, of the modes that were measured."""
     n_modes = F.shape[1]
@@ -71,7 +65,7 @@ def read_measured(
         )
     counts = np.isfinite(F).sum(axis=0)
     means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
-    places, unit, findings = _read_shapes(shapes, dofs, n_modes, n_dof, names, labels)
+    places, unit, findings = _read_shapes(model, shapes, dofs, names)
     weights = _per_mode(shape_weight, names, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
         raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
@@ -79,7 +73,7 @@ def read_measured(
         raise ValueError(
             f"shape_weight is {shape_weight!r} but no shapes were given; expected shapes, or a weight of 0"
         )
-    with_shape = _given(unit)
+    with_shape = np.isfinite(unit).any(axis=0)
     columns = np.flatnonzero((counts > 0) | with_shape)
     if not columns.size:
         raise ValueError(f"F is NaN in all {len(F)} records of all {n_modes} modes; expected a measured frequency")
@@ -109,24 +103,19 @@ def _real_shapes(shapes: NDArray) -> tuple[Array, list[SkthermoWarning]]:
     return np.where(np.isnan(shapes), np.nan, turned.real), [RecordsWarning(text, "doubtful-shapes")]
 
 
-def _given(shapes: Array) -> NDArray[np.bool_]:
-    """Which columns hold a measured shape: not those that are NaN throughout, and none if there are no rows."""
-    return np.asarray(np.isfinite(shapes).any(axis=0))
-
-
 def _read_shapes(
-    shapes, dofs, n_modes: int, n_dof: int, names: list[str], labels: Sequence[Label]
+    model: Any, shapes: Any, dofs: Any, names: list[str]
 ) -> tuple[NDArray[np.intp], Array, list[SkthermoWarning]]:
     if (shapes is None) != (dofs is None):
         given, missing = ("shapes", "dofs") if dofs is None else ("dofs", "shapes")
         raise ValueError(f"{given} were given without {missing}; expected both, or neither")
     if shapes is None:
-        return np.empty(0, dtype=np.intp), np.empty((0, n_modes)), []
-    places = check_dofs(dofs, n_dof, labels)
+        return np.empty(0, dtype=np.intp), np.empty((0, len(names))), []
+    places = check_dofs(dofs, model.n_dof, getattr(model, "dofs", ()))
     array = shape_array(shapes, "shapes")
-    if array.shape != (len(places), n_modes):
+    if array.shape != (len(places), len(names)):
         raise ValueError(
-            f"shapes have shape {array.shape}; expected ({len(places)}, {n_modes}): a row for each of dofs and a "
+            f"shapes have shape {array.shape}; expected ({len(places)}, {len(names)}): a row for each of dofs and a "
             "column for each mode of F"
         )
     array, findings = _real_shapes(array) if np.iscomplexobj(array) else (array, [])
@@ -153,11 +142,12 @@ def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[
 
 
 def _per_mode(values: ArrayLike, names: list[str], what: str) -> Array:
-    n_modes = len(names)
     array = real_array(by_name(values, names, what, "modes"), what)
-    if array.shape not in ((), (n_modes,)):
-        raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
-    return np.broadcast_to(array, (n_modes,)).copy()
+    if array.shape not in ((), (len(names),)):
+        raise ValueError(
+            f"{what} has shape {array.shape}; expected a number, or one for each of the {len(names)} modes"
+        )
+    return np.broadcast_to(array, len(names))
 
 
 @dataclass
@@ -246,10 +236,7 @@ class Residuals:
     """
 
     def __init__(self, model: FEModel, measured: Measured, prior: Array | None, noise: Array | None = None):
-        self.model = model
-        self.measured = measured
-        self.prior = prior
-        self.noise = noise
+        self.model, self.measured, self.prior, self.noise = model, measured, prior, noise
         self.weighted = np.flatnonzero(measured.shape_weights > 0)  # modes whose shapes have a weight
         self.n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
 
@@ -295,12 +282,9 @@ class Point:
     """Residuals at one theta, and their derivatives on demand."""
 
     def __init__(self, residuals: Residuals, theta: Array, modes: PairedModes):
-        self._residuals = residuals
-        self._theta = theta
-        self._modes = modes
+        self._residuals, self._theta, self._modes = residuals, theta, modes
         measured, prior, weighted = residuals.measured, residuals.prior, residuals.weighted
-        self._has_frequency = measured.has_frequency
-        parts = [((modes.frequencies - measured.frequencies) / measured.deviations)[self._has_frequency]]
+        parts = [((modes.frequencies - measured.frequencies) / measured.deviations)[measured.has_frequency]]
         if prior is not None:
             parts.append((theta - 1) / prior)
         if len(weighted):
@@ -337,14 +321,13 @@ class Point:
         """Derivatives of the residuals of frequencies and prior, and of tangents (n_dofs, n_shapes, n_parameters)."""
         measured, prior, weighted = self._residuals.measured, self._residuals.prior, self._residuals.weighted
         d_frequencies, d_shapes = self._modes.derivatives()
-        plain = (d_frequencies / measured.deviations[:, np.newaxis])[self._has_frequency]
+        plain = (d_frequencies / measured.deviations[:, np.newaxis])[measured.has_frequency]
         if prior is not None:
             plain = np.vstack([plain, np.diag(1 / prior)])
         if not len(weighted):
             return plain, np.empty((0, 0, len(self._theta)))
-        return plain, tangent_derivatives(
-            self._modes.shapes[:, weighted], d_shapes[:, weighted], measured.shapes[:, weighted]
-        )
+        shapes = self._modes.shapes[:, weighted]
+        return plain, tangent_derivatives(shapes, d_shapes[:, weighted], measured.shapes[:, weighted])
 
 
 class Outcome(NamedTuple):
@@ -362,7 +345,7 @@ class SearchHistory:
     """Record of one optimisation: its last and its best point, and how many theta had no modes."""
 
     def __init__(self, residuals: Residuals, start: Array):
-        self._residuals = residuals
+        self.residuals = residuals
         self._theta = self.theta = start
         self._point = self.best = residuals.at(start)
         self.n_evaluations = 1
@@ -375,7 +358,7 @@ class SearchHistory:
         if not np.array_equal(theta, self._theta):
             self.n_evaluations += 1
             self._theta = theta.copy()
-            self._point = self._residuals.at(self._theta)
+            self._point = self.residuals.at(self._theta)
             if not np.isfinite(self._point.objective):
                 self.n_failed += 1
             elif self._point.objective < self.best.objective:
@@ -387,10 +370,8 @@ class NoDerivatives(Exception):
     """The model has no finite derivatives at some theta."""
 
 
-def optimise(
-    residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int, tol: float = 1e-9
-) -> Outcome:
-    """Minimise the residuals' loss within bounds, until a relative change of it and of theta is below ``tol``.
+def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max_iter: int) -> Outcome:
+    """Minimise the residuals' loss within bounds, until a relative change of it and of theta is below 1e-9.
 
     Where the model has no modes, steps are cut short, which looks like convergence. A search that met such theta is
     therefore started again from its best point, and has converged when it meets none.
@@ -400,10 +381,10 @@ def optimise(
     with single_blas_thread():
         history = SearchHistory(residuals, start)
         first, before = history.best.objective, np.inf
-        while max_iter > 0 and history.best.objective < (1 - tol) * before:
+        while max_iter > 0 and history.best.objective < (1 - TOL) * before:
             before, n_failed = history.best.objective, history.n_failed
             try:
-                result = search(history, residuals, bounds, max_iter, first, tol)
+                result = search(history, bounds, max_iter, first)
             except NoDerivatives:
                 break
             max_iter -= result.get("nit", result.nfev)
@@ -413,28 +394,19 @@ def optimise(
     return Outcome(start, history.best.objective, success, history.n_evaluations, history.n_failed, history.theta)
 
 
-def _least_squares(
-    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float, tol: float
-) -> OptimizeResult:
-    def jacobian(theta: Array) -> Array:
-        return _finite(history.at(theta).jacobian())
-
+def _least_squares(history: SearchHistory, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
     return least_squares(
         lambda theta: history.at(theta).values.copy(),  # SciPy scales it in place
         history.theta,
-        jacobian,
-        bounds=(bounds[:, 0], bounds[:, 1]),
-        loss=residuals.loss,
-        ftol=tol,
-        xtol=tol,
-        gtol=np.finfo(float).eps,
+        lambda theta: _finite(history.at(theta).jacobian()),
+        bounds=bounds.T,
+        loss=history.residuals.loss,
         max_nfev=max_iter,
+        **{"ftol": TOL, "xtol": TOL, "gtol": np.finfo(float).eps},
     )
 
 
-def _lbfgs(
-    history: SearchHistory, residuals: Residuals, bounds: Array, max_iter: int, first: float, tol: float
-) -> OptimizeResult:
+def _lbfgs(history: SearchHistory, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
     """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
 
     Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.
@@ -453,8 +425,8 @@ def _lbfgs(
 
     scale = first or 1.0
     uphill = np.empty_like(history.theta)
-    options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": tol, "gtol": tol, "maxcor": 20}
-    return minimize(share, history.theta, jac=True, method="L-BFGS-B", bounds=Bounds(*bounds.T), options=options)
+    options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": TOL, "gtol": TOL, "maxcor": 20}
+    return minimize(share, history.theta, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
 
 
 def _finite(derivatives: Array) -> Array:

@@ -331,18 +331,13 @@ class ModelUpdater(Estimator):
         names = [*self.model.parameter_names, *chosen]
         limits = np.tile([max(1 - 4 * spread, 0.1), 1 + 4 * spread], (len(chosen), 1))
         bounds = np.vstack([self._read_bounds(), limits])
-        extended = quiet(_with_groups(self.model, chosen))
+        model = self.model.full if isinstance(self.model, ReducedModel) and chosen else self.model  # faster to extend
+        extended = quiet(model.with_damage_parameters(chosen) if chosen else model)
         residuals = Residuals(extended, self.measured_, np.append(prior, np.full(len(chosen), spread)))
-        search = partial(
-            optimise,
-            bounds=bounds,
-            start=np.append(self.theta_, np.ones(len(chosen))),
-            method="least_squares",
-            max_iter=self.max_iter,
-        )
+        search = bounds, np.append(self.theta_, np.ones(len(chosen))), "least_squares", self.max_iter
         options = {"n_jobs": self.n_jobs, "prefer": getattr(self.model, "prefer", None)}
         drawn = residuals.randomised(n, as_random_state(random_state))
-        outcomes = run_jobs((delayed(search)(one) for one in drawn), n, unit="models", **options)
+        outcomes = run_jobs((delayed(optimise)(one, *search) for one in drawn), n, unit="models", **options)
         models = Parallel(**options)(delayed(_changed_model)(self.model, chosen, one.theta) for one in outcomes)
         theta = np.array([one.theta for one in outcomes])
         findings = doubtful_draws(outcomes, names, bounds, residuals)
@@ -368,9 +363,8 @@ class ModelUpdater(Estimator):
                 f"shapes were given, but {self.model!r} has no {' and no '.join(map(repr, missing))}; expected a model "
                 "with local_modes, n_dof and track, such as AffineModel"
             )
-        n_dof, labels = getattr(self.model, "n_dof", 0), getattr(self.model, "dofs", ())
         names = column_names(table, "f")
-        return read_measured(values, names, shapes, dofs, frequency_std, self.shape_weight, n_dof, labels)
+        return read_measured(self.model, values, names, shapes, dofs, frequency_std, self.shape_weight)
 
     def _read_bounds(self) -> Array:
         names = self.model.parameter_names
@@ -382,23 +376,18 @@ class ModelUpdater(Estimator):
 
     def _run(self, residuals: Residuals, bounds: Array) -> list[Outcome]:
         """The outcome of each start; where a reduced model has searched, the best one goes on with the model itself."""
-        lowest, highest = bounds.T
-        random_state = check_random_state(self.random_state)
-        drawn = random_state.uniform(lowest, highest, size=(self.n_starts - 1, len(bounds)))
+        drawn = check_random_state(self.random_state).uniform(*bounds.T, size=(self.n_starts - 1, len(bounds)))
         starts = np.vstack([np.ones(len(bounds)), drawn])
         reduced = self._reduced(bounds)
         if reduced is None:
             return self._outcomes(residuals, bounds, starts)
         found = self._outcomes(Residuals(reduced, residuals.measured, residuals.prior), bounds, starts)
         outcomes = [one._replace(objective=residuals.at(one.theta).objective) for one in found]
-        best = min(range(len(outcomes)), key=lambda start: outcomes[start].objective)
-        last = optimise(residuals, bounds, outcomes[best].theta, self.method, self.max_iter)
+        best = int(np.argmin([one.objective for one in outcomes]))
         before = outcomes[best]
-        outcomes[best] = last._replace(
-            start=before.start,
-            n_evaluations=before.n_evaluations + last.n_evaluations,
-            n_failed=before.n_failed + last.n_failed,
-        )
+        last = optimise(residuals, bounds, before.theta, self.method, self.max_iter)
+        numbers = {name: getattr(before, name) + getattr(last, name) for name in ("n_evaluations", "n_failed")}
+        outcomes[best] = last._replace(start=before.start, **numbers)
         return outcomes
 
     def _outcomes(self, residuals: Residuals, bounds: Array, starts: Array) -> list[Outcome]:
@@ -442,12 +431,6 @@ def groups_beside(model: Any, groups: Sequence[str] | None) -> list[str]:
         return set().union(*(terms for terms in parameters if terms <= own)) == own
 
     return [name for name in chosen if not is_scaled(name)]
-
-
-def _with_groups(model: Any, groups: Sequence[str]) -> Any:
-    """A model with more parameters, the stiffness of damage groups; a reduced one would take longer to make."""
-    full = model.full if isinstance(model, ReducedModel) and groups else model
-    return full.with_damage_parameters(groups) if groups else full
 
 
 def _changed_model(model: Any, groups: Sequence[str], multipliers: Array) -> FEModel:
