@@ -142,12 +142,10 @@ def _read_deviations(frequency_std: ArrayLike | None, means: Array, names: list[
 
 
 def _per_mode(values: ArrayLike, names: list[str], what: str) -> Array:
-    array = real_array(by_name(values, names, what, "modes"), what)
-    if array.shape not in ((), (len(names),)):
-        raise ValueError(
-            f"{what} has shape {array.shape}; expected a number, or one for each of the {len(names)} modes"
-        )
-    return np.broadcast_to(array, len(names))
+    array, n_modes = real_array(by_name(values, names, what, "modes"), what), len(names)
+    if array.shape not in ((), (n_modes,)):
+        raise ValueError(f"{what} has shape {array.shape}; expected a number, or one for each of the {n_modes} modes")
+    return np.broadcast_to(array, n_modes)
 
 
 @dataclass
@@ -348,6 +346,7 @@ class SearchHistory:
         self.residuals = residuals
         self._theta = self.theta = start
         self._point = self.best = residuals.at(start)
+        self.first = self.best.objective
         self.n_evaluations = 1
         self.n_failed = 0 if np.isfinite(self.best.objective) else 1
 
@@ -380,11 +379,11 @@ def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max
     success = False
     with single_blas_thread():
         history = SearchHistory(residuals, start)
-        first, before = history.best.objective, np.inf
+        before = np.inf
         while max_iter > 0 and history.best.objective < (1 - TOL) * before:
             before, n_failed = history.best.objective, history.n_failed
             try:
-                result = search(history, bounds, max_iter, first)
+                result = search(history, bounds, max_iter)
             except NoDerivatives:
                 break
             max_iter -= result.get("nit", result.nfev)
@@ -394,19 +393,19 @@ def optimise(residuals: Residuals, bounds: Array, start: Array, method: str, max
     return Outcome(start, history.best.objective, success, history.n_evaluations, history.n_failed, history.theta)
 
 
-def _least_squares(history: SearchHistory, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _least_squares(history: SearchHistory, bounds: Array, max_iter: int) -> OptimizeResult:
+    options = {"max_nfev": max_iter, "ftol": TOL, "xtol": TOL, "gtol": np.finfo(float).eps}
     return least_squares(
         lambda theta: history.at(theta).values.copy(),  # SciPy scales it in place
         history.theta,
         lambda theta: _finite(history.at(theta).jacobian()),
         bounds=bounds.T,
         loss=history.residuals.loss,
-        max_nfev=max_iter,
-        **{"ftol": TOL, "xtol": TOL, "gtol": np.finfo(float).eps},
+        **options,
     )
 
 
-def _lbfgs(history: SearchHistory, bounds: Array, max_iter: int, first: float) -> OptimizeResult:
+def _lbfgs(history: SearchHistory, bounds: Array, max_iter: int) -> OptimizeResult:
     """L-BFGS-B on the objective as a share of the first one, since its tolerances are absolute below 1.
 
     Where the model has no modes, it is given a parabola that rises from the best point, so that it turns back.
@@ -423,7 +422,7 @@ def _lbfgs(history: SearchHistory, bounds: Array, max_iter: int, first: float) -
         slope = abs(uphill @ step)
         return history.best.objective / scale + slope / 2, 2 * slope * step / (step @ step)
 
-    scale = first or 1.0
+    scale = history.first or 1.0
     uphill = np.empty_like(history.theta)
     options = {"maxiter": max_iter, "maxfun": 10 * max_iter, "ftol": TOL, "gtol": TOL, "maxcor": 20}
     return minimize(share, history.theta, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
