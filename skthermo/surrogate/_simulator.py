@@ -58,9 +58,7 @@ class Simulator:
         if serves and not known.outside(theta).any():  # NaN is nowhere outside
             return replace(known, usual=theta)
         if tol is None:
-            may_pay = hasattr(model, "reduction_pays")
-            reason = "a reduced model would save no time" if may_pay else "it has no reduced model"
-            return cls(model, reason=reason if auto else "reduce=False")
+            return cls(model, reason="a reduced model would save no time" if auto else "reduce=False")
         if known is not None and known.reason == NO_BASIS:
             return known
         try:
