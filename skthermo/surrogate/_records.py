@@ -182,62 +182,25 @@ class ServiceRecords:
     """Gaps and outliers of training records in order of time, as `RecordSimulator.service_of` gives them.
 
     ``missing`` temperatures and frequencies, (n_records, n_sensors + n_modes); relative residuals of ``outliers``,
-    (n_records, n_modes), NaN where a value is none; ``places``, (n_records, n_coordinates), near for similar weather.
+    (n_records, n_modes), NaN where a value is none; ``weather``, (n_records, n_inputs).
     """
 
     missing: NDArray[np.bool_]
     outliers: Array
-    places: Array
+    weather: Array
 
-    @classmethod
-    def learned(
-        cls, records: TrainingRecords, residuals: BaselineResiduals, raw: ArrayLike | None, predicted: Array
-    ) -> ServiceRecords:
-        """Learn from training records; a value is an outlier if its residual is far from its neighbours' residuals.
-
-        With raw frequencies of these records, outliers are what cleaning has changed or removed.
-        """
-        frequencies = as_floats(records.frequencies)
-        measured, outliers = frequencies, np.full(frequencies.shape, np.nan)
-        if raw is None:
-            outliers[residuals.rows] = residuals.outliers
-        else:
-            measured = as_floats(raw)
-            if measured.shape != frequencies.shape:
-                raise ValueError(
-                    f"outliers has shape {measured.shape}; expected the frequencies that the chain was fitted on "
-                    f"before they were cleaned, {frequencies.shape}, or 'fitted', or the share of outliers"
-                )
-            check_same_rows(records.frequencies, raw, ("the frequencies of fit", "outliers"))
-            is_outlier = ~np.isnan(measured) & (measured != frequencies)
-            outliers[is_outlier] = (measured / predicted - 1)[is_outlier]
-        order = np.argsort(row_times(records.temperatures), kind="stable")
-        order = order[records.counted[order]]
-        missing = np.isnan(np.hstack([as_floats(records.temperatures), measured]))
-        places = pd.DataFrame(places_of(residuals, records.inputs[order])).ffill().bfill()
-        return cls(missing[order], outliers[order], places.to_numpy())
-
-    def draw(self, places: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
+    def draw(self, weather: Array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions, (n_rows,), of the records from which rows of weather in order of time take their faults.
 
         They are successive records, after the last of which the first one comes, so that faults last as long as in
         training. The first row with known weather takes one of the 25 records with the most similar weather.
         """
-        known = np.flatnonzero(~np.isnan(places).any(axis=1))
-        first = random_state.randint(len(self.places))
+        known = np.flatnonzero(~np.isnan(weather).any(axis=1))
+        first = random_state.randint(len(self.weather))
         if len(known):
-            distances = ((self.places - places[known[0]]) ** 2).sum(axis=1)
-            first = random_state.choice(np.argsort(distances, kind="stable")[:25]) - known[0]
-        return (first + np.arange(len(places))) % len(self.places)
-
-
-def places_of(residuals: BaselineResiduals, weather: Array) -> Array:
-    """Coordinates of weather; NaN where it is unknown."""
-    known = ~np.isnan(weather).any(axis=1)
-    places = np.full((len(weather), residuals.places.shape[1]), np.nan)
-    if known.any():
-        places[known] = residuals.coordinates.transform(weather[known])
-    return places
+            differences = (self.weather - weather[known[0]]) / np.nanstd(self.weather, axis=0)
+            first = random_state.choice(np.argsort((differences**2).sum(axis=1), kind="stable")[:25]) - known[0]
+        return (first + np.arange(len(weather))) % len(self.weather)
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,12 +227,28 @@ class RecordSimulator(SavesFrames):
         return self.gaps_and_outliers or self.service_of(None)
 
     def service_of(self, F: ArrayLike | None) -> ServiceRecords:
-        """Gaps and outliers of the training records.
+        """Gaps and outliers of the training records; a value is an outlier if its residual is far from its neighbours'.
 
         With their frequencies before cleaning, outliers are what cleaning has changed or removed.
         """
-        expected = self.records.modelled * np.exp(self.model.discrepancy.at(self.records.inputs))
-        return ServiceRecords.learned(self.records, self.residuals, F, expected)
+        records, frequencies = self.records, as_floats(self.records.frequencies)
+        measured, outliers = frequencies, np.full(frequencies.shape, np.nan)
+        if F is None:
+            outliers[self.residuals.rows] = self.residuals.outliers
+        else:
+            measured = as_floats(F)
+            if measured.shape != frequencies.shape:
+                raise ValueError(
+                    f"outliers has shape {measured.shape}; expected the frequencies that the chain was fitted on "
+                    f"before they were cleaned, {frequencies.shape}, or 'fitted', or the share of outliers"
+                )
+            check_same_rows(records.frequencies, F, ("the frequencies of fit", "outliers"))
+            expected = records.modelled * np.exp(self.model.discrepancy.at(records.inputs))
+            outliers = np.where(~np.isnan(measured) & (measured != frequencies), measured / expected - 1, np.nan)
+        order = np.argsort(row_times(records.temperatures), kind="stable")
+        order = order[records.counted[order]]
+        missing = np.isnan(np.hstack([as_floats(records.temperatures), measured]))
+        return ServiceRecords(missing[order], outliers[order], records.inputs[order])
 
     def noise(
         self,
@@ -326,8 +305,6 @@ class RecordSimulator(SavesFrames):
         if are_drawn(gaps):
             service, taken = self._taken(weather, outliers, streams[0])
             return service.missing[taken, :n_sensors], service.missing[taken, n_sensors:]
-        if np.ndim(outliers):
-            self.service_of(outliers)  # which refuses what is not of the training records
         single = streams[1].uniform(size=(len(weather), n_modes)) < gaps
         return np.zeros((len(weather), n_sensors), dtype=bool), single
 
@@ -340,8 +317,7 @@ class RecordSimulator(SavesFrames):
         else:
             service = self.service_of(outliers) if np.ndim(outliers) else self.service
         order = np.argsort(row_times(weather.given), kind="stable")
-        taken = service.draw(places_of(self.residuals, weather.inputs[order]), stream)
-        return service, taken[np.argsort(order)]
+        return service, service.draw(weather.inputs[order], stream)[np.argsort(order)]
 
 
 def fault_streams(random_state: np.random.RandomState) -> list[np.random.RandomState]:
