@@ -224,6 +224,8 @@ def _by_shape(model: Any, measured: Measured, theta: Array) -> PairedModes:
 class Residuals:
     """Residuals of frequencies, of the prior and of shapes, in one vector with one loss, which a search minimises.
 
+    Without a prior, its standard deviations are infinite.
+
     A shape's residuals are its `tangents` e, of squared length E = 1 / MAC - 1. Together they have the loss
     ((1 - sqrt(MAC)) / sqrt(MAC))^2 = (sqrt(1 + E) - 1)^2, whose slope weights them in the Gauss-Newton matrix.
     (1 - sqrt(MAC)) / sqrt(MAC) itself is quadratic in e: its derivative vanishes at the optimum.
@@ -233,10 +235,10 @@ class Residuals:
     ones.
     """
 
-    def __init__(self, model: FEModel, measured: Measured, prior: Array | None, noise: Array | None = None):
+    def __init__(self, model: FEModel, measured: Measured, prior: Array, noise: Array | None = None):
         self.model, self.measured, self.prior, self.noise = model, measured, prior, noise
         self.weighted = np.flatnonzero(measured.shape_weights > 0)  # modes whose shapes have a weight
-        self.n_plain = int(measured.has_frequency.sum()) + (0 if prior is None else len(prior))
+        self.n_plain = int(measured.has_frequency.sum()) + len(prior)
 
     def at(self, theta: Array) -> "Point":
         return Point(self, theta, paired_modes(self.model, self.measured, theta))
@@ -282,9 +284,8 @@ class Point:
     def __init__(self, residuals: Residuals, theta: Array, modes: PairedModes):
         self._residuals, self._theta, self._modes = residuals, theta, modes
         measured, prior, weighted = residuals.measured, residuals.prior, residuals.weighted
-        parts = [((modes.frequencies - measured.frequencies) / measured.deviations)[measured.has_frequency]]
-        if prior is not None:
-            parts.append((theta - 1) / prior)
+        misses = (modes.frequencies - measured.frequencies) / measured.deviations
+        parts = [misses[measured.has_frequency], (theta - 1) / prior]
         if len(weighted):
             parts.append(tangents(modes.shapes[:, weighted], measured.shapes[:, weighted]).T.ravel())
         self.values, self._scales = np.concatenate(parts), np.ones(1)
@@ -319,9 +320,8 @@ class Point:
         """Derivatives of the residuals of frequencies and prior, and of tangents (n_dofs, n_shapes, n_parameters)."""
         measured, prior, weighted = self._residuals.measured, self._residuals.prior, self._residuals.weighted
         d_frequencies, d_shapes = self._modes.derivatives()
-        plain = (d_frequencies / measured.deviations[:, np.newaxis])[measured.has_frequency]
-        if prior is not None:
-            plain = np.vstack([plain, np.diag(1 / prior)])
+        misses = d_frequencies / measured.deviations[:, np.newaxis]
+        plain = np.vstack([misses[measured.has_frequency], np.diag(1 / prior)])
         if not len(weighted):
             return plain, np.empty((0, 0, len(self._theta)))
         shapes = self._modes.shapes[:, weighted]

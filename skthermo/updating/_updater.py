@@ -229,8 +229,8 @@ class ModelUpdater(Estimator):
         """
         measured = self._read(F, shapes, dofs, frequency_std)
         bounds = self._read_bounds()
-        prior = None if self.prior is None else check_prior(self.prior, self.model.parameter_names)
-        n_parameters = len(bounds)
+        n_parameters, names = len(bounds), self.model.parameter_names
+        prior = np.full(n_parameters, np.inf) if self.prior is None else check_prior(self.prior, names)
         model = quiet(self.model)
         residuals = Residuals(model, measured, prior)
         outcomes = self._run(residuals, bounds)
@@ -248,9 +248,8 @@ class ModelUpdater(Estimator):
         self.starts_ = starts_table(outcomes)
         self.covariance_ = cramer_rao(residuals.at(best.theta).information())
         self.table_ = modes_table(model, measured, best.theta)
-        names = self.model.parameter_names
         findings = [*measured.findings, *false_matches(model, measured, best.theta)]
-        if prior is None:
+        if self.prior is None:
             findings += undetermined(names, measured.n_residuals, self.covariance_)
         if best.success:
             findings += doubtful_optimum(names, best.theta, bounds, measured, self.table_)
