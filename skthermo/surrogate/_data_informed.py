@@ -292,7 +292,7 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         weights = row_weights(sample_weight, X)
         if weights is not None:
             weights = weights / weights[weights > 0].mean()  # penalties do not depend on their scale
-        usable = frame_like(F, np.where(far, np.nan, as_floats(F)), column_names(F, "f"))  # outliers train nothing
+        usable = frame_like(F, np.where(far, np.nan, as_floats(F)))  # outliers train nothing
         self.mode_names_, self.parameter_names_ = column_names(F, "f"), list(self.model.parameter_names)
         self._clone_parts(has_shapes=shapes is not None)
         inverse, mapper = self.inverse_, self.mapper_
@@ -325,9 +325,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             index = filled.index if isinstance(filled, pd.DataFrame) else None
             targets = pd.DataFrame(found.theta, index, self.parameter_names_, copy=False)  # with the names of outputs
             fit_checked(mapper, filled, targets, weights)
-        with collected() as of_model, stages.stage("discrepancy and report"):
+        with collected(), stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
-            findings += [*found.findings, *of_mapper, *of_model]
+            findings += [*found.findings, *of_mapper]
             few_outliers = {"doubtful-values"} if far.mean() <= 0.05 else ()
             of_records = [
                 *gate.warnings(exclude=few_outliers),
@@ -489,9 +489,9 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         self, X: ArrayLike, confidence: float | None = None, *, has_margins: bool = True
     ) -> tuple[Array, Array]:
         """Frequencies with relative margins of a confidence, by default of a standard deviation; or 0 without."""
-        margins, thermal = np.zeros(1), self.thermal_
+        margins = np.zeros(1)
         with collected() as findings:
-            weather = self.weather(X)
+            weather, thermal = self.weather(X), self.thermal_
             frequencies = thermal.simulated(weather)
             if has_margins:
                 residuals, scatter, known = self.recorder_.residuals, 1.0, 1.0

@@ -138,6 +138,8 @@ def doubts_of_order(model: FEModel, F: Table) -> list[RecordsWarning]:
     2 percent from that of its column; a factor common to all modes does not count.
     """
     nominal = as_floats(model.frequencies(np.ones((1, len(model.parameter_names)))))[0]
+    if len(nominal) < 2:
+        return []
     table, names = match_modes(model, as_floats(F)), column_names(F, "f")
     order, logs = table["mode"].to_numpy(), np.log(table["measured"].to_numpy())
     offsets = 100 * (logs - np.log([nominal, table["model"]]))

@@ -164,7 +164,7 @@ PROGRAM = CallableModel(TRUSS.frequencies, TRUSS.parameter_names, 6)
     ("model", "options", "X", "message"),
     [
         (TRUSS, {"dofs": [1, 99]}, X, "dofs holds 99; expected 0 to 22"),
-        (TRUSS, {"shape_noise": [0.01, 0.0]}, X, r"\[0.01 0.  \]; expected standard deviations between"),
+        (TRUSS, {"shape_noise": [0.01, 0.0]}, X, r"\[0.01 0.  \]; expected a relative standard deviation"),
         (PROGRAM, {}, X, "has no method 'modes'; expected a model that"),
         (TRUSS, {}, MEASURED[0], r"X has 6 columns; expected the 6 modes of .* at 4 sensors, 30 columns"),
         (BEAM, {"dofs": [0]}, np.ones((3, 4)), r"mode 1 does not move the degrees of freedom \[0\]"),
