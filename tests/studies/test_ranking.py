@@ -176,15 +176,15 @@ def test_in_sentences(study, table):
 
 
 @pytest.mark.one_case
-@pytest.mark.parametrize("options", [{"n_repeats": 1}, {"n_repeats": 3, "noise": 0.0}], ids=["one repeat", "no noise"])
-def test_without_other_noise_nothing_is_significant(fem, options):
+@pytest.mark.parametrize("options", [{"n_repeats": 2}, {"n_repeats": 3, "noise": 0.0}], ids=["two repeats", "no noise"])
+def test_without_other_noise_in_three_repeats_nothing_is_significant(fem, options):
     some = {"raw": MahalanobisDetector(), "lines": compensated()}
     study = ran(fem, [{}, {"top": 0.2}], some, **options)
     for by in ("pod", "pod_at_equal_pfa"):
         table = study.ranking(by=by)
         assert table[["pod_deficit_ci_low", "pod_deficit_ci_high"]].isna().all(axis=None)
         assert not table["significantly_worse"].any()
-    assert "does not show which detectors" in study.summary()
+    assert "not show which detectors" in study.summary()
 
 
 def test_measured_records_rank_by_what_was_found(fem):

@@ -300,9 +300,12 @@ def _by_family(families: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _margin(best: Array, other: Array, confidence: float, n_comparisons: int) -> float:
-    """Half the width of the interval of a mean difference of pseudo-values, one of several that hold together."""
+    """Half the width of the interval of a mean difference of pseudo-values, one of several that hold together.
+
+    Two differences may lie near each other by chance, so that an interval of theirs says next to nothing.
+    """
     n = len(best)
-    if n < 2 or len(other) != n:
+    if n < 3 or len(other) != n:
         return float("nan")
     tail = (1 - confidence) / 2 / max(n_comparisons, 1)
     return float(t.isf(tail, n - 1) * (best - other).std(ddof=1) / np.sqrt(n))
@@ -324,7 +327,7 @@ def in_words(table: pd.DataFrame, limit: float, confidence: float) -> str:
         lines = [f"All false-alarm rates exceed the limit of {limit:.1%}. With the lowest one, {lines[0]}"]
     behind, both = quiet.drop(index=best.name, errors="ignore"), "({pod:.1%} at {false_alarms:.1%})"
     if len(behind) and behind["pod_deficit_ci_low"].isna().all():
-        lines.append("One repeat does not show which detectors are significantly worse; expected two or more.")
+        lines.append("Fewer than three repeats do not show which detectors are significantly worse; expected three or more.")
     elif len(behind):
         is_worse = behind["significantly_worse"]
         lines += named(f"Not significantly worse at {confidence:.0%} confidence", behind[~is_worse], both)
