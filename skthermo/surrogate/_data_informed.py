@@ -16,7 +16,7 @@ from scipy.stats import norm
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer
-from sklearn.utils import Bunch
+from sklearn.utils import Bunch, get_tags
 
 from skthermo._core.arrays import (
     Array,
@@ -324,7 +324,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         with collected() as of_mapper, stages.stage("temperature mapper", mapper):
             index = filled.index if isinstance(filled, pd.DataFrame) else None
             targets = pd.DataFrame(found.theta, index, self.parameter_names_, copy=False)  # with the names of outputs
-            fit_checked(mapper, filled, targets, weights)
+            try:
+                fit_checked(mapper, filled, targets, weights)
+            except ValueError as error:
+                if get_tags(last_step(mapper)).target_tags.multi_output:
+                    raise
+                wanted = f"expected one of several, such as TemperatureMapper({last_step(mapper)!r:.100})"
+                raise ValueError(f"the mapper may be a regressor of a single output ({error}); {wanted}") from error
         with collected(), stages.stage("discrepancy and report"):
             self._hold(self._recorder(T, F, filled, usable, found.theta, weights))
             findings += [*found.findings, *of_mapper]
@@ -724,7 +730,13 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
     ) -> RecordSimulator:
         """What predicts and draws records, once the mapper has learned theta."""
         inputs = inputs_of_last_step(self.mapper_, filled)
-        learned, posterior = possible(self.mapper_.predict(filled))[0], last_step(self.inverse_)
+        predicted, posterior = as_columns(self.mapper_.predict(filled)), last_step(self.inverse_)
+        if predicted.shape != theta.shape or not np.isfinite(predicted).all(axis=1).any():
+            raise ValueError(
+                f"the mapper predicts {np.isfinite(predicted).all(axis=1).sum()} finite rows in a table of the shape "
+                f"{predicted.shape}; expected parameters of the shape {theta.shape}: has it diverged?"
+            )
+        learned = possible(predicted)[0]
         is_shared = isinstance(posterior, PosteriorInverse) and posterior.model is self.model
         simulator = Simulator.around(self.model, learned, self.reduce, posterior.simulator_ if is_shared else None)
         modelled = as_floats(self.aligner_.inverse_transform(simulator.frequencies(learned, self.n_jobs)))

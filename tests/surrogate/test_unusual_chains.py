@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import KFold
 
@@ -140,3 +141,23 @@ def test_compensators_and_displays_take_it():
     assert (counted < 1 + 1e-9).all()  # less where the chain is less certain than usual
     assert (counted > 1 - 1e-9).mean() > 0.5
     PredictionDisplay.from_estimator(of_vector(), WEATHER, FIRST, confidence=0.9)
+
+
+class Diverged(RegressorMixin, BaseEstimator):
+    """A regressor whose training has failed without an error."""
+
+    def fit(self, X, y):
+        self.n_outputs_ = np.shape(y)[1]
+        return self
+
+    def predict(self, X):
+        return np.full((len(X), self.n_outputs_), np.nan)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning", "ignore:.*uncalibrated-model")
+def test_a_mapper_that_cannot_predict_the_parameters_is_refused():
+    for mapper, match in ((Diverged(), "0 finite rows"), (HistGradientBoostingRegressor(), "TemperatureMapper")):
+        with pytest.raises(ValueError, match=match):
+            DataInformedFEM(TRUSS, mapper=mapper, random_state=0).fit(T, F)
+    trees = TemperatureMapper(HistGradientBoostingRegressor(max_iter=5))
+    assert np.isfinite(DataInformedFEM(TRUSS, mapper=trees, random_state=0).fit(T, F).predict(T)).all(axis=None)

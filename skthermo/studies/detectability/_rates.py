@@ -327,7 +327,7 @@ def in_words(table: pd.DataFrame, limit: float, confidence: float) -> str:
         lines = [f"All false-alarm rates exceed the limit of {limit:.1%}. With the lowest one, {lines[0]}"]
     behind, both = quiet.drop(index=best.name, errors="ignore"), "({pod:.1%} at {false_alarms:.1%})"
     if len(behind) and behind["pod_deficit_ci_low"].isna().all():
-        lines.append("Fewer than three repeats do not show which detectors are significantly worse; expected three or more.")
+        lines.append("Fewer than three repeats do not show which detectors are significantly worse; expected more.")
     elif len(behind):
         is_worse = behind["significantly_worse"]
         lines += named(f"Not significantly worse at {confidence:.0%} confidence", behind[~is_worse], both)
