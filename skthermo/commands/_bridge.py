@@ -29,7 +29,14 @@ from skthermo.monitoring import Monitor, MonitorStatus, Retraining, load_monitor
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, CsvFormat, in_zone, look_at, read_file, text_of
 from skthermo.preprocessing.loggers.stamps import of_the_right_clock
 from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
-from skthermo.reporting.answers import acknowledgement, event_sentences, identified_in, shifts_of
+from skthermo.reporting.answers import (
+    acknowledgement,
+    event_sentences,
+    identified_in,
+    newest_since,
+    opened_since,
+    shifts_of,
+)
 
 HEALTHY, ALARM, NOT_EVALUATED, FAILED = range(4)
 CODES = {
@@ -163,10 +170,10 @@ class Bridge:
 
     def identify_open(self, monitor: Monitor) -> None:
         """Find what explains an open event by the monitor's model; an error hides no alarm."""
-        events = [one["since"] for one in monitor.status(self.options.now).events if one["kind"] in ("damage", "drift")]
-        if events and monitor.fem is not None:
+        since = opened_since(monitor)
+        if since is not None and monitor.fem is not None:
             try:
-                self.identified = identified_in(monitor, min(events))
+                self.identified = identified_in(monitor, since)
             except ValueError as error:
                 self.lines.append(f"what has changed could not be identified: {error}")
 
@@ -388,10 +395,9 @@ class Bridge:
         monitor = self.load()
         if monitor.fem is None:
             raise ValueError(f"{self.file} names no FE model; expected one in [fem], and a fit with it")
-        opened = [one["since"] for one in monitor.status(self.options.now).events if one["kind"] in ("damage", "drift")]
-        since = self.options.since or min(opened, default=monitor.last_ - pd.Timedelta("30D"))
+        since = self.options.since or opened_since(monitor) or monitor.last_ - pd.Timedelta("30D")
         self.identified = identified_in(monitor, since)
-        moved = shifts_of(monitor, since)
+        moved = shifts_of(monitor, newest_since(monitor.corrected_, since).index)
         self.lines += [f"{name}: {100 * shift:+.2f} % against the healthy structure" for name, shift in moved.items()]
         self.lines += [*self.identified.answer(), *self.identified.limits()]
 

@@ -15,7 +15,8 @@ from skthermo._core.warnings import collected
 LONGEST = pd.Timedelta("30D")  # records of the state as it is now
 
 
-def _newest(table: pd.DataFrame, since: Any) -> pd.DataFrame:
+def newest_since(table: pd.DataFrame, since: Any) -> pd.DataFrame:
+    """Rows since a time, of the last 30 days at most."""
     return table[table.index >= max(pd.Timestamp(since), table.index[-1] - LONGEST)]
 
 
@@ -27,29 +28,46 @@ def _measured(monitor: Any) -> pd.DataFrame:
     return records.where(seen.notna())
 
 
-def shifts_of(monitor: Any, since: Any) -> pd.Series:
-    """How far each response is from that of the healthy structure in the same weather, in the median since a time.
+def shifts_of(monitor: Any, stamps: pd.DatetimeIndex) -> pd.Series:
+    """How far each response is from that of the healthy structure in the same weather, in the median of some records.
 
-    Of the last 30 days at most, those that stand out most from their scatter first; relative, or in the unit of a
-    response that may be zero; empty for a detector that has no residuals.
+    Relative, or in the unit of a response that may be zero; empty for a detector that has no residuals.
     """
-    if not len(monitor.corrected_) or not hasattr(monitor.detector_, "residuals"):
+    if not len(stamps) or not hasattr(monitor.detector_, "residuals"):
         return pd.Series(dtype=float)
     alone = getattr(monitor.detector_, "compensator_", None)  # residuals of records, not of a window
     residuals = monitor.detector_.residuals if alone is None else alone.transform
     records = _measured(monitor)
-    seen_from = max(pd.Timestamp(since), records.index[-1] - LONGEST) - 2 * LONGEST  # windows reach into these records
+    seen_from = stamps[0] - 2 * LONGEST  # windows reach into these records
     with collected(drop_others=True):  # each record has its reason
-        rest = _newest(residuals(records[records.index >= seen_from]), since)
-    middle, scatter = rest.median(), rest.std().replace(0.0, np.finfo(float).tiny)
-    return middle[(middle / scatter).abs().sort_values(ascending=False, kind="stable").index]
+        rest = residuals(records[records.index >= seen_from])
+    return rest[rest.index.isin(stamps)].median()
+
+
+def event_shifts(monitor: Any, event: Mapping[str, Any]) -> pd.Series:
+    """How far each response has moved by the records that made an open event, as `shifts_of` has it.
+
+    A drift is the mean of 30 days, most of which are before its first record; of an alarm, the records above the
+    threshold count, of the 30 days up to the last of them.
+    """
+    if event["kind"] == "drift":
+        return monitor.means_[monitor.means_.index > monitor.last_ - LONGEST].mean()
+    seen = monitor.evaluations_.loc[event["since"] :]
+    is_own = (seen["index"] > seen["threshold"]) & seen["event"].isin([0, event["event"]])
+    return shifts_of(monitor, newest_since(seen[is_own], event["since"]).index if is_own.any() else seen.index[:0])
+
+
+def opened_since(monitor: Any) -> pd.Timestamp | None:
+    """The first record of what is open, damage or drift; that of a drift is of 30 days before it shows."""
+    opened = [one for one in monitor.status().events if one["kind"] in ("damage", "drift")]
+    return min((one["since"] - LONGEST * (one["kind"] == "drift") for one in opened), default=None)
 
 
 def identified_in(monitor: Any, since: Any) -> Any:
     """What explains the newest records since a time by the monitor's model, of the last 30 days at most."""
     from skthermo.studies import identify_damage  # jobs without an alarm need no studies
 
-    records, targets = _newest(_measured(monitor), since), monitor.targets_
+    records, targets = newest_since(_measured(monitor), since), monitor.targets_
     with collected(drop_others=True):
         return identify_damage(monitor.fem, records.drop(columns=targets), records[targets], random_state=0)
 
@@ -78,8 +96,8 @@ def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = No
         of = f" of {listed([bare(name) for name in event['modes']])}" if event["modes"] else ""
         yield f"{begun}: values{of} cannot be those of the structure as it was. A sensor or the structure has changed."
         return
-    shifts = shifts_of(monitor, since)
-    moved = change_text(shifts, list(shifts.index[:3]), monitor.units_, monitor.smallest_changes_.is_relative)
+    shifts = event_shifts(monitor, event).rename(str)
+    moved = change_text(shifts, event["modes"], monitor.units_, monitor.smallest_changes_.is_relative)
     named = f"; most changed: {listed(event['modes'])}" if event["modes"] else ""
     yield f"{begun}: {moved} than in the healthy structure in the same weather." if moved else f"{begun}{named}."
     if identified is not None:

@@ -219,16 +219,36 @@ def test_a_slow_change_and_a_known_damage_have_states_of_their_own():
     assert "(scour)" in page.text
 
 
-def test_how_far_modes_fell_is_said_in_percent_without_units_of_columns():
-    stamps = pd.date_range("2025-05-01", "2025-06-29", freq="1D")
-    monitor = FakeMonitor(events=[event_row("2025-06-10", None, modes="f1 [Hz], f2")])
-    rest = pd.DataFrame({"f1 [Hz]": -0.021, "f2": 0.004}, stamps)
-    rest[:"2025-06-09"] = 0.0
-    monitor.corrected_ = monitor.records_ = rest
+def monitor_of_shifts(event, rest):
+    """A monitor with an open event, of whose records these are the residuals; above 1 %, f1 is in alarm."""
+    monitor = FakeMonitor(events=[event])
+    monitor.corrected_ = monitor.records_ = monitor.means_ = rest
     monitor.features_ = monitor.targets_ = list(rest)
     monitor.detector_ = SimpleNamespace(residuals=lambda records: rest.loc[records.index])
+    high = rest.index[rest.iloc[:, 0].abs() > 0.01]
+    monitor.evaluations_.loc[high, "index"] = 4.0
+    return monitor
+
+
+def test_how_far_modes_fell_is_said_in_percent_without_units_of_columns():
+    stamps = pd.date_range("2025-05-01", "2025-06-29", freq="1D")
+    rest = pd.DataFrame({"f1 [Hz]": -0.021, "f2": 0.004, "f3": -0.03}, stamps)
+    rest[:"2025-06-09"] = 0.0
+    monitor = monitor_of_shifts(event_row("2025-06-10", None, modes="f1 [Hz], f2"), rest)
     text = f"f1 is 2.1{SPACE}% lower and f2 0.40{SPACE}% higher than in the healthy structure in the same weather."
     assert text in today_of(monitor).text
+
+
+def test_a_change_is_of_the_records_that_made_its_event():
+    stamps = pd.date_range("2025-05-01", "2025-06-29", freq="1D")
+    in_frost = np.arange(len(stamps)) % 3 == 0
+    rest = pd.DataFrame({"f1": np.where(in_frost, -0.02, 0.001), "f2": 0.0}, stamps)
+    damage = monitor_of_shifts(event_row("2025-05-01", None, modes="f1"), rest)
+    assert f"f1 is 2.0{SPACE}% lower than" in today_of(damage).text
+    rest = pd.DataFrame({"f1": -0.003, "f2": 0.0}, stamps)
+    rest.iloc[-1] = 0.009  # the day on which the mean of 30 days shows it
+    drift = monitor_of_shifts(event_row("2025-06-29", None, kind="drift", modes="f1"), rest)
+    assert f"f1 is 0.26{SPACE}% lower than" in today_of(drift).text
 
 
 def test_the_smallest_change_that_would_be_seen_is_said():
