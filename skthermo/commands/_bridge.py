@@ -56,7 +56,8 @@ class Bridge:
     """
 
     def __init__(self, file: Path, options: argparse.Namespace):
-        self.file, self.options, self.name = file, options, file.stem
+        self.file, self.options = file, options
+        self.name = file.resolve().parent.name if file.suffix == ".toml" else file.stem  # until settings say another
         self.state: str | None = None
         self.code = HEALTHY
         self.status_: MonitorStatus | None = None

@@ -30,6 +30,12 @@ from skthermo.surrogate import TemperatureMapper
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
 REGRESSION = "sklearn.linear_model.Ridge"
+FORM = {
+    "separator": "sign between values", "decimal": "decimal sign", "encoding": "encoding",
+    "names_line": "line with the names", "values_line": "line of the first record",
+    "stamp_columns": "columns with the stamp", "stamps": "form of stamps", "time_zone": "time zone",
+}  # fmt: skip
+"""What the parts of a form are called."""
 
 
 class Proposal:
@@ -173,8 +179,23 @@ def form_of_all(looks: Sequence[FileLook]) -> CsvFormat:
     for look in others:
         own = replace(look.form, missing=missing)
         if own != form and not _fits(form, look):
-            raise ValueError(f"{first.file} and {look.file} have different forms: {form} and {own}; expected the same")
+            pairs = ((name, getattr(form, key), getattr(own, key)) for key, name in FORM.items())
+            differing = "; ".join(
+                f"{name}: {_words(one)} in {first.file.name}, {_words(other)} in {look.file.name}"
+                for name, one, other in pairs
+                if one != other
+            )
+            raise ValueError(
+                f"{first.file} and {look.file} are written differently ({differing}), and [csv] has one form for all "
+                "files of a bridge. Save both alike, or join them in one file"
+            )
     return form
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return " and ".join(value) or "the first"
+    return "as usual" if value is None else str(value)
 
 
 def _fits(form: CsvFormat, look: FileLook) -> bool:

@@ -34,6 +34,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -45,7 +46,6 @@ from skthermo._core.files import ReadWhenAsked, write_when_complete
 from skthermo._core.text import capital, plain
 from skthermo._core.warnings import collected
 from skthermo.commands._bridge import ALARM, CODES, FAILED, HEALTHY, NOT_EVALUATED, Bridge, sentence
-from skthermo.commands._settings import HOW_TO_BEGIN
 from skthermo.monitoring import Fleet
 
 MONITORS = (".toml", ".skops", ".joblib")  # endings of files that stand for a monitor
@@ -225,12 +225,10 @@ def _parser() -> Parser:
 
 def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     """Do the work of a command on each bridge; the exit code."""
-    given = [file / "monitor.toml" if (file / "monitor.toml").is_file() else file for file in options.files]
+    folders = [file for file in options.files if file.is_dir() or not (file.suffix or file.exists())]
+    given = [file / "monitor.toml" if file in folders else file for file in options.files]
     files = [file for file in given if file.suffix in MONITORS]
     options.records = [file for file in given if file.suffix not in MONITORS]
-    if empty := [file for file in given if file.is_dir() or not (file.suffix or file.exists())]:
-        what = "the folder {} has no monitor.toml" if empty[0].is_dir() else "there is no folder {}"
-        raise FileNotFoundError(f"{what.format(repr(str(empty[0])))}; expected: {HOW_TO_BEGIN.format(empty[0])}")
     is_update = options.name == "update"
     if not files or (options.records and (not is_update or len(files) > 1)):
         raise ValueError(
@@ -249,14 +247,15 @@ def _on_bridges(options: argparse.Namespace, facts: dict[str, Any]) -> int:
     facts["exit_code"] = next(code for code in (ALARM, FAILED, NOT_EVALUATED, HEALTHY) if code in codes)
     if len(bridges) > 1 and options.name in ("update", "status", "report"):
         _as_fleet(bridges, options, facts)
-    metrics: dict[Path, list[dict[str, Any]]] = {}
-    for bridge, one in zip(bridges, facts["bridges"], strict=True):
+    metrics: dict[Path, list[Bridge]] = {}
+    for bridge in bridges:
         for file in {options.metrics, bridge.metrics_file} - {None}:
-            metrics.setdefault(file, []).append(one)
-    for file, of_bridges in metrics.items():
+            metrics.setdefault(file, []).append(bridge)
+    for file, shown in metrics.items():
         try:
-            write_metrics(file, of_bridges, pd.Timestamp.now("UTC"))
-        except OSError as error:
+            _refuse_one_name(shown)
+            write_metrics(file, [bridge.facts() for bridge in shown], pd.Timestamp.now("UTC"))
+        except (OSError, ValueError) as error:
             _failed(error, f"{file} was not written: ", facts)
     return facts["exit_code"]
 
@@ -272,15 +271,22 @@ def _say(bridge: Bridge, options: argparse.Namespace, number: int) -> None:
     logger.info("%s %s: state %s, exit code %s", options.name, bridge.name, bridge.state, bridge.code)
 
 
+def _refuse_one_name(bridges: Sequence[Bridge]) -> None:
+    """Raise an error where two bridges have the same name, as a folder and its copy have."""
+    for one, other in combinations(bridges, 2):
+        if one.name == other.name:
+            raise ValueError(
+                f"{one.call} and {other.call} are both called {one.name!r}; expected another name for one of them, "
+                f"as name under [files] in {other.file}"
+            )
+
+
 def _as_fleet(bridges: Sequence[Bridge], options: argparse.Namespace, facts: dict[str, Any]) -> None:
     """Say which alarms are significant among those of several bridges, and write their page."""
-    working = [bridge for bridge in bridges if bridge.state is not None]
-    loaded = {bridge.name: bridge.load for bridge in working}
-    if len(loaded) < len(working):
-        names = [bridge.name for bridge in working]
-        raise ValueError(f"bridges are called {names}; expected another name for each, as in [files]")
+    loaded = {bridge.name: bridge.load for bridge in bridges if bridge.state is not None}
     errors = {one.name: one.error or ValueError("; ".join(one.errors)) for one in bridges if one.errors}
     try:
+        _refuse_one_name(bridges)
         fleet = Fleet.of_monitors(ReadWhenAsked(loaded), errors)
         facts["fleet"] = {"summary": fleet.summary(), "page": None, "discoveries": []}
         if len(fleet.monitors):

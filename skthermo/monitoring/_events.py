@@ -193,7 +193,7 @@ class Events:
     another event. No event goes on beyond a new baseline. Values of sensors that have failed have events of their own.
 
     ``table`` has a row for each event, counted from 1; ``sign`` is its first sign. ``answered`` is the table with what
-    the owner has said of each. ``runs`` are the runs of each event.
+    the owner has said of each. ``runs`` are the runs of each event; ``reached`` says by how many records.
     """
 
     def __init__(
@@ -206,6 +206,8 @@ class Events:
         within: pd.Timedelta = 28 * DAY,
     ):
         self.decisions, self.times, self.said = decisions, decisions.index.as_unit("ns").asi8, said
+        number, among = rule_of(persistence)
+        self.reached = f"reached by {number} of {among} records" if among > 1 else "of a record"
         self.starts, self.within = np.asarray(starts, dtype=np.int64), within
         self.parts = Parts(decisions, weeks)
         causes: list[list[Run]] = []

@@ -279,7 +279,8 @@ def summary_lines(monitor: Any, most: int = 5) -> Iterator[str]:
         said = f"acknowledged as {harmless}" if event["acknowledged"] else "not acknowledged"
         times = f"{event['n_times']} times" if event["n_times"] > 1 else ""
         kind, peak = event["kind"], event["peak"]
-        level = f"mean of 30 days up to {peak:.3g} times its limit" if kind == "drift" else f"index up to {peak:.4g}"
+        reached = f"index {peak:.4g} {monitor.known_events_.reached}"
+        level = f"mean of 30 days up to {peak:.3g} times its limit" if kind == "drift" else reached
         highest = "" if kind == "fault" else f"{level} on {event['peak_time']}"
         parts = [times, highest, event["modes"], event["groups"], said]
         note = f" ({event['note']})" if event["note"] else ""

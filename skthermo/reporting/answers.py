@@ -59,8 +59,9 @@ def event_shifts(monitor: Any, event: Mapping[str, Any]) -> pd.Series:
 
 def opened_since(monitor: Any) -> pd.Timestamp | None:
     """The first record of what is open, damage or drift; that of a drift is of 30 days before it shows."""
-    opened = [one for one in monitor.status().events if one["kind"] in ("damage", "drift")]
-    return min((one["since"] - LONGEST * (one["kind"] == "drift") for one in opened), default=None)
+    before = {"damage": pd.Timedelta(0), "drift": LONGEST}
+    opened = [one for one in monitor.status().events if one["kind"] in before]
+    return min((one["since"] - before[one["kind"]] for one in opened), default=None)
 
 
 def identified_in(monitor: Any, since: Any) -> Any:

@@ -273,8 +273,11 @@ def test_several_bridges_are_a_fleet(bridge, records, tmp_path):
     assert [len(one["errors"]) for one in valid(failed.json)["bridges"]] == [0, 1, 1]
     assert 'skthermo_up{bridge="second"} 0' in metrics.read_text()
     assert run("status", *files[1:], "--now", now).code == FAILED
-    run_twice = run("status", files[0], files[0], "--now", now)
-    assert (run_twice.code, "another name" in run_twice.err) == (FAILED, True)
+    shutil.rmtree(second)
+    gone = run("status", bridge, second, third, "--now", now, "--json", "--metrics", metrics, "--report", page)
+    assert {one["name"]: len(one["errors"]) for one in gone.json["bridges"]} == {"bridge": 0, "second": 1, "third": 1}
+    assert (gone.code, gone.json["errors"], "second" in gone.json["fleet"]["summary"]) == (ALARM, [], True)
+    assert 'skthermo_up{bridge="second"} 0' in metrics.read_text()
 
 
 @pytest.mark.nightly

@@ -147,6 +147,15 @@ def test_a_damaged_line_of_transitions_is_named_and_what_a_killed_run_has_left_i
     assert [file.exists() for file in left] == [False, True]  # another process may be at work on a new one
 
 
+def test_bridges_of_one_name_hide_no_alarm(after, records, tmp_path):
+    copied, metrics = shutil.copytree(after, tmp_path / after.name), tmp_path / "fleet.prom"
+    done = run("status", after, copied, "--now", str(records.index[LAST - 1]), "--metrics", metrics, "--json")
+    assert (done.code, metrics.exists(), done.json["fleet"]) == (ALARM, False, None)
+    assert [one["state"] for one in done.json["bridges"]] == ["alarm", "alarm"]
+    texts = f"{after} and {copied}", str(copied / "monitor.toml")
+    assert [all(text in error for text in texts) for error in done.json["errors"]] == [True, True]
+
+
 @pytest.mark.nightly
 def test_two_at_once(bridge, before, after, records):
     fcntl = pytest.importorskip("fcntl")

@@ -171,3 +171,19 @@ def test_outages_of_days_are_named(tmp_path):
     lines = [line for line in run("check", tmp_path / "log.csv").out.splitlines() if line.startswith("outages")]
     assert len(lines) == 1
     assert f"{hours[399]} to {hours[496]}" in lines[0]
+
+
+def test_two_forms_in_one_folder_are_an_error_in_words(one_detector, tmp_path):
+    stamps = pd.date_range("2026-01-01", periods=50, freq="1h")
+    T = pd.DataFrame({"Date": stamps.strftime("%Y-%m-%d"), "Time": stamps.strftime("%H:%M"), "air [°C]": 5.0})
+    F = pd.DataFrame({"time": stamps, "f1 [Hz]": 4.0})
+    T["air [°C]"] += np.arange(50) % 7 / 10
+    F["f1 [Hz]"] += np.arange(50) % 5 / 100
+    files = tmp_path / "T.csv", tmp_path / "F.csv"
+    T.to_csv(files[0], index=False)
+    F.to_csv(files[1], index=False)
+    done = run("init", *files, "--into", tmp_path / "b")
+    assert done.code == 3
+    assert all(text in done.err for text in (*map(str, files), "the stamp: Date and Time in T.csv, the first in F.csv"))
+    assert "sign between values" not in done.err  # which is the same in both
+    assert not set("(){}[]='").intersection(done.err.split("differently (")[1].split("), and")[0])

@@ -121,7 +121,9 @@ class FakeMonitor(Monitor):
         states = {"damage": "alarm", "drift": "drift", "watch": "watch"}
         standing = next((state for kind, state in states.items() if kind in kinds), "")
         self.known_events_ = SimpleNamespace(
-            standing=lambda: ([standing], [0]), set_aside=lambda number: ([("fault" in kinds)],)
+            standing=lambda: ([standing], [0]),
+            set_aside=lambda number: ([("fault" in kinds)],),
+            reached=real.known_events_.reached,
         )
 
     def get_params(self, deep=True):

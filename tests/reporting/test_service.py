@@ -100,6 +100,9 @@ def test_it_says_what_the_real_monitor_says(page, real):
     assert "monitor.acknowledge(" in page.text
     assert f"Of 66{SPACE}records in service, 6 (9.1{SPACE}%) were not evaluated" in page.text
     assert f"There was no record on 4 of 70{SPACE}days." in page.text
+    indices = monitor.evaluations_.loc[:, "index"].nlargest(3)
+    assert event["peak"] == indices.iloc[2] < indices.iloc[0]  # the level of an event is not the highest index
+    assert "Index reached by 3 of 5 records" in page.text
     numbers = [head for head in page.heads if head.isdigit()]
     assert numbers == [str(number) for number in monitor.events_.index[::-1]]
 
