@@ -201,7 +201,7 @@ class Bridge:
                     self.lines.append(f"no acknowledgement of the former monitor kept: {error}")
                 shutil.copy2(file, file.with_name(f"{file.stem}.replaced-{datetime.now():%Y%m%d-%H%M%S}{file.suffix}"))
             monitor.save(file)
-            fitted = datetime.now(UTC).isoformat(timespec="seconds")
+            fitted = datetime.now(UTC).isoformat(timespec="milliseconds")
             self.taken = Taken(self.taken.file, layouts, {}, fitted, settings.of_a_fit)
             self.taken.write()
         settings.path(settings.records.folder).mkdir(exist_ok=True)
@@ -247,6 +247,19 @@ class Bridge:
         self.taken.state = self.state
         self.taken.write()
 
+    def _layouts(self) -> list[list[str]]:
+        """Columns of each file of the baseline; they are read anew where what the fit has left of them is lost."""
+        try:
+            records, form = self.settings.records, self.settings.csv
+            files = [] if self.taken.layouts else map(self.settings.path, records.baseline)
+            self.taken.layouts += [list(read_columns(file, form, records)) for file in files]
+        except (OSError, ValueError) as error:
+            raise ValueError(
+                f"{self.taken.file} is lost, and columns of the baseline's files cannot be read: {sentence(error)}; "
+                f"expected one of them from a backup, or skthermo fit {self.file} --replace"
+            ) from error
+        return self.taken.layouts
+
     def _new_files(self, monitor: Monitor) -> list[NewFile]:
         """Files with rows to take in: those that are named, or those of the folder, and of the baseline's files after
         its end, that were not taken in yet."""
@@ -268,13 +281,17 @@ class Bridge:
                         raise  # [csv] was found in text files, and not in workbooks, which say nothing of texts
                     own = look_at(file, form.time_zone, wanted=settings.records.columns).form
                     table = read_columns(file, replace(own, missing=form.missing), settings.records, **options)
-                check_layout(table, file, settings.records, taken.layouts)
+                if set(table) != set(settings.records.columns):
+                    check_layout(table, file, settings.records, self._layouts())
             table = in_zone(table, monitor.last_.tz, file).rename_axis(monitor.baseline_.index.name)
             return table if after is None else table[table.index > after]
 
         sources: dict[Path, pd.Timestamp | None] = dict.fromkeys(named)
         if not named:
-            for file in files_in(settings.path(settings.records.folder)):
+            folder = settings.path(settings.records.folder)
+            if not folder.is_dir():
+                self.failed(FileNotFoundError(f"there is no folder {folder}; expected it, with the new records"))
+            for file in files_in(folder):
                 why = taken.why_no_records(file, settings.records.columns)
                 if why is None:
                     sources[file] = None
@@ -466,28 +483,29 @@ def sentence(error: Exception) -> str:
 def append_lines(file: Path, entries: Sequence[Mapping[str, Any]], own: Mapping[str, str]) -> list[dict[str, Any]]:
     """Append those entries to a file of JSON lines that it does not have yet, and give them.
 
-    ``own`` are the values that lines of this monitor have. A line that a killed command has left unfinished is
-    removed; the caller holds the lock of the monitor.
+    ``own`` are the name of the bridge, which may be a new one, and the time of the fit, by which its lines are known;
+    where that is lost, it is the time in the last line. A line that a killed command has left unfinished is removed;
+    the caller holds the lock of the monitor.
     """
-    known = 0
+    lines: list[dict[str, Any]] = []
     if file.exists():
         content = file.read_bytes()
         whole = content[: content.rfind(b"\n") + 1]
         for number, text in enumerate(whole.splitlines(), start=1):
             try:
-                line = dict(json.loads(text))
+                lines.append(dict(json.loads(text)))
             except (ValueError, TypeError) as error:
                 raise ValueError(f"line {number} of {file} is damaged; expected JSON: mend or remove it") from error
-            if all(line.get(name) == value for name, value in own.items()):
-                known = max(known, line["id"])
         if len(whole) < len(content):
             os.truncate(file, len(whole))
-    new = [dict(own) | dict(entry) for entry in entries if entry["id"] > known]
+    fitted = own["fitted"] or (lines[-1].get("fitted", "") if lines else "")
+    known = max((line["id"] for line in lines if line.get("fitted") == fitted), default=0)
+    new = [dict(own) | {"fitted": fitted} | dict(entry) for entry in entries if entry["id"] > known]
     if new:
-        with open(file, "ab") as lines:
-            lines.write("".join(f"{json.dumps(plain(one), ensure_ascii=False)}\n" for one in new).encode())
-            lines.flush()
-            os.fsync(lines.fileno())
+        with open(file, "ab") as end:
+            end.write("".join(f"{json.dumps(plain(one), ensure_ascii=False)}\n" for one in new).encode())
+            end.flush()
+            os.fsync(end.fileno())
     return new
 
 

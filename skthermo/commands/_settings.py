@@ -289,7 +289,8 @@ def read_settings(file: Path) -> Settings:
         content = tomllib.loads(text)
     except FileNotFoundError as error:
         how = HOW_TO_BEGIN.format(file.parent)
-        raise FileNotFoundError(f"there is no file {str(file)!r}; expected settings, from: {how}") from error
+        missing = f"file {str(file)!r}" if file.parent.is_dir() else f"folder {str(file.parent)!r}"
+        raise FileNotFoundError(f"there is no {missing}; expected settings, from: {how}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f'{file} is no TOML: {error}; expected lines such as name = "value"') from error
     try:

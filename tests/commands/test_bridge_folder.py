@@ -101,6 +101,27 @@ def test_temperatures_wait_for_frequencies_of_the_same_time(bridge, records):
         pd.testing.assert_frame_equal(taken, records[FIRST : FIRST + end], check_freq=False)
 
 
+def test_files_with_a_part_of_the_columns_are_read_where_what_was_taken_is_lost(bridge, records):
+    assert run("update", bridge, "--now", write_day(records, bridge, FIRST)).code == HEALTHY
+    (bridge / "monitor.joblib.taken.json").unlink()
+    write_pair(records[FIRST + 1 : FIRST + 2], bridge / "new")
+    now, files = str(records.index[FIRST + 1]), shutil.copytree(bridge / "baseline", bridge / "kept")
+    shutil.rmtree(bridge / "baseline")
+    lost = run("update", bridge, "--now", now)
+    assert (lost.code, "taken.json is lost" in lost.err, "--replace" in lost.err) == (FAILED, True, True)
+    shutil.copytree(files, bridge / "baseline")
+    assert run("update", bridge, "--now", now).code == HEALTHY
+    assert load_monitor(bridge / "monitor.joblib").counts_["n_records"] == 2
+
+
+def test_a_folder_of_new_records_that_is_missing_is_named(bridge, records):
+    now = write_day(records, bridge, FIRST)
+    assert run("update", bridge, "--now", now).code == HEALTHY
+    shutil.rmtree(bridge / "new")
+    gone = run("update", bridge, "--now", now)
+    assert (gone.code, f"there is no folder {bridge / 'new'}" in gone.err) == (FAILED, True)
+
+
 def test_a_file_without_a_column_is_named_until_it_is_mended_and_keeps_no_other_out(bridge, records):
     now, night = write_day(records, bridge, FIRST, FIRST + 3), records[FIRST + 3 : FIRST + 5]
     night.filter(regex="^T").to_csv(bridge / "new" / "T.csv", index_label="time")

@@ -136,6 +136,19 @@ def test_a_line_of_transitions_that_was_cut_off_is_written_again(bridge, after, 
     assert_goes_on(bridge, records, after)
 
 
+def test_each_change_is_there_once_in_a_folder_that_is_renamed_or_has_lost_what_was_taken(after, records, tmp_path):
+    renamed, now = shutil.copytree(after, tmp_path / "renamed"), str(records.index[LAST - 1])
+    (event,) = [one for one in load_monitor(renamed / "monitor.joblib").status().events if one["kind"] == "damage"]
+    for _ in range(2):
+        n_before = len(transitions(renamed))
+        assert run("acknowledge", renamed, event["event"], "--damage", "--now", now).code == 0
+        assert [(one["bridge"], one["what"]) for one in transitions(renamed)[n_before:]] == [
+            ("renamed", "acknowledged")
+        ]
+        (renamed / "monitor.joblib.taken.json").unlink()
+        assert len({one["fitted"] for one in transitions(renamed)}) == 1
+
+
 def test_a_damaged_line_of_transitions_is_named_and_what_a_killed_run_has_left_is_removed(bridge, records):
     (bridge / "transitions.jsonl").write_text('{"bridge": "another", "id": 1}\nnonsense\n', encoding="utf-8")
     left = [bridge / f".metrics.prom.{name}.unfinished" for name in ("old", "new")]
