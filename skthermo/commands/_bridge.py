@@ -17,10 +17,13 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 import skthermo.reporting
 from skthermo._core.files import alone_with, write_when_complete
+from skthermo._core.frames import usual_step
 from skthermo._core.text import counted, plain
 from skthermo._core.warnings import collected, warn_each
 from skthermo.commands._settings import RecordSettings, Settings, read_settings
@@ -31,6 +34,7 @@ from skthermo.preprocessing.loggers.stamps import of_the_right_clock
 from skthermo.preprocessing.loggers.together import in_usual_units, joined, once
 from skthermo.reporting.answers import (
     acknowledgement,
+    counted_reasons,
     event_sentences,
     identified_in,
     newest_since,
@@ -326,9 +330,11 @@ class Bridge:
             tables = [file.rows for file in files]
             batch, waiting = joined(tables, columns) if has_settings else (pd.concat(tables), ())
             answers.append(monitor.update(batch, confirm=self.options.confirm))
-            handed.update({file.path: batch.index for file in files})
-            if len(waiting):
-                self.lines.append(f"not in all files yet, so that they wait: {len(waiting)} stamps")
+            between = _between(waiting, monitor.records_.index, usual_step(monitor.baseline_.index))
+            handed.update({file.path: batch.index.union(waiting[between]) for file in files})
+            notes = {"stamps not in all files yet, so that they wait": ~between}
+            notes["stamps left out, between records and not in all files"] = between
+            self.lines += [f"{note}: {rows.sum()}" for note, rows in notes.items() if rows.any()]
 
         if len(units) > 1:
             try:
@@ -352,8 +358,7 @@ class Bridge:
         n_ahead, new = counts["n_ahead"], evaluated[~evaluated["revised"].astype(bool)]
         states = new["state"].value_counts().reindex(list(CODES), fill_value=0).to_dict()
         is_unknown = new["state"] == "not evaluated"
-        reasons = new.loc[is_unknown, "reason"].value_counts().to_dict()
-        remarks = new.loc[~is_unknown & (new["reason"] != ""), "reason"].value_counts()
+        reasons, remarks = (counted_reasons(new.loc[rows, "reason"]) for rows in (is_unknown, ~is_unknown))
         always = ("healthy", "alarm", "not evaluated")
         shown = ", ".join(f"{number} {state}" for state, number in states.items() if number or state in always)
         others = ", ".join(f"{counts[name]} {text}" for name, text in COUNTS.items())
@@ -463,6 +468,15 @@ class Bridge:
                 self.failed(ValueError(f"the {said.kind} was refused, and the monitor is as it was before"))
             self.append_transitions(monitor)
             self._keep_state()
+
+
+def _between(stamps: pd.DatetimeIndex, known: pd.DatetimeIndex, step: pd.Timedelta) -> NDArray[np.bool_]:
+    """Which stamps are between two known records that follow each other as usual: no other file will have them."""
+    after = known.searchsorted(stamps)
+    is_inside = (after > 0) & (after < len(known))
+    ends = after[is_inside]
+    is_inside[is_inside] = known[ends] - known[ends - 1] <= 1.5 * step
+    return is_inside
 
 
 def _is_news(line: str, changed: Collection[str]) -> bool:

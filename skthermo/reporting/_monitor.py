@@ -15,7 +15,7 @@ from skthermo.fem import Structure
 from skthermo.monitoring import Monitor
 from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 from skthermo.reporting._page import Drawing, Row, draw, draw_structure, rows_of, settings_of
-from skthermo.reporting.answers import acknowledgement, event_sentences
+from skthermo.reporting.answers import acknowledgement, counted_reasons, event_sentences
 
 Time: TypeAlias = str | datetime | None
 
@@ -89,11 +89,10 @@ class Standing:
         """How many records were not evaluated and why, remarks on others, and how many days had no record."""
         is_unknown, reasons = self.evaluations["state"] == "not evaluated", self.evaluations["reason"]
         n_days = len(midnights_between(self.days.index[0], self.days.index[-1]))
-        remarks = reasons[~is_unknown & (reasons != "")]
         return {
             "number": int(self.monitor.counts_["n_not_evaluated"]),
-            "reasons": list(reasons[is_unknown].value_counts().items()),
-            "remarks": list(remarks.value_counts().items()),
+            "reasons": list(counted_reasons(reasons[is_unknown]).items()),
+            "remarks": list(counted_reasons(reasons[~is_unknown]).items()),
             "n_days": n_days,
             "silent": n_days - len(self.days),
         }

@@ -109,6 +109,12 @@ def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = No
         yield f"{loss} in {', '.join(event['groups'])} explains most of it."
 
 
+def counted_reasons(reasons: pd.Series) -> dict[str, int]:
+    """How many records have each reason, the most frequent first; all wrong values of a column are one reason."""
+    without_values = reasons.str.replace(r" is -?(\d|inf)[^,:;]*(?=[^;]*: taken as missing)", "", regex=True)
+    return without_values[reasons != ""].value_counts().to_dict()
+
+
 def acknowledgement(event: int, settings: str | None) -> str:
     """How to say what an event was: the command or, without settings, the call."""
     if settings is None:

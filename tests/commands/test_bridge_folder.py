@@ -9,6 +9,7 @@ from importlib.resources import files
 from itertools import pairwise
 
 import joblib
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -99,6 +100,27 @@ def test_temperatures_wait_for_frequencies_of_the_same_time(bridge, records):
         assert run("update", bridge, "--now", str(f.index[end - 1])).code == HEALTHY
         taken = load_monitor(bridge / "monitor.joblib").records_
         pd.testing.assert_frame_equal(taken, records[FIRST : FIRST + end], check_freq=False)
+
+
+def test_stamps_between_the_records_of_the_other_file_wait_for_nothing(bridge, records):
+    rows = records[FIRST : FIRST + 3]
+    twice = rows.filter(regex="^T").resample("12h").interpolate()
+    twice.to_csv(bridge / "new" / "T.csv", index_label="time")
+    rows.filter(regex="^f").to_csv(bridge / "new" / "F.csv", index_label="time")
+    now = str(rows.index[-1])
+    first, second = (run("update", bridge, "--now", now, "--verbose") for _ in range(2))
+    assert (first.code, "left out, between records and not in all files: 2" in first.out) == (HEALTHY, True)
+    assert load_monitor(bridge / "monitor.joblib").counts_["n_records"] == 3
+    assert not any(text in second.out for text in ("T.csv", "wait", "left out, between"))
+
+
+def test_wrong_values_of_a_column_are_one_counted_line(bridge, records):
+    wrong = records.copy()
+    wrong.iloc[FIRST : FIRST + 9, 0] = -200.0 - np.arange(9)
+    now = write_day(wrong, bridge, FIRST, FIRST + 9)
+    lines = run("update", bridge, "--now", now, "--verbose").out.splitlines()
+    counts = [int(line.rpartition(": ")[2]) for line in lines if line.startswith(("evaluated, ", "not evaluated, "))]
+    assert sum(counts) >= 9 > 4 > len(counts)
 
 
 def test_files_with_a_part_of_the_columns_are_read_where_what_was_taken_is_lost(bridge, records):
