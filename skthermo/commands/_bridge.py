@@ -39,6 +39,7 @@ from skthermo.reporting.answers import (
     identified_in,
     newest_since,
     opened_since,
+    regime_text,
     shifts_of,
 )
 
@@ -212,6 +213,8 @@ class Bridge:
         self.written.append(file)
         self.lines += [f"code that the settings name was run: {name}" for name in settings.code]
         self.lines.append(f"fitted to {len(baseline)} records, {baseline.index[0]} to {baseline.index[-1]}")
+        if regimes := regime_text(monitor):
+            self.lines.append(regimes)
         if len(records) > len(baseline):
             self.lines.append(f"later records of these files, for update: {len(records) - len(baseline)}")
         self.describe(monitor)

@@ -26,6 +26,7 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.preprocessing import ExponentialMeans, check_records
 from skthermo.preprocessing.loggers.logger_files import NO_TEXT_FILES, PARQUET, CsvFormat, FileLook, read_file
 from skthermo.preprocessing.loggers.together import HZ, LoggerRecords
+from skthermo.reporting.answers import regime_text
 from skthermo.surrogate import TemperatureMapper
 
 BASELINE = "baseline"  # folder to which the files of the baseline are copied
@@ -107,8 +108,10 @@ class Proposal:
             made = settings.Settings(Path(), {}, settings.Files(), self.records, self.form, parts, options)
             try:
                 with collected():  # the fit that follows gives them
-                    smallest = made.monitor().fit(self.baseline).smallest_changes_
-                size, finds = np.exp(np.log(list(smallest.single.values())).mean()), str(smallest)
+                    monitor = made.monitor().fit(self.baseline)
+                smallest = monitor.smallest_changes_
+                size = np.exp(np.log(list(smallest.single.values())).mean())
+                finds = "; ".join(filter(None, [str(smallest), regime_text(monitor)]))
             except ValueError as error:
                 size, finds = np.inf, f"it cannot be fitted to this baseline: {error}"
             one = {"kind": kind, "compensator": chosen, "text": f"{text}{falls}"}

@@ -15,7 +15,7 @@ from skthermo.fem import Structure
 from skthermo.monitoring import Monitor
 from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 from skthermo.reporting._page import Drawing, Row, draw, draw_structure, rows_of, settings_of
-from skthermo.reporting.answers import acknowledgement, counted_reasons, event_sentences
+from skthermo.reporting.answers import acknowledgement, counted_reasons, event_sentences, regime_text
 
 Time: TypeAlias = str | datetime | None
 
@@ -149,6 +149,7 @@ def monitor_facts(standing: Standing, structure: Structure | None = None) -> dic
         "losses": losses,
         "draw_detectable": partial(draw_structure, structure, losses=losses),
         "sentences_of": partial(event_sentences, monitor),
+        "regimes": regime_text(monitor),
         "acknowledgement": acknowledgement,
         "call": None,
         "settings": settings_of(parts, but=("monitor: detector", "monitor: fem")),

@@ -109,6 +109,16 @@ def event_sentences(monitor: Any, event: Mapping[str, Any], identified: Any = No
         yield f"{loss} in {', '.join(event['groups'])} explains most of it."
 
 
+def regime_text(monitor: Any) -> str:
+    """Where the detector divides records in two regimes; "" where it does not."""
+    regime = getattr(monitor.detector_, "regime_", None)
+    if regime is None:
+        return ""
+    name, highest = regime
+    level = f"{highest:.4g} {monitor.units_.get(name, '')}".strip()
+    return f"records up to {level} of {bare(name)!r} and above it are evaluated by detectors of their own"
+
+
 def counted_reasons(reasons: pd.Series) -> dict[str, int]:
     """How many records have each reason, the most frequent first; all wrong values of a column are one reason."""
     without_values = reasons.str.replace(r" is -?(\d|inf)[^,:;]*(?=[^;]*: taken as missing)", "", regex=True)

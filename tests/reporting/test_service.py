@@ -254,6 +254,14 @@ def test_a_change_is_of_the_records_that_made_its_event():
     assert f"f1 is 0.26{SPACE}% lower than" in today_of(drift).text
 
 
+def test_regimes_are_said_where_there_are_some():
+    monitor = FakeMonitor()
+    assert "detectors of their own" not in page_of(monitor)
+    monitor.detector_ = SimpleNamespace(regime_=("T1", 3.671))
+    text = Page(page_of(monitor)).text
+    assert f"Records up to 3.671 {monitor.units_['T1']} of 'T1' and above it are evaluated by detectors of" in text
+
+
 def test_the_smallest_change_that_would_be_seen_is_said():
     text = "A fall of all responses by 1 %, or of one response alone by 2 % (f1) to 3 % (f2) raises an alarm"
     assert text in section_of(usual_page(), "today").text
