@@ -47,8 +47,8 @@ def shifts_of(monitor: Any, stamps: pd.DatetimeIndex) -> pd.Series:
 def event_shifts(monitor: Any, event: Mapping[str, Any]) -> pd.Series:
     """How far each response has moved by the records that made an open event, as `shifts_of` has it.
 
-    A drift is the mean of 30 days, most of which are before its first record; of an alarm, the records above the
-    threshold count, of the 30 days up to the last of them.
+    A drift is told by the days of the last 30, as its test takes them, which begin before the event; an alarm by the
+    records above the threshold, of the 30 days up to the last of them.
     """
     if event["kind"] == "drift":
         return monitor.means_[monitor.means_.index > monitor.last_ - LONGEST].mean()
@@ -58,7 +58,7 @@ def event_shifts(monitor: Any, event: Mapping[str, Any]) -> pd.Series:
 
 
 def opened_since(monitor: Any) -> pd.Timestamp | None:
-    """The first record of what is open, damage or drift; that of a drift is of 30 days before it shows."""
+    """When the open damage or drift began; a drift has its records in the 30 days before it shows, too."""
     before = {"damage": pd.Timedelta(0), "drift": LONGEST}
     opened = [one for one in monitor.status().events if one["kind"] in before]
     return min((one["since"] - before[one["kind"]] for one in opened), default=None)
