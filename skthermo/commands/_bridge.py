@@ -333,11 +333,14 @@ class Bridge:
             tables = [file.rows for file in files]
             batch, waiting = joined(tables, columns) if has_settings else (pd.concat(tables), ())
             answers.append(monitor.update(batch, confirm=self.options.confirm))
-            between = _between(waiting, monitor.records_.index, usual_step(monitor.baseline_.index))
-            handed.update({file.path: batch.index.union(waiting[between]) for file in files})
-            notes = {"stamps not in all files yet, so that they wait": ~between}
-            notes["stamps left out, between records and not in all files"] = between
-            self.lines += [f"{note}: {rows.sum()}" for note, rows in notes.items() if rows.any()]
+            done = batch.index
+            if len(waiting):
+                between = _between(waiting, monitor.records_.index, usual_step(monitor.baseline_.index))
+                done = done.union(waiting[between])
+                notes = {"stamps not in all files yet, so that they wait": ~between}
+                notes["stamps left out, between records and not in all files"] = between
+                self.lines += [f"{note}: {rows.sum()}" for note, rows in notes.items() if rows.any()]
+            handed.update({file.path: done for file in files})
 
         if len(units) > 1:
             try:

@@ -47,8 +47,8 @@ def shifts_of(monitor: Any, stamps: pd.DatetimeIndex) -> pd.Series:
 def event_shifts(monitor: Any, event: Mapping[str, Any]) -> pd.Series:
     """How far each response has moved by the records that made an open event, as `shifts_of` has it.
 
-    A drift is told by the days of the last 30, as its test takes them, which begin before the event; an alarm by the
-    records above the threshold, of the 30 days up to the last of them.
+    Of a drift, these are the last 30 days, as in its test, which begin before the event; of an alarm, the records above
+    the threshold in the 30 days up to the last of them.
     """
     if event["kind"] == "drift":
         return monitor.means_[monitor.means_.index > monitor.last_ - LONGEST].mean()
