@@ -15,6 +15,7 @@ from skthermo.datasets import truss_structure
 from skthermo.detection import MahalanobisDetector
 from skthermo.monitoring import Monitor
 from skthermo.reporting import owner_report
+from skthermo.reporting.answers import opened_since
 from tests.monitoring.nightly import FIRST, truss_records
 from tests.reporting.monitors import FakeMonitor, event_row, smallest_changes
 from tests.reporting.pages import HOSTILE, QUOTED, Page, assert_sound, page_text, section_of, sections_in
@@ -252,6 +253,8 @@ def test_a_change_is_of_the_records_that_made_its_event():
     rest.iloc[-1] = 0.009  # the day on which the mean of 30 days shows it
     drift = monitor_of_shifts(event_row("2025-06-29", None, kind="drift", modes="f1"), rest)
     assert f"f1 is 0.26{SPACE}% lower than" in today_of(drift).text
+    assert opened_since(damage) == pd.Timestamp("2025-05-01")
+    assert opened_since(drift) == pd.Timestamp("2025-05-30")  # what explains a drift is sought in the same records
 
 
 def test_regimes_are_said_where_there_are_some():
