@@ -33,20 +33,19 @@ class KW51Monitoring(Monitoring):
     is_published: bool | None
 
 
-class FleetRecords(Monitoring):
-    """Result of ``records`` of a `~skthermo.datasets.make_fleet` bridge."""
+class Campaign(Monitoring):
+    """Simulated records, with their model and parameters."""
 
     clean_frequencies: pd.DataFrame
     theta: pd.DataFrame
-
-
-class TrussCampaign(FleetRecords):
-    """Result of `make_truss_campaign`."""
-
     model: AffineModel
 
 
-class KW51Campaign(TrussCampaign):
+class TrussCampaign(Campaign):
+    """Result of `make_truss_campaign`."""
+
+
+class KW51Campaign(Campaign):
     """Result of `make_kw51_campaign`; with ``shapes`` if they were asked for."""
 
     damping: pd.DataFrame
@@ -54,3 +53,10 @@ class KW51Campaign(TrussCampaign):
     sensors: list[str]
     state: pd.Series
     retrofit: dict[str, Any]
+
+
+class FleetRecords(Monitoring):
+    """Result of ``records`` of a `~skthermo.datasets.make_fleet` bridge."""
+
+    clean_frequencies: pd.DataFrame
+    theta: pd.DataFrame
