@@ -238,7 +238,8 @@ class Residuals:
     def __init__(self, model: FEModel, measured: Measured, prior: Array, noise: Array | None = None):
         self.model, self.measured, self.prior, self.noise = model, measured, prior, noise
         self.weighted = np.flatnonzero(measured.shape_weights > 0)  # modes whose shapes have a weight
-        self.n_plain = int(measured.has_frequency.sum()) + len(prior)
+        self.held = np.isfinite(prior)  # parameters with a prior
+        self.n_plain = int(measured.has_frequency.sum() + self.held.sum())
 
     def at(self, theta: Array) -> "Point":
         return Point(self, theta, paired_modes(self.model, self.measured, theta))
@@ -285,7 +286,7 @@ class Point:
         self._residuals, self._theta, self._modes = residuals, theta, modes
         measured, prior, weighted = residuals.measured, residuals.prior, residuals.weighted
         misses = (modes.frequencies - measured.frequencies) / measured.deviations
-        parts = [misses[measured.has_frequency], (theta - 1) / prior]
+        parts = [misses[measured.has_frequency], ((theta - 1) / prior)[residuals.held]]
         if len(weighted):
             parts.append(tangents(modes.shapes[:, weighted], measured.shapes[:, weighted]).T.ravel())
         self.values, self._scales = np.concatenate(parts), np.ones(1)
@@ -321,7 +322,7 @@ class Point:
         measured, prior, weighted = self._residuals.measured, self._residuals.prior, self._residuals.weighted
         d_frequencies, d_shapes = self._modes.derivatives()
         misses = d_frequencies / measured.deviations[:, np.newaxis]
-        plain = np.vstack([misses[measured.has_frequency], np.diag(1 / prior)])
+        plain = np.vstack([misses[measured.has_frequency], np.diag(1 / prior)[self._residuals.held]])
         if not len(weighted):
             return plain, np.empty((0, 0, len(self._theta)))
         shapes = self._modes.shapes[:, weighted]
