@@ -189,7 +189,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
             self.feature_names_in_ = self.compensator_.feature_names_in_
         T, R = self.compensator_.inputs(X)[0], as_floats(residuals)
         self.regime_ = self._chosen_regime(X, T, R, np.flatnonzero(~labelled_damaged(y, len(R))))
-        regime = self._regimes(T)
+        regime = self._regimes(T, self.regime_)
         self.means_ = None
         Z = as_frame(X, residuals)
         if self.window is not None:
@@ -371,7 +371,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         """Residuals of records or their means, the regime of each record, and findings."""
         check_is_fitted(self)
         residuals, T, findings = self.compensator_.evaluated(X)
-        Z, regime = as_frame(X, residuals), self._regimes(T)
+        Z, regime = as_frame(X, residuals), self._regimes(T, self.regime_)
         if self.means_ is None:
             return Z, regime, findings
         self._check_order(X)
@@ -406,8 +406,7 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         Means over a window scatter so little that a slow change counts as damage in the narrower regime.
         """
         n_first = 2 * len(T) // 3
-        first_regime = as_floats(T)[:n_first, self._input_names(T).index(name)] <= value
-        if min(first_regime.sum(), (~first_regime).sum()) < least_rows:
+        if np.bincount(self._regimes(T, (name, value))[:n_first], minlength=2).min() < least_rows:
             return False
         with collected():
             earlier = clone(self).set_params(regimes=(name, value), cv=None).fit(X[:n_first])
@@ -418,11 +417,11 @@ class CompensatedDetector(DamageIndexMixin, Estimator):
         names = getattr(self, "feature_names_in_", None)
         return list(range(T.shape[1])) if names is None else list(np.delete(names, self.compensator_.targets_))
 
-    def _regimes(self, T: Any) -> Regimes:
+    def _regimes(self, T: Any, regime: tuple[Any, float] | None) -> Regimes:
         """The number of the regime of each record: 0 up to the value, 1 above; a missing input counts as above."""
-        if self.regime_ is None:
+        if regime is None:
             return np.zeros(len(T), dtype=np.intp)
-        name, value = self.regime_
+        name, value = regime
         return (~(as_floats(T)[:, self._input_names(T).index(name)] <= value)).astype(np.intp)
 
     def _check_order(self, X: Any) -> None:

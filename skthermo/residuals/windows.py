@@ -74,7 +74,9 @@ class WindowMeans(SavesFrames):
         """
         values, index, n_before = residuals.to_numpy(), residuals.index, 0
         if self.history is not None:
-            known, zone = self.history[0].index.tz, getattr(index, "tz", "none, as no DatetimeIndex")
+            if not has_stamps(residuals):
+                raise ValueError("X has rows without a DatetimeIndex; expected a DatetimeIndex, as in fit")
+            known, zone = self.history[0].index.tz, index.tz
             if (known is None) != (zone is None):
                 raise ValueError(f"X has stamps in time zone {zone}; expected {known}, as in fit")
         if self.history is not None and not is_baseline and len(index) and index[0] > self.history[0].index[-1]:
