@@ -23,13 +23,20 @@ from skthermo._core.estimators import (
     validate_data,
     with_means,
 )
-from skthermo._core.frames import column_names, frame_like, marker_findings, positions_of
+from skthermo._core.frames import (
+    column_names,
+    correlation_times,
+    frame_like,
+    marker_findings,
+    positions_of,
+    row_times,
+)
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import labelled_damaged, mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
 from skthermo.exceptions import SkthermoWarning
 from skthermo.preprocessing.checks import misplaced_columns, set_aside
-from skthermo.preprocessing.folds import Rows
+from skthermo.preprocessing.folds import BlockedKFold, Rows
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import (
@@ -342,16 +349,16 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         F = frame_like(F, np.where(labelled_damaged(y, len(F))[:, np.newaxis], np.nan, as_floats(F)))
         self.sensors_ = SensorRegression.fitted(T)
         inputs, filled = self._filled(T)
-        Y, folds = as_floats(F), read_folds(self.cv, inputs)
-        self.folds_ = np.full(len(Y), -1)
-        for number, (_, test) in enumerate(folds):
-            self.folds_[test] = number
+        Y = as_floats(F)
         self.training_range_ = TrainingRange.spanned(inputs, ~np.isnan(Y).all(axis=1))
         self.relative_ = (np.fmin.reduce(Y) > 0) & (np.nanstd(Y, axis=0) < np.nanmean(Y, axis=0) / 3)
         estimator = self._default_part("estimator") if self.estimator is None else self.estimator
         estimator = with_means(estimator, inputs, F)
-        predicted, doubts = self._regress(estimator, inputs, F, folds)
+        predicted, folds, doubts = self._regress(estimator, inputs, F)
         residuals = self._difference(Y, predicted)
+        self.folds_ = np.full(len(Y), -1)
+        for number, (_, test) in enumerate(folds):
+            self.folds_[test] = number
         self.scale_, self.usual_deviation_ = robust_deviation(residuals), median(self._deviations(predicted))
         self.extrapolation_ = self._learn_extrapolation(estimator, inputs, F)
         residuals = self._shrunk(residuals, inputs, self._with_fills(T, inputs, predicted))
@@ -363,24 +370,29 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         return findings, frame_like(F, residuals)
 
     def _regress(
-        self, estimator: BaseEstimator, T: Any, F: Any, folds: list[tuple[Rows, Rows]]
-    ) -> tuple[Array, list[SkthermoWarning]]:
-        """Fit the regression; predictions out of fold with standard deviations, and findings of the estimator.
+        self, estimator: BaseEstimator, T: Any, F: Any
+    ) -> tuple[Array, list[tuple[Rows, Rows]], list[SkthermoWarning]]:
+        """Fit the regression; predictions out of fold with standard deviations, folds, and findings of the estimator.
 
-        Targets that are far from a first regression do not train the second one.
+        Targets that are far from a first regression do not train the second one. Where residuals of the first are
+        correlated for long, the blocks of the second are longer.
         """
-        Y = as_floats(F)
+        Y, in_time = as_floats(F), np.argsort(row_times(T), kind="stable")
+        cv = BlockedKFold(5) if self.cv is None else self.cv
         for _ in range(2):
+            folds = read_folds(cv, T)
             with collected() as found:
                 self.regression_ = RowsRegression.fitted(estimator, T, F)
                 predicted = self.regression_.out_of_fold(estimator, T, F, folds)
             residuals = self._difference(Y, predicted)
             far = np.abs(residuals - median(residuals)) > 8 * robust_deviation(residuals)
-            if not far.any():
+            memory = 5 * correlation_times(np.where(far, np.nan, residuals)[in_time]).max()
+            longer = cv.remembering(T, memory) if self.cv is None else cv
+            if not far.any() and longer is cv:
                 break
-            F = frame_like(F, np.where(far, np.nan, Y))
+            F, cv = frame_like(F, np.where(far, np.nan, Y)), longer
         self.estimator_ = self.regression_.estimator
-        return predicted, found
+        return predicted, folds, found
 
     def _learn_extrapolation(self, estimator: BaseEstimator, T: Any, F: Any) -> Extrapolation:
         """How residuals scatter where the regression extrapolates, in the coldest and the warmest fifth of records."""

@@ -20,7 +20,6 @@ from sklearn.utils import get_tags
 from skthermo._core.arrays import Array, as_floats
 from skthermo._core.estimators import BaseSearchCV, _BaseImputer, fit_checked, fit_outputs, last_step, predict_with_std
 from skthermo._core.frames import column_names
-from skthermo.preprocessing import BlockedKFold
 from skthermo.preprocessing.folds import Rows, out_of_fold
 
 
@@ -111,10 +110,8 @@ def fit_rows(estimator: BaseEstimator, inputs: Any, F: Any) -> BaseEstimator:
 
 
 def read_folds(cv: Any, T: Any) -> list[tuple[Rows, Rows]]:
-    """The folds that a user asks for, as training and test rows; by default blocks of a week."""
+    """The folds that a user asks for, as training and test rows."""
     n_rows = len(T)
-    if cv is None:
-        return list(BlockedKFold(5).split(T))
     n_folds = 5 if isinstance(cv, str) else cv
     if isinstance(n_folds, Integral) and n_folds > n_rows:
         raise ValueError(f"cv is {cv!r}, {n_folds} folds of {n_rows} rows; expected a row or more in each fold")
