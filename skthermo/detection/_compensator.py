@@ -62,8 +62,8 @@ class TemperatureCompensator(TransformerMixin, Estimator):
     cv : "contiguous", int, cross-validation splitter or iterable, default=None
         Folds by which the baseline is predicted:
 
-        - ``None``: blocks of a week (without stamps, of a 52nd of the rows), dealt in turn to five folds, so that each
-          fold sees each season.
+        - ``None``: blocks of a week (without stamps, of a 52nd of the rows), or of five correlation times of the
+          residuals where that is longer, dealt in turn to five folds, so that each fold sees each season.
         - ``"contiguous"``: five periods of time, each predicted from the others. An int gives that many.
         - A splitter, or pairs of training and test rows: every row must be in exactly one test fold, or all but the
           first rows, as with ``TimeSeriesSplit``: the residuals of those are NaN.

@@ -3,18 +3,20 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter
 from sklearn.base import clone
 from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
 from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
 from sklearn.impute import SimpleImputer
 from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import GridSearchCV, KFold, ShuffleSplit, cross_val_predict
+from sklearn.model_selection import GridSearchCV, KFold, PredefinedSplit, ShuffleSplit, cross_val_predict
 from sklearn.multioutput import MultiOutputRegressor
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from skthermo.preprocessing import BlockedKFold, KNNGapImputer, LagFeatures
+from skthermo.detection import TemperatureCompensator
+from skthermo.preprocessing import KNNGapImputer, LagFeatures
 from skthermo.residuals.sensors import SensorRegression
 from skthermo.surrogate import TemperatureMapper
 from tests.detection.compensated import (
@@ -44,10 +46,21 @@ SHUFFLED = KFold(3, shuffle=True, random_state=0)
 def test_fit_transform_is_cross_val_predict_and_then_a_fit_on_all_rows(cv, same):
     fitted = compensator(cv=cv)
     residuals = fitted.fit_transform(X)
-    same = BlockedKFold(5) if cv is None else same
+    same = PredefinedSplit(fitted.folds_) if cv is None else same
     predicted = cross_val_predict(KNeighborsRegressor(3), T, F, cv=same)
     np.testing.assert_allclose(residuals, np.log(F / predicted), atol=1e-12)
     pd.testing.assert_frame_equal(fitted.transform(X), compensator().fit(X).transform(X))
+
+
+@pytest.mark.parametrize(("correlation", "shortest", "longest"), [(0.0, 7, 7), (0.9, 30, 36)])
+def test_blocks_out_of_fold_are_as_long_as_noise_is_remembered(correlation, shortest, longest):
+    rng, days = np.random.default_rng(0), pd.date_range("2025", periods=365)
+    noise = lfilter([1.0], [1.0, -correlation], rng.normal(0, 0.001, (365 + 100, 2)), axis=0)[100:]
+    air = pd.DataFrame({"air": 10 * np.sin(np.arange(365) / 58) + rng.normal(0, 3, 365)}, days)
+    records = air.join(pd.DataFrame(5.0 * np.exp(noise - 0.001 * air.to_numpy()), days, ["f1", "f2"]))
+    fold_of = TemperatureCompensator(targets=["f1", "f2"]).fit(records).folds_
+    blocks = np.diff(np.flatnonzero(np.diff(fold_of)))
+    assert shortest <= blocks.min() and blocks.max() <= longest
 
 
 def test_lags_within_go_by_time():
