@@ -328,6 +328,22 @@ def test_shapes_show_what_frequencies_hardly_show(fem):
     assert found.table.loc["vertical", "error_alone"] < 0.5 * without.table.loc["vertical", "error_alone"]
 
 
+def test_one_solve_gives_frequencies_and_shapes(fem, monkeypatch):
+    later, dofs = make_truss_campaign(samples_per_year=120, random_state=1), [1, 3, 5, 10, 16, 22]
+    shape, solved = TRUSS.modes(np.ones((1, 4)))[1][0][dofs], []
+
+    def counted(solve):
+        return lambda model, theta: solved.append(model) or solve(model, theta)
+
+    for name in ("frequencies", "modes"):
+        monkeypatch.setattr(AffineModel, name, counted(getattr(AffineModel, name)))
+    identify_damage(fem, later.temperatures, later.frequencies, ["top", "diagonal"], random_state=0)
+    without = len(solved)
+    measured = {"shapes": (shape, shape), "dofs": dofs}
+    identify_damage(fem, later.temperatures, later.frequencies, ["top", "diagonal"], random_state=0, **measured)
+    assert len(solved) - without < 1.2 * without
+
+
 def test_groups_that_cannot_be_seen_keep_their_prior_probability(fem, healthy):
     with pytest.warns(UserWarning, match="vertical.*undetermined"):
         found = identify_damage(fem, WEATHER[::2], healthy[::2], random_state=0)

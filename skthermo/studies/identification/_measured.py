@@ -173,8 +173,9 @@ def observed(
 
     def state(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
         after, theta = changed(model, shift.theta, causes, amounts, kind)
-        logs = np.log(as_floats(fem.aligner_.inverse_transform(after.frequencies(theta))))[0, known]
-        return logs if shapes is None else np.append(logs, compared(after.modes(theta)[1][0]))
+        solved = (after.frequencies(theta),) if shapes is None else after.modes(theta)
+        logs = np.log(as_floats(fem.aligner_.inverse_transform(solved[0])))[0, known]
+        return logs if shapes is None else np.append(logs, compared(solved[1][0]))
 
     before = state([], [])
     return ObservedChange(change, covariance, lambda *causes: state(*causes) - before, findings)
