@@ -10,8 +10,8 @@
 """
 
 from collections import defaultdict
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -472,14 +472,11 @@ class Campaign:
     structure: object
     seed: int
     wrong: bool = False
-    chains: dict = field(default_factory=dict)
 
-    @property
+    @cached_property
     def fem(self):
         """The fitted chain, made when it is first needed."""
-        if "fem" not in self.chains:
-            self.chains["fem"] = self.chain(self.model).fit(*self.records)
-        return self.chains["fem"]
+        return self.chain(self.model).fit(*self.records)
 
     @property
     def model(self):
@@ -502,7 +499,7 @@ class Campaign:
             random_state=self.seed,
         )
 
-    @property
+    @cached_property
     def records(self):
         """Healthy temperatures and frequencies to learn from."""
         return self.structure.records(TRAINING_DAYS, {}, memory_of(self.seed), 1000 + self.seed)
