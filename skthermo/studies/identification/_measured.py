@@ -173,7 +173,7 @@ def observed(
 
     def state(causes: Sequence[Cause], amounts: Sequence[float]) -> Array:
         after, theta = changed(model, shift.theta, causes, amounts, kind)
-        solved = (after.frequencies(theta),) if shapes is None else after.modes(theta)
+        solved = [after.frequencies(theta)] if shapes is None else after.modes(theta)
         logs = np.log(as_floats(fem.aligner_.inverse_transform(solved[0])))[0, known]
         return logs if shapes is None else np.append(logs, compared(solved[1][0]))
 
