@@ -14,7 +14,7 @@ from scipy import stats
 from skthermo._core.arrays import Array, median, robust_deviation
 from skthermo._core.frames import days_later, midnights
 from skthermo._core.saved_frames import SavesFrames
-from skthermo.monitoring._evaluation import directions_of, joined_names, scales_of, sensitivities_of
+from skthermo.monitoring._evaluation import DetectorParts
 from skthermo.monitoring._events import leading
 from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.mean_errors import MeanErrors, chance_of
@@ -41,32 +41,28 @@ class MeanTest(SavesFrames):
     @classmethod
     def learned(
         cls,
-        residuals: pd.DataFrame,
-        detector: Any,
-        trained: pd.DataFrame,
+        parts: DetectorParts,
         per_year: float,
         since: pd.Timestamp | None = None,
         crossings: float = 16.0,
     ) -> MeanTest:
-        """From residuals of a baseline, out of fold, for so many false alarms a year.
+        """From out-of-fold residuals of what a detector was trained on, for so many false alarms a year.
 
         The days ``since`` an intervention alone tell the level after it.
 
         A level that a mean exceeds with probability p is exceeded in about 16 p events a year, as means of neighbouring
         weeks share most of their days: measured with independent and with correlated residuals of three and six modes.
         """
-        names, days = list(residuals.columns), midnights(residuals.index)
-        means = residuals.groupby(days).mean()
-        directional, directions, joined = directions_of(detector), None, {}
-        if directional is not None:
-            joined = joined_names(directional)
-            directions = directional.directions_.loc[list(sensitivities_of(directional).index)]
+        rest, groups = parts.residuals(parts.trained, is_baseline=True), parts.groups
+        means = rest.groupby(midnights(rest.index)).mean()
         is_long = means.notna().any(axis=1).sum() >= 12 * cls.n_days / 2  # each of a dozen parts tells of half a mean
         errors = MeanErrors.learned(means.to_numpy()) if is_long else None
         if errors is not None and since is not None:
             n_own = np.maximum(means[means.index >= since].count().to_numpy() / errors.for_one, 1.0)
             errors = replace(errors, n_trained=np.minimum(errors.n_trained, n_own))
-        return cls(errors, per_year / crossings, names, scales_of(detector, names, trained), directions, joined)
+        directions = None if groups is None else groups.drop(columns=["sensitivity", "joined"])
+        joined = {} if groups is None else groups["joined"].to_dict()
+        return cls(errors, per_year / crossings, parts.targets, parts.scales, directions, joined)
 
     def weeks(self, means: pd.DataFrame, times: Sequence[pd.Timestamp]) -> pd.DataFrame:
         """A row for each of some times, by daily means of residuals before it.

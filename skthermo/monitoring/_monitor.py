@@ -38,17 +38,12 @@ from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._evaluation import (
+    DetectorParts,
     blind_findings,
     causes,
-    departures,
-    group_effects,
-    index_of,
-    losses_of,
     outages_of,
     refuse_other_batches,
-    residuals,
     rounded,
-    window_of,
 )
 from skthermo.monitoring._events import (
     FAULT,
@@ -444,8 +439,8 @@ class Monitor(SavesFrames, Estimator):
             self.features_ = columns.seen(detector)
             detector.fit(trained[self.features_])
         findings += [*of_clocks, *self._take_charge(detector, trained)]
-        refuse_other_batches(detector, self.features_, trained, self.lookback_)
-        findings += blind_findings(detector, self.features_, trained, self.targets_, self.lookback_, self.threshold_)
+        refuse_other_batches(self._index, trained, self.lookback_)
+        findings += blind_findings(self._index, trained, self.targets_, self.lookback_, self.threshold_)
         self._begin_service(self.fem)
         self.versions_ = versions()
         warn_each(findings)
@@ -478,12 +473,10 @@ class Monitor(SavesFrames, Estimator):
         if self.lookback is not None:
             self.lookback_ = Lookback(0, check_duration(self.lookback, "lookback"))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        baseline = residuals(detector, trained, self.targets_, trained, is_baseline=True)
-        slow = 0.25  # of the false alarms that are asked for
-        test = MeanTest.learned(baseline, detector, trained, slow * self.false_alarms_per_year, self.since_)
-        share = 1.0 if test.errors is None else 1 - slow
+        parts, slow = self._parts, 0.25  # of the false alarms that are asked for
+        self.mean_test_ = MeanTest.learned(parts, slow * self.false_alarms_per_year, self.since_)
+        share = 1.0 if self.mean_test_.errors is None else 1 - slow
         levels = EventLevels.learned(index, self.false_alarms_per_year, self.persistence, share)
-        self.mean_test_ = test
         self.threshold_, self.clear_threshold_ = levels.threshold, levels.release
         self.false_alarm_estimate_, self.baseline_peaks_ = levels.estimate, levels.peaks
         self.watch_threshold_ = None
@@ -492,16 +485,21 @@ class Monitor(SavesFrames, Estimator):
             self.watch_threshold_ = min(watch.threshold, self.threshold_)
         step = usual_step(trained.index)
         number, among = rule_of(self.persistence)
-        window = window_of(detector) if self.lookback is None else self.lookback_
+        window = parts.window() if self.lookback is None else self.lookback_
         within, share_above = window.duration(step) + among * step, (number - 0.5) / among
         self.smallest_changes_ = SmallestChanges.measured(
-            self._index, trained, self.targets_, self.threshold_, within, share_above, losses_of(detector)
+            self._index, trained, self.targets_, self.threshold_, within, share_above, parts.groups
         )
         return list(levels.findings(self.smallest_changes_))
 
     def _index(self, records: pd.DataFrame) -> Array:
         """Damage indices of records in order of time, by the detector in charge."""
-        return index_of(self.detector_, self.features_, records)
+        with collected(drop_others=True):  # the reason of each record stands for a warning of the detector
+            return -np.asarray(self.detector_.score_samples(records[self.features_]), dtype=float)
+
+    @property
+    def _parts(self) -> DetectorParts:
+        return DetectorParts(self.detector_, self.targets_, self.trained_)
 
     def _twin(self) -> Monitor:
         """A monitor that stands as this one, to be changed in its place: an error leaves this one as it was."""
@@ -598,7 +596,7 @@ class Monitor(SavesFrames, Estimator):
         then = self._index_then(records, place, index, drifts)
         columns = {"index": index, "index_then": then, "is_blind": np.asarray(is_blind), "reason": reason}
         if self.mean_test_.errors is not None:
-            rest = residuals(self.detector_, records[self.features_], self.targets_, self.trained_).iloc[place:]
+            rest = self._parts.residuals(records[self.features_]).iloc[place:]
             rest = rest[~is_outside]
             if self.corrections_.drift is not None:  # what is taken out of the frequencies counts
                 rest = rest + self.corrections_.drift.shifts(drifts.loc[rest.index], self.targets_)
@@ -646,9 +644,10 @@ class Monitor(SavesFrames, Estimator):
         records, place = self._with_memory(int(rows[0]))
         places = place + rows - rows[0]
         records = records.iloc[: places[-1] + 1]
-        sizes = departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places]
+        parts, seen = self._parts, records[self.features_]
+        sizes = parts.residuals(seen, in_windows=True).to_numpy()[places] / parts.scales
         sizes = pd.DataFrame(np.round(np.nan_to_num(sizes), 2), columns=list(map(str, self.targets_)))
-        found = group_effects(self.detector_, records[self.features_]).iloc[places]
+        found = parts.effects(seen).iloc[places]
         modes = [leading(row) for _, row in sizes.abs().iterrows()]
         found = found.join(sizes.add_prefix("departure ").set_axis(found.index)).assign(modes=modes)
         found = found.astype({"modes": object})
