@@ -89,13 +89,16 @@ class Corrections:
             sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
         return DayState(state.day, sensors, drift)
 
-    def drifts(self, states: Sequence[DayState], stamps: pd.DatetimeIndex) -> pd.DataFrame:
-        """Shares of stiffness by group, as in "drift top", that are taken out of records from the first state on."""
+    def drifts(self, states: Sequence[DayState]) -> pd.DataFrame:
+        """Shares of stiffness by group, as in "drift top", that are taken out of the records of each day."""
+        days = pd.DatetimeIndex([state.day for state in states]).as_unit("ns")
         if self.drift is None:
-            return pd.DataFrame(index=stamps)
-        shares = [self.drift.taken_out(state.drift).add_prefix("drift ") for state in states]
-        table = pd.DataFrame(shares, pd.DatetimeIndex([state.day for state in states]).as_unit(stamps.unit))
-        return table.reindex(midnights(stamps), method="ffill").set_axis(stamps)
+            return pd.DataFrame(index=days)
+        return pd.DataFrame([self.drift.taken_out(state.drift).add_prefix("drift ") for state in states], days)
+
+    def shifts(self, drifts: pd.DataFrame, stamps: pd.DatetimeIndex) -> Any:
+        """Shifts of ln f of the responses that are taken out of records by the drifts of their days."""
+        return 0.0 if self.drift is None else self.drift.shifts(drifts.loc[midnights(stamps)], self.targets)
 
     def corrected(
         self,
@@ -109,9 +112,9 @@ class Corrections:
         """Raw records as the detector sees them, without values of sensors since these are at fault, and drift.
 
         Also what became of their values, a row for each record (``n_held`` responses that were set aside although the
-        structure may have moved them, ``held`` names them; ``n_left_out`` values; columns ``at_fault``; ``note``; and
-        ``drifts``). ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a
-        sensor. With ``once_found``, values of sensors at fault stay until that was found.
+        structure may have moved them, ``held`` names them; ``n_left_out`` values; columns ``at_fault``; ``note``).
+        ``drifts`` are those of each day, and ``acknowledged`` times (nanoseconds) at which what was held then was said
+        to be the fault of a sensor. With ``once_found``, values of sensors at fault stay until that was found.
         """
         wrong = self.plausible.implausible(raw.to_numpy())
         T, F = self._split(raw.mask(wrong))
@@ -121,12 +124,11 @@ class Corrections:
             about = pd.DataFrame({"n_held": 0.0, "held": "", "n_left_out": 0, "at_fault": "", "note": ""}, raw.index)
         else:
             seen_T, seen_F, about = self.sensors.masked(faults, T, F, acknowledged, once_found=once_found)
-        if self.drift is not None:
-            seen_F = seen_F * np.exp(-self.drift.shifts(drifts, list(seen_F)))
+        seen_F = seen_F * np.exp(-self.shifts(drifts, raw.index))
         about["n_left_out"] += wrong.sum(axis=1)
         about["note"] = ["; ".join(filter(None, parts)) for parts in zip(notes, about["note"], strict=True)]
         records = seen_T.join(seen_F)[[name for name in raw.columns if name not in self.reference]]
-        return records, about.join(drifts).astype({"held": object, "note": object, "at_fault": object})
+        return records, about.astype({"held": object, "note": object, "at_fault": object})
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
         is_target = records.columns.isin(self.targets)

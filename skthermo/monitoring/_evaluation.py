@@ -59,8 +59,7 @@ class DetectorParts:
 
     def window(self) -> Lookback:
         """How far back means of residuals are taken; the memory of the weather delays no alarm."""
-        found = [Lookback.learned(part) for part in self.after]
-        return Lookback(sum(one.rows for one in found), sum((one.time for one in found), pd.Timedelta(0)))
+        return Lookback.learned(*self.after)
 
     def residuals(self, records: pd.DataFrame, *, is_baseline: bool = False, in_windows: bool = False) -> pd.DataFrame:
         """What the weather does not explain of each record, of windows where these are asked for and there are some.
