@@ -66,13 +66,12 @@ class Corrections:
 
     def advanced(self, begin: DayState, raw: pd.DataFrame) -> tuple[DayState, ...]:
         """States at the beginning of each day of raw records from a day on, by the days before."""
-        days = midnights(raw.index)
-        bounds = [*np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[0] - 1)), len(raw)]
+        days = list(raw.groupby(midnights(raw.index)))
         if self.sensors is None and self.drift is None:
-            return (replace(begin, day=days[-1]),)
-        states = [replace(begin, day=days[0])]
-        for (first, stop), next_day in zip(pairwise(bounds[:-1]), days[bounds[1:-1]], strict=True):
-            states.append(replace(self._after(states[-1], raw.iloc[first:stop]), day=next_day))
+            return (replace(begin, day=days[-1][0]),)
+        states = [replace(begin, day=days[0][0])]
+        for (_, records), (next_day, _) in pairwise(days):
+            states.append(replace(self._after(states[-1], records), day=next_day))
         return tuple(states)
 
     def _after(self, state: DayState, raw: pd.DataFrame) -> DayState:

@@ -15,7 +15,7 @@ from skthermo._core.arrays import Array, median, robust_deviation
 from skthermo._core.frames import days_later, midnights
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._evaluation import DetectorParts
-from skthermo.monitoring._events import leading
+from skthermo.monitoring._events import leading, table_of
 from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.mean_errors import MeanErrors, chance_of
 
@@ -73,16 +73,13 @@ class MeanTest(SavesFrames):
         groups = list(dict.fromkeys(self.joined.values()))
         columns = [f"departure {name}" for name in self.names]
         columns += [f"{what} {group}" for what in ("effect", "loss") for group in groups]
-        rows = [self._tested(means, time) for time in times]
-        numbers = [[level, p_value, *values] for level, p_value, _, values in rows]
+        types = dict.fromkeys(["level", "p_value", *columns], float) | {"modes": object}
         index = pd.DatetimeIndex(times) if len(times) else means.index[:0]
-        table = pd.DataFrame(np.reshape(numbers, (len(rows), 2 + len(columns))), index, ["level", "p_value", *columns])
-        return table.assign(modes=np.array([modes for _, _, modes, _ in rows], dtype=object)).astype({"modes": object})
+        return table_of([self._tested(means, time) for time in times], types, index)
 
-    def _tested(self, means: pd.DataFrame, time: pd.Timestamp) -> tuple[float, float, str, list[float]]:
-        """Level, probability, modes, and what the mean of the days before a time departs by."""
-        n_groups = len(set(self.joined.values()))
-        nothing = np.nan, np.nan, "", [0.0] * (len(self.names) + 2 * n_groups)
+    def _tested(self, means: pd.DataFrame, time: pd.Timestamp) -> list[Any]:
+        """Level, probability, what the mean of the days before a time departs by, and modes."""
+        nothing = [np.nan, np.nan, *[0.0] * (len(self.names) + 2 * len(set(self.joined.values()))), ""]
         days = means[(means.index >= days_later(time, -self.n_days)) & (means.index < time)].to_numpy()
         if self.errors is None or 2 * (~np.isnan(days).all(axis=1)).sum() < self.n_days:
             return nothing
@@ -104,9 +101,8 @@ class MeanTest(SavesFrames):
         departures, sizes = np.zeros(len(some)), np.round(np.abs(mean) / np.sqrt(np.diag(covariance)), 2)
         departures[some] = np.round(mean / self.scales[some], 4)
         modes = leading(dict(zip(np.array(self.names, dtype=object)[some], sizes, strict=True)))
-        values = [*departures, *self._explained(root, white, some)]
         level, p_value = np.sqrt(squared / limit), chance_of(squared, n_free, freedom)
-        return float(np.round(level, 6)), float(np.round(p_value, 6)), modes, values
+        return [np.round(level, 6), np.round(p_value, 6), *departures, *self._explained(root, white, some), modes]
 
     def _explained(self, root: Array, white: Array, some: NDArray[np.bool_]) -> list[float]:
         """Effects of the groups in standard errors of the mean, then their losses; none where they explain less than

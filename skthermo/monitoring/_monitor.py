@@ -34,6 +34,7 @@ from skthermo._core.frames import (
     usual_step,
 )
 from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.text import plain
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._corrections import Corrections
@@ -655,16 +656,16 @@ class Monitor(SavesFrames, Estimator):
         decisions.loc[found.index, found.columns] = found
         self._tell(decisions_=decisions)
 
-    def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
-        """Append the changes since a former state to the transitions, after the actions that made them."""
-        tables = before.known_events_.table, self.known_events_.table
-        old, new = (table[~(table["end"] < first)] for table in tables)
-        found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
-        for one in [*done, *sorted(found, key=lambda change: change["time"])]:
-            plain = {"id": len(self.transitions_) + 1, "what": one["what"], "time": one["time"].isoformat()}
-            plain |= {"newest": self.last_.isoformat(), "kind": one["kind"], "event": one.get("event", 0)}
-            plain |= {"column": one.get("column", ""), "detail": one.get("detail", "")}
-            self.transitions_ = (*self.transitions_, plain)
+    def _become(self, after: Monitor, first: pd.Timestamp, **done: Any) -> None:
+        """Stand as a changed twin does; changes from a stamp on join the transitions, after what was ``done``."""
+        old, new = (one.known_events_.table for one in (self, after))
+        found = [*event_changes(old[~(old["end"] < first)], new[~(new["end"] < first)])]
+        found = sorted([*found, *fault_changes(self.faults_, after.faults_, after.last_)], key=lambda one: one["time"])
+        usual = {"id": 0, "what": "", "time": after.last_, "newest": after.last_, "kind": "", "event": 0}
+        for number, one in enumerate([done, *found] if done else found, len(self.transitions_) + 1):
+            entry = plain(usual | {"column": "", "detail": ""} | one | {"id": number})
+            after.transitions_ = (*after.transitions_, entry)
+        vars(self).update(vars(after))
 
     def update(self, new: pd.DataFrame, *, confirm: bool = False) -> pd.DataFrame:
         """Evaluate records that came since.
@@ -712,12 +713,11 @@ class Monitor(SavesFrames, Estimator):
             known = pd.concat([self.records_, records])
             after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
             first = after._decide(fresh[0])
-            after._note(self, fresh[0])
             was, now = (one.known_events_.evaluations for one in (self, after))
             news = _news(was[was.index >= first], now[now.index >= first], fresh)
             answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
-        vars(self).update(vars(after))
+        self._become(after, fresh[0] if len(fresh) else self.last_)
         return answers
 
     def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
@@ -831,9 +831,7 @@ class Monitor(SavesFrames, Estimator):
             raise ValueError(f"note is {note!r:.100}; expected text")
         one, after = events.loc[event], self._twin()
         after._say(one["kind"], one["peak_time"], check_flag(harmless, "harmless"), note)
-        done = {"what": "acknowledged", "time": self.last_, "kind": one["kind"], "event": int(event), "detail": note}
-        after._note(after, self.last_, done)
-        vars(self).update(vars(after))
+        self._become(after, self.last_, what="acknowledged", kind=one["kind"], event=int(event), detail=note)
 
     def _say(self, kind: str, time: pd.Timestamp, harmless: bool, note: str) -> None:
         """Note the owner's answer to the event of a kind at a time, at the time of the newest record."""
@@ -906,9 +904,7 @@ class Monitor(SavesFrames, Estimator):
             until = "on" if last is None else f"to {last}"
             raise ValueError(f"no record since the baseline is stamped {first} {until}; expected some to be discarded")
         after._decide(min(first, midnight(after.last_)))
-        done = {"what": "discarded", "time": first, "kind": "", "detail": f"records: {n_discarded}"}
-        after._note(self, first, done)
-        vars(self).update(vars(after))
+        self._become(after, first, what="discarded", time=first, detail=f"records: {n_discarded}")
         return n_discarded
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
@@ -1008,8 +1004,7 @@ class Monitor(SavesFrames, Estimator):
             after._begin_corrections(trained.join(raw)[list(self.baseline_.columns)], fem)
         after._decide(today)
         what = "rebaseline" if retraining.kind == "new baseline" else retraining.kind
-        after._note(self, today, {"what": what, "time": self.last_, "kind": retraining.kind})
-        vars(self).update(vars(after))
+        self._become(after, today, what=what, kind=retraining.kind)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.
