@@ -71,7 +71,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("signs of shapes beside theta", "return there * np.sign(", "return there * np.abs("),
     ],
     ("monitoring/_fleet.py", "monitoring/test_fleet.py"): [
-        ("bridges whose records failed called healthy", "if self.errors else status", "if False else status"),
+        ("bridges whose records failed called healthy", "if self.error else status", "if False else status"),
     ],
     ("surrogate/_fleet_mapper.py", "surrogate/test_fleet_mapper.py"): [
         ("bridges unlike the others", "(1.0, 10.0, 100.0)", "(1.0,)"),

@@ -299,10 +299,8 @@ class Bridge:
             if not folder.is_dir():
                 self.failed(FileNotFoundError(f"there is no folder {folder}; expected it, with the new records"))
             for file in files_in(folder):
-                why = taken.why_no_records(file, settings.records.columns)
-                if why is None:
-                    sources[file] = None
-                elif why:
+                sources[file] = None
+                if why := taken.why_no_records(file, settings.records.columns):
                     self.lines.append(f"no records in {file}: {why}")
             later = settings.records.baseline if settings.records.until else []
             sources |= {settings.path(name): monitor.baseline_.index[-1] for name in later}
@@ -544,10 +542,9 @@ class Taken:
     """What has been taken in from which files, kept beside the monitor.
 
     ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit,
-    ``settings`` are those of the fit, ``state`` is what the last call said, and ``others`` are files without records.
-    For each file there are its size, the time of its last change, and how many of its first rows are done, with a
-    checksum of these. If a command is killed after it has saved the monitor, rows come again, and the monitor knows
-    them.
+    ``settings`` are those of the fit, ``state`` is what the last call said. For each file there are its size, the time
+    of its last change, and how many of its first rows are done, with a checksum of these. If a command is killed after
+    it has saved the monitor, rows come again, and the monitor knows them.
     """
 
     file: Path
@@ -556,7 +553,6 @@ class Taken:
     fitted: str = ""
     settings: dict[str, Any] | None = None
     state: str | None = None
-    others: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def read(cls, file: Path) -> Taken:
@@ -574,9 +570,8 @@ class Taken:
     def new_in(self, file: Path, read: Any) -> NewFile | None:
         """What is new in a file; None if it is as it was when all of it was taken in."""
         known = self.files.get(self._key(file), {})
-        found = file.stat()
-        seen = {"size": found.st_size, "changed": found.st_mtime_ns}
-        is_as_before = all(known.get(name) == value for name, value in seen.items())
+        seen = seen_of(file)
+        is_as_before = seen.items() <= known.items()
         if is_as_before and known.get("whole"):
             return None
         table = read(file, leave_unfinished=not is_as_before)  # a line that is not finished may be, the next time
@@ -586,17 +581,17 @@ class Taken:
         is_finished = is_as_before or file.suffix.lower() in NO_TEXT_FILES or end in (b"\n", b"\r")
         return NewFile(file, table[n_done:], table[:n_done], seen | {"whole": is_finished})
 
-    def why_no_records(self, file: Path, columns: Sequence[str]) -> str | None:
-        """Why a file holds no records, as an empty one, or a text that names no column; "" once that was said of it,
-        until it changes. None if it may hold some."""
-        seen, key = {"size": file.stat().st_size, "changed": file.stat().st_mtime_ns}, self._key(file)
-        if seen["size"] and (
-            file.suffix.lower() != ".txt" or key in self.files or any(name in text_of(file) for name in columns)
-        ):
-            return None
-        why = "it names no column of the records" if seen["size"] else "the file is empty"
-        before, self.others[key] = self.others.get(key), seen
-        return "" if seen == before else why
+    def why_no_records(self, file: Path, columns: Sequence[str]) -> str:
+        """Why a new or changed file holds no records, as an empty one, or a text that names no column; it is done with
+        by that. "" for others."""
+        seen, known = seen_of(file), self.files.get(self._key(file), {})
+        may_be_text = file.suffix.lower() == ".txt" and "rows" not in known
+        if seen.items() <= known.items() or (seen["size"] and not may_be_text):
+            return ""
+        if any(name in text_of(file) for name in columns):
+            return ""
+        self.files[self._key(file)] = seen | {"whole": True}
+        return "it names no column of the records" if seen["size"] else "the file is empty"
 
     def _key(self, file: Path) -> str:
         """How a file is called: by its path from the folder of the monitor, wherever the command is started."""
@@ -612,6 +607,12 @@ class Taken:
             "checksum": _checksum(done),
             "whole": file.seen["whole"] and not waiting.any(),
         }
+
+
+def seen_of(file: Path) -> dict[str, int]:
+    """Size of a file, and the time of its last change."""
+    found = file.stat()
+    return {"size": found.st_size, "changed": found.st_mtime_ns}
 
 
 def _checksum(table: pd.DataFrame) -> int:

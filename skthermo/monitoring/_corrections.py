@@ -66,13 +66,12 @@ class Corrections:
 
     def advanced(self, begin: DayState, raw: pd.DataFrame) -> tuple[DayState, ...]:
         """States at the beginning of each day of raw records from a day on, by the days before."""
-        days = midnights(raw.index)
-        bounds = [*np.flatnonzero(np.diff(days.asi8, prepend=days.asi8[0] - 1)), len(raw)]
+        days = list(raw.groupby(midnights(raw.index)))
         if self.sensors is None and self.drift is None:
-            return (replace(begin, day=days[-1]),)
-        states = [replace(begin, day=days[0])]
-        for (first, stop), next_day in zip(pairwise(bounds[:-1]), days[bounds[1:-1]], strict=True):
-            states.append(replace(self._after(states[-1], raw.iloc[first:stop]), day=next_day))
+            return (replace(begin, day=days[-1][0]),)
+        states = [replace(begin, day=days[0][0])]
+        for (_, records), (next_day, _) in pairwise(days):
+            states.append(replace(self._after(states[-1], records), day=next_day))
         return tuple(states)
 
     def _after(self, state: DayState, raw: pd.DataFrame) -> DayState:
@@ -89,13 +88,16 @@ class Corrections:
             sensors = self.sensors.advance(sensors, *self._split(raw.mask(is_missing)))
         return DayState(state.day, sensors, drift)
 
-    def drifts(self, states: Sequence[DayState], stamps: pd.DatetimeIndex) -> pd.DataFrame:
-        """Shares of stiffness by group, as in "drift top", that are taken out of records from the first state on."""
+    def drifts(self, states: Sequence[DayState]) -> pd.DataFrame:
+        """Shares of stiffness by group, as in "drift top", that are taken out of the records of each day."""
+        days = pd.DatetimeIndex([state.day for state in states]).as_unit("ns")
         if self.drift is None:
-            return pd.DataFrame(index=stamps)
-        shares = [self.drift.taken_out(state.drift).add_prefix("drift ") for state in states]
-        table = pd.DataFrame(shares, pd.DatetimeIndex([state.day for state in states]).as_unit(stamps.unit))
-        return table.reindex(midnights(stamps), method="ffill").set_axis(stamps)
+            return pd.DataFrame(index=days)
+        return pd.DataFrame([self.drift.taken_out(state.drift).add_prefix("drift ") for state in states], days)
+
+    def shifts(self, drifts: pd.DataFrame, stamps: pd.DatetimeIndex) -> Any:
+        """Shifts of ln f of the responses that are taken out of records by the drifts of their days."""
+        return 0.0 if self.drift is None else self.drift.shifts(drifts.loc[midnights(stamps)], self.targets)
 
     def corrected(
         self,
@@ -109,9 +111,9 @@ class Corrections:
         """Raw records as the detector sees them, without values of sensors since these are at fault, and drift.
 
         Also what became of their values, a row for each record (``n_held`` responses that were set aside although the
-        structure may have moved them, ``held`` names them; ``n_left_out`` values; columns ``at_fault``; ``note``; and
-        ``drifts``). ``acknowledged`` are times (nanoseconds) at which what was held then was said to be the fault of a
-        sensor. With ``once_found``, values of sensors at fault stay until that was found.
+        structure may have moved them, ``held`` names them; ``n_left_out`` values; columns ``at_fault``; ``note``).
+        ``drifts`` are those of each day, and ``acknowledged`` times (nanoseconds) at which what was held then was said
+        to be the fault of a sensor. With ``once_found``, values of sensors at fault stay until that was found.
         """
         wrong = self.plausible.implausible(raw.to_numpy())
         T, F = self._split(raw.mask(wrong))
@@ -121,12 +123,11 @@ class Corrections:
             about = pd.DataFrame({"n_held": 0.0, "held": "", "n_left_out": 0, "at_fault": "", "note": ""}, raw.index)
         else:
             seen_T, seen_F, about = self.sensors.masked(faults, T, F, acknowledged, once_found=once_found)
-        if self.drift is not None:
-            seen_F = seen_F * np.exp(-self.drift.shifts(drifts, list(seen_F)))
+        seen_F = seen_F * np.exp(-self.shifts(drifts, raw.index))
         about["n_left_out"] += wrong.sum(axis=1)
         about["note"] = ["; ".join(filter(None, parts)) for parts in zip(notes, about["note"], strict=True)]
         records = seen_T.join(seen_F)[[name for name in raw.columns if name not in self.reference]]
-        return records, about.join(drifts).astype({"held": object, "note": object, "at_fault": object})
+        return records, about.astype({"held": object, "note": object, "at_fault": object})
 
     def _split(self, records: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
         is_target = records.columns.isin(self.targets)

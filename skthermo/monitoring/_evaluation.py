@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -20,11 +21,7 @@ from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._events import lowered
 from skthermo.monitoring._records import Lookback
 
-
-def index_of(detector: Any, columns: list[Any], records: pd.DataFrame) -> Array:
-    """Damage indices of records; the reason of each record stands for a warning of the detector."""
-    with collected(drop_others=True):
-        return -np.asarray(detector.score_samples(records[columns]), dtype=float)
+IndexOf: TypeAlias = Callable[[pd.DataFrame], Array]  # damage indices of records in order of time
 
 
 def rounded(index: Array) -> Array:
@@ -42,125 +39,102 @@ def parts_of(detector: Any) -> list[Any]:
     return [] if detector is None or detector == "passthrough" else [detector]
 
 
-def window_of(detector: Any) -> Lookback:
-    """How far back a fitted detector takes means of residuals; its memory of the weather delays no alarm."""
-    *_, last = parts = parts_of(detector)
-    after = 1 + max((n for n, part in enumerate(parts) if isinstance(part, TemperatureCompensator)), default=-1)
-    averaged = [last.means_] if isinstance(last, CompensatedDetector) else parts[after:]
-    found = [Lookback.learned(part) for part in averaged if part is not None]
-    return Lookback(sum(one.rows for one in found), sum((one.time for one in found), pd.Timedelta(0)))
+class DetectorParts:
+    """A fitted detector taken apart, and what it says of records beside their index.
 
+    ``steps`` come before the compensator, and ``after`` takes means of what that leaves, such as a window. Without a
+    compensator, the records themselves are evaluated, as departures from the mean of ``trained``.
+    """
 
-def residuals(
-    detector: Any, records: pd.DataFrame, targets: list[Any], trained: pd.DataFrame, *, is_baseline: bool = False
-) -> pd.DataFrame:
-    """What the weather does not explain of each record, without windows; departures from the mean of the baseline where
-    the detector has no compensator. Those of the baseline itself are out of fold."""
-    *steps, last = parts_of(detector)
-    with collected(drop_others=True):
-        if isinstance(last, CompensatedDetector):
-            before, compensator = steps, last.compensator_
+    def __init__(self, detector: Any, targets: list[Any], trained: pd.DataFrame):
+        *self.steps, self.last = self.after = parts_of(detector)
+        self.targets, self.trained = targets, trained
+        self.is_whole, self.compensator = isinstance(self.last, CompensatedDetector), None
+        places = [place for place, step in enumerate(self.steps) if isinstance(step, TemperatureCompensator)]
+        if self.is_whole:
+            self.compensator, self.after = self.last.compensator_, [part for part in [self.last.means_] if part]
+        elif places:
+            self.compensator, self.after = self.steps[places[0]], self.after[places[0] + 1 :]
+            self.steps = self.steps[: places[0]]
+
+    def window(self) -> Lookback:
+        """How far back means of residuals are taken; the memory of the weather delays no alarm."""
+        return Lookback.learned(*self.after)
+
+    def residuals(self, records: pd.DataFrame, *, is_baseline: bool = False, in_windows: bool = False) -> pd.DataFrame:
+        """What the weather does not explain of each record, of windows where these are asked for and there are some.
+
+        Those of the baseline itself are out of fold.
+        """
+        if self.compensator is None:
+            return records[self.targets] - self.trained[self.targets].mean()
+        if is_baseline:
+            rest = self.compensator.residuals_
         else:
-            places = [n for n, step in enumerate(steps) if isinstance(step, TemperatureCompensator)]
-            if not places:
-                return records[targets] - trained[targets].mean()
-            before, compensator = steps[: places[0]], steps[places[0]]
-        rest = compensator.residuals_ if is_baseline else compensator.transform(_through(before, records))
-    return in_order(compensator, as_floats(rest), targets).set_index(records.index)
+            rest_of = self.last.residuals if in_windows and self.is_whole else self.compensator.transform
+            with collected(drop_others=True):
+                rest = rest_of(through(self.steps, records))
+        return self._in_order(as_floats(rest)).set_index(records.index)
 
+    def _in_order(self, values: Array) -> pd.DataFrame:
+        """Values of the compensator's targets in the order of the monitor's."""
+        names = list(self.compensator.get_feature_names_out())
+        if not set(names) <= set(self.targets):  # a step before has made arrays of the records
+            return pd.DataFrame(values[:, np.argsort(self.compensator.targets_)], columns=self.targets)
+        return pd.DataFrame(values, columns=names).reindex(columns=self.targets)
 
-def in_order(compensator: TemperatureCompensator, values: Array, targets: list[Any]) -> pd.DataFrame:
-    """Values of the targets of a compensator in the order of some targets."""
-    names = list(compensator.get_feature_names_out())
-    if not set(names) <= set(targets):  # a step before has made arrays of the records
-        return pd.DataFrame(values[:, np.argsort(compensator.targets_)], columns=targets)
-    return pd.DataFrame(values, columns=names).reindex(columns=targets)
+    @cached_property
+    def scales(self) -> Array:
+        """Standard deviations of what the detector sees of each target while nothing changes."""
+        if self.compensator is None:
+            return self.trained[self.targets].std(ddof=0).replace(0.0, 1.0).to_numpy()
+        scale = (self.last if self.is_whole else self.compensator).scale_
+        return self._in_order(np.where(scale > 0, scale, 1.0)[np.newaxis]).to_numpy()[0]
 
+    @cached_property
+    def groups(self) -> pd.DataFrame | None:
+        """Relative changes of the modes by a whole loss of stiffness of each damage group, None without directions.
 
-def scales_of(detector: Any, targets: list[Any], trained: pd.DataFrame) -> Array:
-    """Standard deviations of what a detector sees of each target while nothing changes."""
-    *steps, last = parts_of(detector)
-    places = [step for step in steps if isinstance(step, TemperatureCompensator)]
-    if not places and not isinstance(last, CompensatedDetector):
-        return trained[targets].std(ddof=0).replace(0.0, 1.0).to_numpy()
-    scale = last.scale_ if isinstance(last, CompensatedDetector) else places[0].scale_
-    compensator = last.compensator_ if isinstance(last, CompensatedDetector) else places[0]
-    return in_order(compensator, np.where(scale > 0, scale, 1.0)[np.newaxis], targets).to_numpy()[0]
+        Also by how many standard deviations it moves a record (``sensitivity``), and the name of all groups that cannot
+        be distinguished from it, such as "top or bottom" (``joined``).
+        """
+        directional = self.last.detectors_[0] if self.is_whole else self.last
+        if not isinstance(directional, DirectionalDetector) or isinstance(directional.directions, str):
+            return None
+        found = directional.sensitivities_
+        found = found[~found.index.str.endswith(", section")]
+        alike = pd.DataFrame(np.eye(len(found)), found.index, found.index)
+        for one, other in directional.indistinguishable_:
+            if {one, other} <= {*found.index}:
+                alike.loc[one, other] = 1.0
+        together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], found.index)
+        joined = together.groupby(together).transform(lambda same: " or ".join(same.index))
+        return directional.directions_.loc[found.index].assign(sensitivity=found, joined=joined) if len(found) else None
 
+    def effects(self, records: pd.DataFrame) -> pd.DataFrame:
+        """Losses of stiffness of the damage groups, as in column "loss top", and their effects in standard deviations,
+        "effect top".
 
-def departures(detector: Any, records: pd.DataFrame, targets: list[Any], trained: pd.DataFrame) -> Array:
-    """Residuals of records in standard deviations, of windows where the detector has such."""
-    *steps, last = parts_of(detector)
-    if isinstance(last, CompensatedDetector):
+        NaN where they explain less than half of a record. No columns without directions of groups.
+        """
+        if self.groups is None:
+            return pd.DataFrame(index=records.index)
         with collected(drop_others=True):
-            rest = in_order(last.compensator_, as_floats(last.residuals(_through(steps, records))), targets)
-    else:
-        rest = residuals(detector, records, targets, trained)
-    return rest.to_numpy() / scales_of(detector, targets, trained)
+            table = through(self.steps, records)
+            losses, shares = self.last.severities(table).set_axis(records.index), self.last.explained(table)
+        moved = (losses * self.groups["sensitivity"]).round(2)
+        losses, effects = (one.T.groupby(self.groups["joined"]).sum().T for one in (losses, moved))
+        is_explained = (effects > 0) & (np.round(shares, 4)[:, np.newaxis] >= 0.5)
+        found = {"loss ": losses.round(6), "effect ": effects}
+        return pd.concat([one.where(is_explained).add_prefix(prefix) for prefix, one in found.items()], axis=1)
 
 
-def _through(steps: list[Any], records: pd.DataFrame) -> Any:
+def through(steps: list[Any], records: pd.DataFrame) -> Any:
+    """Records as the last of some steps gives them."""
     table: Any = records
     for step in steps:
         table = step.transform(table)
     return table
-
-
-def directions_of(detector: Any) -> DirectionalDetector | None:
-    """The fitted detector that has directions of losses of stiffness of damage groups, if there is one."""
-    last = parts_of(detector)[-1]
-    one = last.detectors_[0] if isinstance(last, CompensatedDetector) else last
-    is_directional = isinstance(one, DirectionalDetector) and not isinstance(one.directions, str)
-    return one if is_directional and len(sensitivities_of(one)) else None
-
-
-def sensitivities_of(directional: DirectionalDetector) -> pd.Series:
-    """By how many standard deviations a whole loss of stiffness of each group moves a record."""
-    found = directional.sensitivities_
-    return found[~found.index.str.endswith(", section")]
-
-
-def losses_of(detector: Any) -> pd.DataFrame | None:
-    """Loss of stiffness of each damage group that moves a record by one standard deviation, and the relative changes
-    by it."""
-    directional = directions_of(detector)
-    if directional is None:
-        return None
-    known = sensitivities_of(directional)
-    seen = known[known > 0]
-    return directional.directions_.loc[seen.index].div(seen, axis=0).assign(loss=1 / seen)
-
-
-def group_effects(detector: Any, records: pd.DataFrame) -> pd.DataFrame:
-    """Losses of stiffness of the damage groups, as in column "loss top", and their effects in standard deviations,
-    "effect top".
-
-    NaN where they explain less than half of a record. Groups that cannot be distinguished are one, such as "top or
-    bottom"; no columns without such directions.
-    """
-    directional = directions_of(detector)
-    if directional is None:
-        return pd.DataFrame(index=records.index)
-    *steps, last = parts_of(detector)
-    with collected(drop_others=True):
-        table = _through(steps, records)
-        losses, shares = last.severities(table).set_axis(records.index), last.explained(table)
-    sensitivities, joined = sensitivities_of(directional), joined_names(directional)
-    losses, effects = (one.T.groupby(joined).sum().T for one in (losses, (losses * sensitivities).round(2)))
-    is_explained = (effects > 0) & (np.round(shares, 4)[:, np.newaxis] >= 0.5)
-    found = {"loss ": losses.round(6), "effect ": effects}
-    return pd.concat([one.where(is_explained).add_prefix(prefix) for prefix, one in found.items()], axis=1)
-
-
-def joined_names(directional: DirectionalDetector) -> dict[str, str]:
-    """Names of damage groups, those that cannot be distinguished as one, such as "top or bottom"."""
-    names = sensitivities_of(directional).index
-    alike = pd.DataFrame(np.eye(len(names)), names, names)
-    for one, other in directional.indistinguishable_:
-        if {one, other} <= {*names}:
-            alike.loc[one, other] = 1.0
-    together = pd.Series(connected_components(alike.to_numpy(), directed=False)[1], names)
-    return {name: " or ".join(names[together == together[name]]) for name in names}
 
 
 def outages_of(times: pd.DatetimeIndex, step: pd.Timedelta, reach: pd.Timedelta) -> list[tuple[pd.Timestamp, Any, Any]]:
@@ -196,14 +170,14 @@ def causes(
     return np.where(np.isnan(index), unknown, others).tolist()
 
 
-def refuse_other_batches(detector: Any, columns: list[Any], trained: pd.DataFrame, lookback: Lookback) -> None:
+def refuse_other_batches(index_of: IndexOf, trained: pd.DataFrame, lookback: Lookback) -> None:
     """Refuse a detector that evaluates a record otherwise among all than with the records it looks back to."""
     times = trained.index.asi8
     rows = np.linspace(len(times) // 2, min(len(times) // 2 + 100, len(times) - 1), 5).astype(np.intp)
     first = max(lookback.start(times, int(rows[0])) - 100, 0)
-    whole = index_of(detector, columns, trained.iloc[first : rows[-1] + 100])[rows - first]
+    whole = index_of(trained.iloc[first : rows[-1] + 100])[rows - first]
     parts = (trained.iloc[lookback.start(times, int(row)) : row + 1] for row in rows)
-    alone = np.array([index_of(detector, columns, part)[-1] for part in parts])
+    alone = np.array([index_of(part)[-1] for part in parts])
     same = np.isclose(whole, alone, rtol=1e-6, atol=1e-9, equal_nan=True)
     if not same.all():
         row = int(np.argmin(same))
@@ -215,7 +189,7 @@ def refuse_other_batches(detector: Any, columns: list[Any], trained: pd.DataFram
 
 
 def blind_findings(
-    detector: Any, columns: list[Any], trained: pd.DataFrame, targets: list[Any], lookback: Lookback, threshold: float
+    index_of: IndexOf, trained: pd.DataFrame, targets: list[Any], lookback: Lookback, threshold: float
 ) -> Iterator[ResultWarning]:
     """The finding of responses whose large fall raises no alarm; an error where a larger one ends it."""
     number, times = trained[targets].notna().sum(axis=1).to_numpy(), trained.index.asi8
@@ -226,7 +200,7 @@ def blind_findings(
     for target, deviation in trained[targets].std(ddof=0).replace(0.0, 1.0).items():
         sizes = (5, 20, 80)  # standard deviations by which it is lowered
         changed = (lowered(part, {target: size * deviation}) for size in sizes)
-        indices = (pd.Series(index_of(detector, columns, records)[-n_last:]) for records in changed)
+        indices = (pd.Series(index_of(records)[-n_last:]) for records in changed)
         seen = [index.median() > threshold for index in indices]
         for smaller, larger, *found in zip(sizes[:-1], sizes[1:], seen[:-1], seen[1:], strict=True):
             if found == [True, False]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from numbers import Integral
@@ -140,12 +140,18 @@ def alike(one: Array, other: Array, cosine: float = 0.7) -> bool:
     return bool(length > 0 and one @ other >= cosine * length)
 
 
+def table_of(rows: Sequence[Any], types: Mapping[str, Any], index: Any = None) -> pd.DataFrame:
+    """Rows as a table whose columns have some types, also without any."""
+    return pd.DataFrame(rows, index, list(types), dtype=object).astype(types)
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """Records in a row, ``first`` up to ``stop``, in which a level is open, and what departs in them.
 
-    ``level`` is the level of each record, NaN where there is none, and ``direction`` the mean departure of the
-    responses. ``effects`` and ``losses`` of damage groups are sums over its records, or over ``n_weeks`` of means.
+    ``level`` is the level of each record, NaN where there is none, and ``modes`` are those at its highest one.
+    ``departed`` are departures of the responses, effects and losses of damage groups, one after the other: sums over
+    its records, or over ``n_weeks`` of means.
     """
 
     kind: str
@@ -153,36 +159,13 @@ class Run:
     stop: int
     level: Array
     modes: str
-    direction: Array
-    effects: Array
-    losses: Array
+    departed: Array
     n_weeks: int = 0
-
-    @property
-    def peak(self) -> int:
-        """Position of the highest level."""
-        return self.first + int(np.nanargmax(self.level))
 
     @property
     def n_alarms(self) -> int:
         """Number of its records that have a level."""
         return int((~np.isnan(self.level)).sum())
-
-
-class Parts:
-    """Departures of modes, effects and losses of damage groups in some rows of a table, summed.
-
-    Another table, of weeks, gives names and order; 0 where the table has none.
-    """
-
-    def __init__(self, table: pd.DataFrame, weeks: pd.DataFrame):
-        names = {what: [one for one in weeks if one.startswith(f"{what} ")] for what in ("departure", "effect", "loss")}
-        self.groups = [name.removeprefix("effect ") for name in names["effect"]]
-        rows = table.reindex(columns=[one for some in names.values() for one in some]).to_numpy(dtype=float)
-        self._values = np.split(np.nan_to_num(rows), np.cumsum([len(some) for some in names.values()])[:2], axis=1)
-
-    def __call__(self, first: int, stop: int) -> list[Array]:
-        return [values[first:stop].sum(axis=0) for values in self._values]
 
 
 class Events:
@@ -208,77 +191,71 @@ class Events:
         self.decisions, self.times, self.said = decisions, decisions.index.as_unit("ns").asi8, said
         number, among = rule_of(persistence)
         self.reached = f"reached by {number} of {among} records" if among > 1 else "of a record"
-        self.starts, self.within = np.asarray(starts, dtype=np.int64), within
-        self.parts = Parts(decisions, weeks)
+        self.persistence, self.starts, self.within = persistence, np.asarray(starts, dtype=np.int64), within
+        departed = weeks.filter(regex="^(departure|effect|loss) ")
+        self.groups = [name.removeprefix("effect ") for name in departed if name.startswith("effect ")]
+        self.n_modes = departed.shape[1] - 2 * len(self.groups)
         causes: list[list[Run]] = []
-        found = [*self._raised(persistence), *self._drifts(weeks), *self._faults(persistence)]
+        of_records = np.nan_to_num(decisions.reindex(columns=departed.columns).to_numpy(dtype=float))
+        found = [*self._raised(of_records), *self._drifts(weeks, departed.to_numpy()), *self._faults()]
         for run in sorted(found, key=lambda run: (run.first, RANKED_KINDS.index(run.kind))):
             cause = next((one for one in reversed(causes) if self._is_same(one, run)), None)
             if cause is None:
                 causes.append([run])
             else:
                 cause.append(run)
-        self.runs = dict(enumerate(causes, 1))
-        rows, stamp = [self._row(runs) for runs in causes], decisions.index.dtype
-        dtypes = {"kind": object, "start": stamp, "end": stamp, "peak": float, "peak_time": stamp}
-        dtypes |= {"modes": object, "groups": object, "size": float, "n_alarms": np.int64, "n_times": np.int64}
-        dtypes["sign"] = stamp
-        columns = zip(*rows, strict=True) if rows else [()] * len(dtypes)
-        series = zip(dtypes, map(list, columns), dtypes.values(), strict=True)
-        table = pd.DataFrame({name: pd.Series(values, dtype=dtype) for name, values, dtype in series})
-        self.table = table.set_axis(pd.RangeIndex(1, len(rows) + 1, name="event"))
+        self.runs, stamp = dict(enumerate(causes, 1)), decisions.index.dtype
+        types = {"kind": object, "start": stamp, "end": stamp, "peak": float, "peak_time": stamp}
+        types |= {"modes": object, "groups": object, "size": float, "n_alarms": np.int64, "n_times": np.int64}
+        index = pd.RangeIndex(1, len(causes) + 1, name="event")
+        self.table = table_of([self._row(runs) for runs in causes], types | {"sign": stamp}, index)
         self.answered = with_acknowledgements(self.table, said)
 
-    def _raised(self, persistence: Persistence) -> Iterator[Run]:
+    def _runs(
+        self, kind: str, values: Array, limits: pd.DataFrame, persistence: Persistence, modes: Any, departed: Array
+    ) -> Iterator[Run]:
+        """Runs of a series of values on the stamps of their limits, by the modes and the departures of each."""
+        level, spans = followed(values, limits.index.as_unit("ns").asi8, limits, persistence, self.starts)
+        for first, stop in spans:
+            own = level[first:stop]
+            peak = first + int(np.nanargmax(own))
+            yield Run(kind, first, stop, own, modes.iloc[peak], departed[first:stop].sum(axis=0))
+
+    def _raised(self, departed: Array) -> Iterator[Run]:
         """Runs of alarms and watches."""
-        decisions = self.decisions
-        index, is_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy() > 0
-        above = np.nextafter(decisions["release"].to_numpy(), np.inf)
+        index, is_held = self.decisions["index"].to_numpy(), self.decisions["n_held"].to_numpy() > 0
+        above = np.nextafter(self.decisions["release"].to_numpy(), np.inf)
         shown = np.where(is_held & ~np.isnan(index), np.maximum(index, above), index)  # others cannot close an event
         for kind, names in {DAMAGE: ["threshold", "release"], WATCH: ["watch", "watch_release"]}.items():
-            limits = decisions[names].set_axis(["threshold", "release"], axis=1)
-            if limits["threshold"].isna().all():
-                continue
-            level, spans = followed(shown, self.times, limits, persistence, self.starts)
-            for first, stop in spans:
-                peak = decisions["modes"].iloc[first + int(np.nanargmax(level[first:stop]))]
-                yield Run(kind, first, stop, level[first:stop], peak, *self.parts(first, stop))
+            limits = self.decisions[names].set_axis(["threshold", "release"], axis=1)
+            yield from self._runs(kind, shown, limits, self.persistence, self.decisions["modes"], departed)
 
-    def _drifts(self, weeks: pd.DataFrame) -> Iterator[Run]:
+    def _drifts(self, weeks: pd.DataFrame, departed: Array) -> Iterator[Run]:
         """Runs of weeks in which the mean of the last days has moved."""
-        at = weeks.index.as_unit("ns").asi8
-        limits = pd.DataFrame({"threshold": 1.0, "release": 0.7}, weeks.index)
-        level, spans = followed(weeks["level"].to_numpy(), at, limits, 1, self.starts)
-        ends, parts = np.append(np.searchsorted(self.times, at), len(self.times)), Parts(weeks, weeks)
-        of_record = np.searchsorted(at, self.times, side="right") - 1
-        for start, end in spans:
-            anew = self.times.searchsorted(self.starts[self.starts > at[start]]).min(initial=len(self.times))
-            first, stop = ends[start], min(ends[end], anew)
+        at, limits = weeks.index.as_unit("ns").asi8, pd.DataFrame({"threshold": 1.0, "release": 0.7}, weeks.index)
+        ends = np.append(np.searchsorted(self.times, at), len(self.times))
+        week = np.searchsorted(at, self.times, side="right") - 1
+        for run in self._runs(DRIFT, weeks["level"].to_numpy(), limits, 1, weeks["modes"], departed):
+            anew = self.times.searchsorted(self.starts[self.starts > at[run.first]]).min(initial=len(self.times))
+            first, stop = int(ends[run.first]), int(min(ends[run.stop], anew))
             if first < stop:
-                peak = start + int(np.nanargmax(level[start:end]))
-                modes, own = weeks["modes"].iloc[peak], parts(start, end)
-                yield Run(DRIFT, first, stop, level[of_record[first:stop]], modes, *own, n_weeks=end - start)
+                level = run.level[week[first:stop] - run.first]
+                yield replace(run, first=first, stop=stop, level=level, n_weeks=run.stop - run.first)
 
-    def _faults(self, persistence: Persistence) -> Iterator[Run]:
+    def _faults(self) -> Iterator[Run]:
         """Runs of responses that were set aside, and of alarms that rested on values of sensors at fault."""
-        decisions, held = self.decisions, self.decisions["n_held"].to_numpy()
-        if held.any():
-            limits = pd.DataFrame({"threshold": 0.5, "release": 0.5}, decisions.index)
-            level, spans = followed(held, self.times, limits, 3, self.starts)
-            for first, stop in spans:
-                names = decisions["held"].iloc[first + int(np.nanargmax(level[first:stop]))]
-                yield Run(FAULT, first, stop, level[first:stop], names, *self.parts(0, 0))
+        decisions, nothing = self.decisions, np.zeros((len(self.times), self.n_modes + 2 * len(self.groups)))
+        limits = pd.DataFrame({"threshold": 0.5, "release": 0.5}, decisions.index)
+        yield from self._runs(FAULT, decisions["n_held"].to_numpy(), limits, 3, decisions["held"], nothing)
         then, index = decisions["index_then"].to_numpy(), decisions["index"].to_numpy()
         differs = ~((then == index) | (np.isnan(then) & np.isnan(index)))
         if not differs.any():
             return
-        limits = decisions[["threshold", "release"]]
-        _, real = followed(index, self.times, limits, persistence, self.starts)
-        level, spans = followed(then, self.times, limits, persistence, self.starts)
-        for first, stop in spans:
-            names = decisions["at_fault"][first:stop][differs[first:stop]]
-            if (names != "").any() and not any(one < stop and first < end for one, end in real):
-                yield Run(FAULT, first, stop, level[first:stop], names[names != ""].iloc[0], *self.parts(0, 0))
+        _, real = followed(index, self.times, decisions, self.persistence, self.starts)
+        for run in self._runs(FAULT, then, decisions, self.persistence, decisions["at_fault"], nothing):
+            names = decisions["at_fault"][run.first : run.stop][differs[run.first : run.stop]]
+            if (names != "").any() and not any(first < run.stop and run.first < stop for first, stop in real):
+                yield replace(run, modes=names[names != ""].iloc[0])
 
     def _is_same(self, cause: list[Run], run: Run) -> bool:
         """Whether a run has the cause of earlier ones."""
@@ -292,24 +269,25 @@ class Events:
             return run.modes == cause[0].modes
         if any(one.kind != run.kind and DRIFT not in (one.kind, run.kind) and run.first < one.stop for one in cause):
             return True  # an alarm within a watch
-        for one in self.said[self.said["harmless"]].itertuples() if len(self.said) else ():
-            if self.times[cause[0].first] <= one.time < end and one.at < begin:
-                return False
-        return alike(sum(one.direction / max(np.linalg.norm(one.direction), 1e-300) for one in cause), run.direction)
+        said = self.said[self.said["harmless"] & (self.said["at"] < begin)]
+        if ((said["time"] >= self.times[cause[0].first]) & (said["time"] < end)).any():
+            return False
+        earlier = [one.departed[: self.n_modes] for one in cause]
+        mean = sum(one / max(np.linalg.norm(one), 1e-300) for one in earlier)
+        return alike(mean, run.departed[: self.n_modes])
 
     def _row(self, runs: list[Run]) -> tuple[Any, ...]:
         """What the table says of an event."""
         stamps, kind = self.decisions.index, min((run.kind for run in runs), key=RANKED_KINDS.index)
         own, stop = [run for run in runs if run.kind == kind], max(run.stop for run in runs)
-        highest = max(own, key=lambda run: np.nanmax(run.level))
-        number = sum(run.n_weeks or run.n_alarms for run in own)
-        effects, losses = (sum(getattr(run, name) for run in own) / number for name in ("effects", "losses"))
-        means = dict(zip(self.parts.groups, effects, strict=False))
-        groups = leading({name: mean for name, mean in means.items() if mean > 2}) if means else ""
-        size = losses[self.parts.groups.index(groups.split(", ")[0])] if groups else np.nan
-        end, peak = stamps[stop] if stop < len(stamps) else pd.NaT, float(np.nanmax(highest.level))
-        ends, n_alarms = (stamps[own[0].first], end, peak, stamps[highest.peak]), sum(run.n_alarms for run in own)
-        return kind, *ends, highest.modes, groups, size, n_alarms, len(own), stamps[runs[0].first]
+        highest, n_alarms = max(own, key=lambda run: np.nanmax(run.level)), sum(run.n_alarms for run in own)
+        mean = sum(run.departed for run in own) / sum(run.n_weeks or run.n_alarms for run in own)
+        effects, losses = (dict(zip(self.groups, part, strict=True)) for part in np.split(mean[self.n_modes :], 2))
+        groups = leading({name: effect for name, effect in effects.items() if effect > 2})
+        size = losses[groups.split(", ")[0]] if groups else np.nan
+        start, end = stamps[own[0].first], stamps[stop] if stop < len(stamps) else pd.NaT
+        peak = float(np.nanmax(highest.level)), stamps[highest.first + int(np.nanargmax(highest.level))]
+        return kind, start, end, *peak, highest.modes, groups, size, n_alarms, len(own), stamps[runs[0].first]
 
     def is_raised(self) -> NDArray[np.bool_]:
         """Which records are in an alarm or a watch."""
@@ -318,61 +296,49 @@ class Events:
             found[run.first : run.stop] = True
         return found
 
-    def standing(self) -> tuple[NDArray[np.object_], NDArray[np.int64]]:
-        """How the structure stands at each record by its events, whether it is evaluated or not, and the event.
+    @cached_property
+    def standing(self) -> pd.DataFrame:
+        """How the structure stands at each record by its events, whether it is evaluated or not, and the ``event``.
 
         What the owner has answered of an event holds for later records up to one and a half times the level that it had
         reached; the level of a mean of 30 days goes on to rise for so long after a change. After damage that is known,
-        nothing is healthy until a new baseline.
+        nothing is healthy until a new baseline. A record ``is_set_aside`` in an event of responses that were, and
+        ``is_unexplained`` until somebody has explained it.
         """
-        states, numbers = np.full(len(self.times), "healthy", dtype=object), np.zeros(len(self.times), dtype=np.int64)
-        ranks = np.full(len(self.times), len(STATES))
+        ranks, numbers = np.full(len(self.times), len(STATES)), np.zeros(len(self.times), dtype=np.int64)
+        is_unexplained, is_set_aside = np.zeros((2, len(self.times)), dtype=bool)
+        n_held = self.decisions["n_held"].to_numpy()
         for number, runs in self.runs.items():
-            event, ordered = self.answered.loc[number], sorted(runs, key=lambda run: -RANKED_KINDS.index(run.kind))
-            if event["kind"] == FAULT:
-                continue
-            for run in ordered:
+            event = self.answered.loc[number]
+            for run in sorted(runs, key=lambda run: -RANKED_KINDS.index(run.kind)):
                 rows = np.arange(run.first, run.stop)
-                is_calm = np.zeros(len(rows), dtype=bool)
-                if event["acknowledged"]:
-                    of_kind = [one for one in runs if one.kind == run.kind]
-                    reached = event["at"] + 30 * DAY.value * (run.kind == DRIFT)
-                    before = [one.level[self.times[one.first : one.stop] <= reached] for one in of_kind]
-                    most = 1.5 * np.fmax.reduce(np.concatenate(before), initial=-np.inf)
-                    is_calm = (self.times[rows] >= event["at"]) & ~(run.level > (most if most > 0 else np.inf))
-                rank = STATES.index({DAMAGE: "alarm", DRIFT: "drift", WATCH: "watch"}[run.kind])
-                higher = ~is_calm & (rank <= ranks[rows])
-                ranks[rows[higher]], numbers[rows[higher]] = rank, number
+                is_said = event["acknowledged"] & (self.times[rows] >= event["at"])
+                if run.kind == FAULT:
+                    numbers[rows[numbers[rows] == 0]] = number
+                    if (n_held[rows] > 0).any():
+                        is_set_aside[rows] = True
+                        is_unexplained[rows] |= ~(is_said & event["harmless"])
+                    continue
+                until = event["at"] + 30 * DAY.value * (run.kind == DRIFT)
+                of_kind = [one for one in runs if one.kind == run.kind]
+                before = [one.level[self.times[one.first : one.stop] <= until] for one in of_kind]
+                most = 1.5 * np.fmax.reduce(np.concatenate(before), initial=-np.inf)
+                is_calm = is_said & ~(run.level > (most if most > 0 else np.inf))
+                higher = rows[~is_calm & (RANKED_KINDS.index(run.kind) <= ranks[rows])]
+                ranks[higher], numbers[higher] = RANKED_KINDS.index(run.kind), number
             if event["acknowledged"] and not event["harmless"] and event["kind"] in (DAMAGE, DRIFT):
                 later = self.starts[self.starts > self.times[runs[0].first]]
                 known = (self.times >= event["at"]) & (self.times < (later.min() if len(later) else np.inf))
                 ranks[known] = np.minimum(ranks[known], STATES.index("known damage"))
-        shown = ranks < len(STATES)
-        states[shown] = np.array(STATES, dtype=object)[ranks[shown]]
-        return states, numbers
-
-    def set_aside(self, number: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Whether each record is in an event of responses that were set aside which nobody has explained, or in any.
-
-        Records without another event get the numbers of faults in ``number``, in its place.
-        """
-        is_unexplained, is_set_aside = np.zeros((2, len(self.times)), dtype=bool)
-        for place, run in ((place, run) for place, runs in self.runs.items() for run in runs if run.kind == FAULT):
-            rows = np.arange(run.first, run.stop)
-            number[rows[number[rows] == 0]] = place
-            if (self.decisions["n_held"].to_numpy()[rows] > 0).any():
-                is_set_aside[rows] = True
-                is_harmless, at = self.answered.loc[place, ["harmless", "at"]]
-                is_over = bool(is_harmless) & (self.times[rows] >= at)
-                is_unexplained[rows] |= ~is_over
-        return is_unexplained, is_set_aside
+        table = {"state": np.array([*STATES, "healthy"], dtype=object)[ranks], "event": numbers}
+        table |= {"is_unexplained": is_unexplained, "is_set_aside": is_set_aside}
+        return pd.DataFrame(table, self.decisions.index).astype({"state": object})
 
     @cached_property
     def evaluations(self) -> pd.DataFrame:
         """State, event and what drives it of each record."""
-        standing, number = self.standing()
-        is_unexplained, is_set_aside = self.set_aside(number)
         decisions = self.decisions
+        standing, number, is_unexplained, is_set_aside = (self.standing[name].to_numpy() for name in self.standing)
         index, n_held = decisions["index"].to_numpy(), decisions["n_held"].to_numpy()
         is_held, has_index = (n_held > 0) | decisions["is_blind"].to_numpy() | is_unexplained, ~np.isnan(index)
         is_raised = has_index & np.isin(standing, ["alarm", "drift", "watch"])
@@ -400,14 +366,13 @@ class Events:
 
 def with_acknowledgements(events: pd.DataFrame, said: pd.DataFrame) -> pd.DataFrame:
     """Events with the owner's last answer to each, found by its kind and time, and ``at`` which record it was given."""
-    answers = [(False, False, "", 0)] * (len(events) if said.empty else 0)
-    for event in events.itertuples() if len(said) else ():
+    answers = []
+    for event in events.itertuples():
         end = np.inf if pd.isna(event.end) else event.end.value
         own = said[(said["kind"] == event.kind) & (said["time"] >= event.start.value) & (said["time"] < end)]
         answers.append((True, *own[["harmless", "note", "at"]].iloc[-1]) if len(own) else (False, False, "", 0))
-    dtypes = {"acknowledged": bool, "harmless": bool, "note": object, "at": np.int64}
-    columns = zip(dtypes, zip(*answers, strict=True) if answers else [()] * len(dtypes), strict=True)
-    return events.assign(**{name: pd.Series(list(some), events.index, dtypes[name]) for name, some in columns})
+    types = {"acknowledged": bool, "harmless": bool, "note": object, "at": np.int64}
+    return events.join(table_of(answers, types, events.index))
 
 
 def blocks_of(times: pd.DatetimeIndex, length: pd.Timedelta = 7 * DAY) -> NDArray[np.intp]:
@@ -616,13 +581,13 @@ class SmallestChanges(SavesFrames):
         threshold: float,
         within: pd.Timedelta,
         share_above: float,
-        losses: pd.DataFrame | None = None,
+        groups: pd.DataFrame | None = None,
         steps: Sequence[float] = (0.0, 0.5, 2.0, 5.0),
     ) -> SmallestChanges:
         """Falls by which a share of the indices, ``index_of`` records in order of time, is above a threshold.
 
-        ``losses`` are relative changes of the responses, in their order, by the loss of each damage group that moves a
-        record by one standard deviation; their column ``"loss"`` is that loss. ``steps`` are in standard deviations.
+        ``groups`` are relative changes of the responses, in their order, by a whole loss of each damage group, which
+        moves a record by its ``"sensitivity"`` in standard deviations. ``steps`` are in these, too.
         """
         some = whole_weeks(records, 1000)
         responses = some[list(names)]
@@ -633,9 +598,9 @@ class SmallestChanges(SavesFrames):
         if is_relative:
             share = float(np.median(shares))
             changes["common", ""] = share, {name: share * responses[name] for name in names}
-        for group, row in (pd.DataFrame() if losses is None else losses).iterrows():
-            falls = -row.drop("loss").to_numpy() * responses
-            changes["groups", group] = float(row["loss"]), {name: falls[name] for name in names}
+        for group, row in () if groups is None else groups[groups["sensitivity"] > 0].iterrows():
+            falls = -row.iloc[: len(names)].to_numpy(dtype=float) / row["sensitivity"] * responses
+            changes["groups", group] = float(1 / row["sensitivity"]), {name: falls[name] for name in names}
         start, found = index_of(some), {"single": {}, "common": {}, "groups": {}}
         for (kind, name), (size, falls) in changes.items():
             by_step = ({one: step * fall for one, fall in falls.items()} for step in steps[1:])

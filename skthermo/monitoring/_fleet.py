@@ -12,7 +12,6 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -40,15 +39,14 @@ from skthermo.monitoring._events import times_exceeded
 from skthermo.monitoring._monitor import Monitor
 from skthermo.monitoring._status import MonitorStatus
 
-Fitted = tuple[Any, Monitor | None]  # an estimator and the monitor of its bridge
-
 
 @dataclass(frozen=True)
 class KnownBridge:
-    """All that is known of a bridge beside its fitted objects.
+    """All that is known of a bridge, and where its fitted objects are.
 
     ``content`` identifies the records, the estimator and the versions by which it was fitted. ``warnings`` have stage,
-    kind, message and number, ``errors`` have stage, type and text, and place.
+    kind, message and number, ``failure`` has stage, type and text, and place. ``kept`` are the estimator and the
+    monitor, the file that holds them, or a mapping that gives the monitor by the name of the bridge.
     """
 
     name: Hashable
@@ -58,11 +56,20 @@ class KnownBridge:
     events: pd.DataFrame | None = None
     status: MonitorStatus | None = None  # at the time of the newest record; None without a monitor
     warnings: tuple[tuple[str, str, str, int], ...] = ()
-    errors: tuple[tuple[str, str, str], ...] = ()
+    failure: tuple[str, str, str] = ("", "", "")
+    kept: Any = (None, None)
 
     @property
     def error(self) -> str:
-        return "; ".join(text for _, text, _ in self.errors)
+        return self.failure[1]
+
+    def opened(self) -> tuple[Any, Monitor | None]:
+        """The estimator and the monitor; they come after the facts in a file."""
+        if isinstance(self.kept, Path):
+            with open(self.kept, "rb") as content:
+                pickle.load(content)
+                return pickle.load(content)
+        return (None, self.kept[self.name]) if isinstance(self.kept, Mapping) else self.kept
 
     def status_at(self, now: Any = None, max_age: Any = None) -> MonitorStatus:
         """Status at a time; nothing is healthy whose newest records failed."""
@@ -70,7 +77,7 @@ class KnownBridge:
             return MonitorStatus("not evaluated", self.error or "there is no monitor").at(now)
         status = self.status.at(now, max_age=max_age)
         state = status.state if status.state in ("alarm", "drift") else "not evaluated"
-        return replace(status, state=state, reason=self.error) if self.errors else status
+        return replace(status, state=state, reason=self.error) if self.error else status
 
     @property
     def state(self) -> str:
@@ -99,7 +106,7 @@ class KnownBridge:
         """The bridge as it was, with an error and the line of code that raised it."""
         places = traceback.extract_tb(error.__traceback__)[-1:]
         where = "".join(f"{Path(one.filename).name}:{one.lineno} in {one.name}" for one in places)
-        return replace(self, errors=((stage, f"{type(error).__name__}: {error}", where),))
+        return replace(self, failure=(stage, f"{type(error).__name__}: {error}", where))
 
     def warned(self, stage: str, found: Iterable[SkthermoWarning]) -> KnownBridge:
         """The bridge with the warnings of a stage in place of earlier ones."""
@@ -110,9 +117,9 @@ class KnownBridge:
 
 def fit_bridge(
     known: KnownBridge, maker: Any, records: Any, monitor: Callable[[Any], Monitor] | None, seed: int, keeps: bool
-) -> tuple[KnownBridge, Fitted | None]:
-    """Fit a bridge and its monitor, unless the same was fitted before; no fitted objects where all is as it was."""
-    start, stage, bridge, fitted = time.perf_counter(), "records", KnownBridge(known.name), None
+) -> KnownBridge:
+    """Fit a bridge and its monitor, unless the same was fitted before."""
+    start, stage, bridge = time.perf_counter(), "records", KnownBridge(known.name)
     with single_blas_thread(), collected() as found:
         try:
             T, F = called(records)
@@ -123,43 +130,43 @@ def fit_bridge(
             content = [versions, estimator, as_new(T), as_new(F), by_value(monitor)]
             content = str(joblib.hash(content, coerce_mmap=True)) if keeps else ""
             if keeps and content == known.content:
-                return replace(known, errors=()), None
+                return replace(known, failure=bridge.failure)
             stage, chain = "fit", estimator.fit(T, F)
             errors = chain.report_.modes["MAPE"] if hasattr(chain, "report_") else mape(np.asarray(F), chain.predict(T))
             missing = np.concatenate([pd.isna(np.asarray(table)).ravel() for table in (T, F)])
             facts = {"n_records": len(F), "gaps": missing.mean(), "mape": float(np.mean(errors))}
-            bridge, fitted = replace(bridge, content=content, is_fitted=True, facts=facts), (chain, None)
+            bridge = replace(bridge, content=content, is_fitted=True, facts=facts, kept=(chain, None))
             if monitor is not None:
                 stage = "monitor"
                 watch = monitor(chain)
                 seed_parts(watch, np.random.RandomState(seed))
                 watch.fit(pd.concat([T, F], axis=1))
-                bridge, fitted = bridge.after(watch), (chain, watch)
+                bridge = replace(bridge.after(watch), kept=(chain, watch))
         except Exception as error:
             if stage in ("records", "maker") and known.is_fitted:
-                return known.failed(stage, error), None
+                return known.failed(stage, error)
             bridge = replace(bridge, content="").failed(stage, error)
     bridge = replace(bridge, facts=bridge.facts | {"seconds": time.perf_counter() - start})
-    return bridge.warned("fit", found), fitted
+    return bridge.warned("fit", found)
 
 
-def update_bridge(known: KnownBridge, kept: Any, records: Any) -> tuple[KnownBridge, Fitted | None, pd.DataFrame]:
+def update_bridge(known: KnownBridge, records: Any) -> tuple[KnownBridge, pd.DataFrame]:
     """Evaluate new records of a bridge by its monitor."""
-    stage, fitted = "new records", None
+    stage = "new records"
     with single_blas_thread(), collected() as found:
         try:
             new = called(records)
             new, stage = pd.concat(new, axis=1) if isinstance(new, tuple) else new, "update"
-            chain, monitor = opened(kept, known.name)
+            chain, monitor = known.opened()
             if monitor is None:
                 raise ValueError("the bridge has no monitor; expected fit_fleet(..., monitor=function of a chain)")
             answers = monitor.update(new).rename_axis("time").reset_index()
-            bridge, fitted = replace(known, errors=()).after(monitor), (chain, monitor)
+            bridge = replace(known.after(monitor), failure=("", "", ""), kept=(chain, monitor))
         except Exception as error:
             bridge = known.failed(stage, error)
             row = {"time": pd.NaT, "state": "not evaluated", "index": np.nan, "reason": bridge.error, "event": 0}
             answers = pd.DataFrame([row | {"revised": False}])
-    return bridge.warned("update", found), fitted, labelled(known.name, answers)
+    return bridge.warned("update", found), labelled(known.name, answers)
 
 
 def labelled(bridge: Hashable, table: pd.DataFrame) -> pd.DataFrame:
@@ -179,20 +186,11 @@ def by_value(thing: Any) -> bytes:
     return pickle.dumps(wrap_non_picklable_objects(thing, keep_wrapper=False))
 
 
-def opened(kept: Any, name: Hashable) -> Fitted:
-    """The fitted objects of a bridge: as they are, from its file after the facts, or its monitor from a mapping."""
-    if isinstance(kept, Path):
-        with open(kept, "rb") as content:
-            pickle.load(content)
-            return pickle.load(content)
-    return (None, kept[name]) if isinstance(kept, Mapping) else kept
-
-
 def read_known(file: Path) -> KnownBridge:
     """What a file holds first; one that cannot be read is a bridge that is not fitted."""
     try:
         with open(file, "rb") as content:
-            return pickle.load(content)
+            return replace(pickle.load(content), kept=file)
     except Exception as error:  # damaged files raise errors of every type
         return KnownBridge(file.stem).failed("reading its file", error)
 
@@ -306,13 +304,14 @@ def fit_fleet(
             delayed(fit_bridge)(before[name], maker, records[name], monitor, seed_of(base, name), path is not None)
             for name, maker in estimators.items()
         )
-        for known, fitted in in_turn(jobs, len(before), n_jobs, progress):
-            if before[known.name].facts.get("n_evaluated") and fitted is not None:
+        for known in in_turn(jobs, len(before), n_jobs, progress):
+            is_new = known.is_fitted and isinstance(known.kept, tuple)
+            if before[known.name].facts.get("n_evaluated") and is_new:
                 file = file_of(path, known.name)
                 file.replace(file.with_suffix(".replaced"))
                 restarted.append(known.name)
-            if fitted is not None or known.errors != before[known.name].errors:
-                fleet._put(known, fitted)
+            if is_new or known.failure != before[known.name].failure:
+                fleet._put(known)
     findings = list(fleet._findings(list(estimators), "fit"))
     if restarted:
         text = (
@@ -392,9 +391,7 @@ class Fleet:
     """
 
     def __init__(self, folder: str | os.PathLike[str]):
-        self._folder: Path | None = check_path(folder, "folder")
-        self._known: dict[Hashable, KnownBridge] = {}
-        self._kept: dict[Hashable, Any] = {}
+        self._folder, self._known = check_path(folder, "folder"), {}
         self._read()
         if not self._known:
             raise ValueError(f"the folder {str(folder)!r} holds no bridge; expected the folder of a fit_fleet")
@@ -403,7 +400,7 @@ class Fleet:
     def _in(cls, folder: Path | None) -> Fleet:
         """A fleet in memory, or in a folder that may be empty."""
         fleet = cls.__new__(cls)
-        fleet._folder, fleet._known, fleet._kept = folder, {}, {}
+        fleet._folder, fleet._known = folder, {}
         fleet._read()
         return fleet
 
@@ -411,19 +408,15 @@ class Fleet:
         """Read what the folder holds."""
         for file in sorted(self._folder.glob("*.bridge")) if self._folder else ():
             known = read_known(file)
-            self._known[known.name], self._kept[known.name] = known, file
+            self._known[known.name] = known
 
-    def _put(self, known: KnownBridge, fitted: Fitted | None) -> None:
-        """Keep what is known of a bridge; without fitted objects, they stay what they are."""
-        name = known.name
-        self._known[name] = known
+    def _put(self, known: KnownBridge) -> None:
+        """Keep a bridge, in its file if there is a folder."""
         if self._folder is not None:
-            if fitted is None and known.is_fitted:
-                fitted = opened(self._kept[name], name)
-            self._kept[name] = file_of(self._folder, name)
-            write_when_complete(self._kept[name], pickle.dumps(known) + by_value(fitted))
-        elif fitted is not None:
-            self._kept[name] = fitted
+            file = file_of(self._folder, known.name)
+            write_when_complete(file, pickle.dumps(replace(known, kept=None)) + by_value(known.opened()))
+            known = replace(known, kept=file)
+        self._known[known.name] = known
 
     @classmethod
     def of_monitors(
@@ -454,8 +447,7 @@ class Fleet:
         fleet = cls._in(None)
         for name, monitor in monitors.items():
             facts = {"n_records": len(monitor.baseline_)}
-            fleet._known[name] = KnownBridge(name, is_fitted=True, facts=facts).after(monitor)
-            fleet._kept[name] = monitors
+            fleet._known[name] = KnownBridge(name, is_fitted=True, facts=facts, kept=monitors).after(monitor)
         for name, error in (errors or {}).items():
             fleet._known[name] = fleet._known.get(name, KnownBridge(name)).failed("update", error)
         if not fleet._known:
@@ -471,17 +463,15 @@ class Fleet:
     @property
     def chains(self) -> Mapping[Hashable, BaseEstimator]:
         """Fitted estimators by name, read when asked for."""
-        fitted = [name for name, one in self._known.items() if one.is_fitted]
-        return ReadWhenAsked({name: partial(self._object, name, 0) for name in fitted})
+        return self._opened(0, [one for one in self._known.values() if one.is_fitted])
 
     @property
     def monitors(self) -> Mapping[Hashable, Monitor]:
         """Monitors by name, read when asked for."""
-        watched = [name for name, one in self._known.items() if one.status is not None]
-        return ReadWhenAsked({name: partial(self._object, name, 1) for name in watched})
+        return self._opened(1, [one for one in self._known.values() if one.status is not None])
 
-    def _object(self, name: Hashable, part: int) -> Any:
-        return opened(self._kept[name], name)[part]
+    def _opened(self, place: int, known: Iterable[KnownBridge]) -> Mapping[Hashable, Any]:
+        return ReadWhenAsked({one.name: lambda one=one: one.opened()[place] for one in known})
 
     @property
     def table(self) -> pd.DataFrame:
@@ -521,7 +511,7 @@ class Fleet:
     @property
     def errors(self) -> pd.DataFrame:
         """What failed."""
-        rows = [(name, *one) for name, known in self._known.items() for one in known.errors]
+        rows = [(name, *one.failure) for name, one in self._known.items() if one.error]
         return pd.DataFrame(rows, columns=["bridge", "stage", "error", "where"])
 
     def update(
@@ -573,12 +563,9 @@ class Fleet:
         answers: dict[Hashable, pd.DataFrame] = {}
         with only_user(self._folder):
             self._read()  # another process may have updated the folder since
-            jobs = (
-                delayed(update_bridge)(self._known[name], self._kept.get(name, (None, None)), new)
-                for name, new in records.items()
-            )
-            for known, fitted, one in in_turn(jobs, len(records), n_jobs, progress):
-                self._put(known, fitted)
+            jobs = (delayed(update_bridge)(self._known[name], new) for name, new in records.items())
+            for known, one in in_turn(jobs, len(records), n_jobs, progress):
+                self._put(known)
                 answers[known.name] = one
         warn_each(self._findings(list(records), "update"))
         tables = [answers[name] for name in records if len(answers[name])]
@@ -611,10 +598,10 @@ class Fleet:
                 f"{bridge!r:.100} is no bridge with a monitor; expected one of {list(self.monitors)!r:.200}"
             )
         with only_user(self._folder):
-            self._read()
-            chain, monitor = opened(self._kept[bridge], bridge)
+            self._read()  # another process may have updated the folder since
+            chain, monitor = self._known[bridge].opened()
             monitor.acknowledge(event, harmless=harmless, note=note)
-            self._put(self._known[bridge].after(monitor), (chain, monitor))
+            self._put(replace(self._known[bridge].after(monitor), kept=(chain, monitor)))
 
     def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> dict[Hashable, MonitorStatus]:
         """The state of each bridge at a time, and the facts behind it, for machines.
@@ -693,7 +680,7 @@ class Fleet:
 
     def _findings(self, asked: list[Hashable], stage: str) -> Iterator[SkthermoWarning]:
         """One finding of all bridges that failed or warned."""
-        failed = [name for name in asked if self._known[name].errors]
+        failed = [name for name in asked if self._known[name].error]
         warned = self.warnings
         warned = warned[warned["bridge"].isin(asked) & (warned["stage"] == stage)]
         parts = []

@@ -14,8 +14,8 @@ from scipy import stats
 from skthermo._core.arrays import Array, median, robust_deviation
 from skthermo._core.frames import days_later, midnights
 from skthermo._core.saved_frames import SavesFrames
-from skthermo.monitoring._evaluation import directions_of, joined_names, scales_of, sensitivities_of
-from skthermo.monitoring._events import leading
+from skthermo.monitoring._evaluation import DetectorParts
+from skthermo.monitoring._events import leading, table_of
 from skthermo.residuals.cones import project_on_cones
 from skthermo.residuals.mean_errors import MeanErrors, chance_of
 
@@ -41,32 +41,28 @@ class MeanTest(SavesFrames):
     @classmethod
     def learned(
         cls,
-        residuals: pd.DataFrame,
-        detector: Any,
-        trained: pd.DataFrame,
+        parts: DetectorParts,
         per_year: float,
         since: pd.Timestamp | None = None,
         crossings: float = 16.0,
     ) -> MeanTest:
-        """From residuals of a baseline, out of fold, for so many false alarms a year.
+        """From out-of-fold residuals of what a detector was trained on, for so many false alarms a year.
 
         The days ``since`` an intervention alone tell the level after it.
 
         A level that a mean exceeds with probability p is exceeded in about 16 p events a year, as means of neighbouring
         weeks share most of their days: measured with independent and with correlated residuals of three and six modes.
         """
-        names, days = list(residuals.columns), midnights(residuals.index)
-        means = residuals.groupby(days).mean()
-        directional, directions, joined = directions_of(detector), None, {}
-        if directional is not None:
-            joined = joined_names(directional)
-            directions = directional.directions_.loc[list(sensitivities_of(directional).index)]
+        rest, groups = parts.residuals(parts.trained, is_baseline=True), parts.groups
+        means = rest.groupby(midnights(rest.index)).mean()
         is_long = means.notna().any(axis=1).sum() >= 12 * cls.n_days / 2  # each of a dozen parts tells of half a mean
         errors = MeanErrors.learned(means.to_numpy()) if is_long else None
         if errors is not None and since is not None:
             n_own = np.maximum(means[means.index >= since].count().to_numpy() / errors.for_one, 1.0)
             errors = replace(errors, n_trained=np.minimum(errors.n_trained, n_own))
-        return cls(errors, per_year / crossings, names, scales_of(detector, names, trained), directions, joined)
+        directions = None if groups is None else groups.drop(columns=["sensitivity", "joined"])
+        joined = {} if groups is None else groups["joined"].to_dict()
+        return cls(errors, per_year / crossings, parts.targets, parts.scales, directions, joined)
 
     def weeks(self, means: pd.DataFrame, times: Sequence[pd.Timestamp]) -> pd.DataFrame:
         """A row for each of some times, by daily means of residuals before it.
@@ -77,16 +73,13 @@ class MeanTest(SavesFrames):
         groups = list(dict.fromkeys(self.joined.values()))
         columns = [f"departure {name}" for name in self.names]
         columns += [f"{what} {group}" for what in ("effect", "loss") for group in groups]
-        rows = [self._tested(means, time) for time in times]
-        numbers = [[level, p_value, *values] for level, p_value, _, values in rows]
+        types = dict.fromkeys(["level", "p_value", *columns], float) | {"modes": object}
         index = pd.DatetimeIndex(times) if len(times) else means.index[:0]
-        table = pd.DataFrame(np.reshape(numbers, (len(rows), 2 + len(columns))), index, ["level", "p_value", *columns])
-        return table.assign(modes=np.array([modes for _, _, modes, _ in rows], dtype=object)).astype({"modes": object})
+        return table_of([self._tested(means, time) for time in times], types, index)
 
-    def _tested(self, means: pd.DataFrame, time: pd.Timestamp) -> tuple[float, float, str, list[float]]:
-        """Level, probability, modes, and what the mean of the days before a time departs by."""
-        n_groups = len(set(self.joined.values()))
-        nothing = np.nan, np.nan, "", [0.0] * (len(self.names) + 2 * n_groups)
+    def _tested(self, means: pd.DataFrame, time: pd.Timestamp) -> list[Any]:
+        """Level, probability, what the mean of the days before a time departs by, and modes."""
+        nothing = [np.nan, np.nan, *[0.0] * (len(self.names) + 2 * len(set(self.joined.values()))), ""]
         days = means[(means.index >= days_later(time, -self.n_days)) & (means.index < time)].to_numpy()
         if self.errors is None or 2 * (~np.isnan(days).all(axis=1)).sum() < self.n_days:
             return nothing
@@ -108,9 +101,8 @@ class MeanTest(SavesFrames):
         departures, sizes = np.zeros(len(some)), np.round(np.abs(mean) / np.sqrt(np.diag(covariance)), 2)
         departures[some] = np.round(mean / self.scales[some], 4)
         modes = leading(dict(zip(np.array(self.names, dtype=object)[some], sizes, strict=True)))
-        values = [*departures, *self._explained(root, white, some)]
         level, p_value = np.sqrt(squared / limit), chance_of(squared, n_free, freedom)
-        return float(np.round(level, 6)), float(np.round(p_value, 6)), modes, values
+        return [np.round(level, 6), np.round(p_value, 6), *departures, *self._explained(root, white, some), modes]
 
     def _explained(self, root: Array, white: Array, some: NDArray[np.bool_]) -> list[float]:
         """Effects of the groups in standard errors of the mean, then their losses; none where they explain less than

@@ -34,21 +34,17 @@ from skthermo._core.frames import (
     usual_step,
 )
 from skthermo._core.saved_frames import SavesFrames
+from skthermo._core.text import plain
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.monitoring._corrections import Corrections
 from skthermo.monitoring._evaluation import (
+    DetectorParts,
     blind_findings,
     causes,
-    departures,
-    group_effects,
-    index_of,
-    losses_of,
     outages_of,
     refuse_other_batches,
-    residuals,
     rounded,
-    window_of,
 )
 from skthermo.monitoring._events import (
     FAULT,
@@ -59,15 +55,17 @@ from skthermo.monitoring._events import (
     leading,
     lowered,
     rule_of,
+    table_of,
 )
 from skthermo.monitoring._files import acknowledgements_in, versions, write_monitor
 from skthermo.monitoring._means import MeanTest
 from skthermo.monitoring._records import (
     OF_TRAINING,
-    Intake,
     Lookback,
+    compensators_of,
     read_records,
     refuse_other_units,
+    sorted_out,
     usable_baseline,
     without_what_cannot_be,
     without_wrong_clocks,
@@ -215,6 +213,8 @@ class Monitor(SavesFrames, Estimator):
         Records that are set aside, because they are stamped too far ahead.
     tallies_ : dict
         Numbers of repeated, late and too late records.
+    drifts_ : DataFrame
+        Share of stiffness of each group, "drift GROUP", that was taken out of the records of each day.
     corrections_, states_, began_ : object, tuple and Timestamp
         Checks of sensors and drift; what they knew at the beginning of each of the last days; and their first day.
 
@@ -331,9 +331,9 @@ class Monitor(SavesFrames, Estimator):
             }
         ).astype(np.int64)
         day = midnights(answers.index).rename("day")
-        index, drift = (one.groupby(day) for one in (answers["index"], self.decisions_.filter(regex="^drift ")))
+        index = answers["index"].groupby(day)
         table = table.groupby(day).sum().assign(index_median=index.median(), index_max=index.max())
-        return table.join(drift.first())
+        return table.join(self.drifts_)
 
     @property
     def counts_(self) -> dict[str, int]:
@@ -434,18 +434,19 @@ class Monitor(SavesFrames, Estimator):
                 f"{len(again)} stamps of the baseline are there twice, the first {again[0]}; expected once"
             )
         with collected() as findings:
-            baseline, detector, columns, found = usable_baseline(self, given)
+            baseline, detector, targets, units, found = usable_baseline(self, given)
             seed_parts(detector, seeded(self.random_state))
             self.columns_, self.left_out_, aside = list(given.columns), found.left_out, found.table
-            self.targets_, self.units_, self.reference_ = columns.targets, columns.units, columns.reference
+            self.targets_, self.units_ = targets, units
+            self.reference_ = [name for name in baseline if name in (self.reference or [])]
             self.set_aside_ = aside[~aside["column"].isin(list(self.left_out_))].reset_index(drop=True)
             self.baseline_, self.prior_, self.since_ = baseline, None, None
-            trained = baseline if not columns.reference else baseline[columns.inputs]
-            self.features_ = columns.seen(detector)
+            trained = baseline.drop(columns=self.reference_) if self.reference_ else baseline
+            self.features_ = list(trained) if compensators_of(detector) else targets
             detector.fit(trained[self.features_])
         findings += [*of_clocks, *self._take_charge(detector, trained)]
-        refuse_other_batches(detector, self.features_, trained, self.lookback_)
-        findings += blind_findings(detector, self.features_, trained, self.targets_, self.lookback_, self.threshold_)
+        refuse_other_batches(self._index, trained, self.lookback_)
+        findings += blind_findings(self._index, trained, self.targets_, self.lookback_, self.threshold_)
         self._begin_service(self.fem)
         self.versions_ = versions()
         warn_each(findings)
@@ -457,12 +458,12 @@ class Monitor(SavesFrames, Estimator):
         self.records_ = self.ahead_ = nothing
         self.corrected_ = nothing.drop(columns=self.reference_)
         self.means_, self.transitions_ = nothing[self.targets_], ()
-        kinds = {"kind": object, "time": np.int64, "at": np.int64, "harmless": bool, "note": object}
-        said = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
+        said = table_of([], {"kind": object, "time": np.int64, "at": np.int64, "harmless": bool, "note": object})
         weeks = self.mean_test_.weeks(self.means_, ())
         self._tell(decisions_=self._decisions(nothing.index), weeks_=weeks, acknowledgements_=said, restarts_=())
         self.tallies_ = dict.fromkeys(("n_repeated", "n_late", "n_too_late"), 0)
         self._begin_corrections(self.baseline_, fem)
+        self.drifts_ = self.corrections_.drifts(self.states_)[:0]
 
     def _begin_corrections(self, baseline: pd.DataFrame, fem: Any) -> None:
         """Watch sensors and drift anew, from the newest day on."""
@@ -478,12 +479,10 @@ class Monitor(SavesFrames, Estimator):
         if self.lookback is not None:
             self.lookback_ = Lookback(0, check_duration(self.lookback, "lookback"))
         index = pd.Series(last_step(detector).baseline_index_, trained.index)
-        baseline = residuals(detector, trained, self.targets_, trained, is_baseline=True)
-        slow = 0.25  # of the false alarms that are asked for
-        test = MeanTest.learned(baseline, detector, trained, slow * self.false_alarms_per_year, self.since_)
-        share = 1.0 if test.errors is None else 1 - slow
+        parts, slow = self._parts, 0.25  # of the false alarms that are asked for
+        self.mean_test_ = MeanTest.learned(parts, slow * self.false_alarms_per_year, self.since_)
+        share = 1.0 if self.mean_test_.errors is None else 1 - slow
         levels = EventLevels.learned(index, self.false_alarms_per_year, self.persistence, share)
-        self.mean_test_ = test
         self.threshold_, self.clear_threshold_ = levels.threshold, levels.release
         self.false_alarm_estimate_, self.baseline_peaks_ = levels.estimate, levels.peaks
         self.watch_threshold_ = None
@@ -492,16 +491,21 @@ class Monitor(SavesFrames, Estimator):
             self.watch_threshold_ = min(watch.threshold, self.threshold_)
         step = usual_step(trained.index)
         number, among = rule_of(self.persistence)
-        window = window_of(detector) if self.lookback is None else self.lookback_
+        window = parts.window() if self.lookback is None else self.lookback_
         within, share_above = window.duration(step) + among * step, (number - 0.5) / among
         self.smallest_changes_ = SmallestChanges.measured(
-            self._index, trained, self.targets_, self.threshold_, within, share_above, losses_of(detector)
+            self._index, trained, self.targets_, self.threshold_, within, share_above, parts.groups
         )
         return list(levels.findings(self.smallest_changes_))
 
     def _index(self, records: pd.DataFrame) -> Array:
         """Damage indices of records in order of time, by the detector in charge."""
-        return index_of(self.detector_, self.features_, records)
+        with collected(drop_others=True):  # the reason of each record stands for a warning of the detector
+            return -np.asarray(self.detector_.score_samples(records[self.features_]), dtype=float)
+
+    @property
+    def _parts(self) -> DetectorParts:
+        return DetectorParts(self.detector_, self.targets_, self.trained_)
 
     def _twin(self) -> Monitor:
         """A monitor that stands as this one, to be changed in its place: an error leaves this one as it was."""
@@ -544,15 +548,14 @@ class Monitor(SavesFrames, Estimator):
         restarts = self.restarts_
         if restarts:  # records that the detector of a new baseline evaluates are in no event from before
             restarts = (*restarts[:-1], min(restarts[-1], first.as_unit("ns").value))
-        drifts = self.corrections_.drifts(states, raw.index)
-        drifts = pd.concat([self._drifts_before(begin.day, drifts), drifts])
+        before = self.drifts_[self.drifts_.index < begin.day]
+        self.drifts_ = pd.concat([before, self.corrections_.drifts(states)])
         states = [*(one for one in earlier if one.day < begin.day), *states]
         n_old = sum(one.day <= self.last_ - check_duration(self.max_delay, "max_delay") for one in states)
         self.states_ = tuple(states[max(n_old - 1, 0) :])
-        raw = self.records_[self.records_.index >= first]
-        seen, notes = self._corrected(raw, drifts)
+        seen, notes = self._corrected(self.records_[self.records_.index >= first])
         self.corrected_ = pd.concat([self.corrected_[self.corrected_.index < first], seen])
-        new = self._decided(first, notes, drifts)
+        new = self._decided(first, notes)
         weeks = self.weeks_[self.weeks_.index <= first]
         weeks = pd.concat([weeks, self.mean_test_.weeks(self.means_, self._test_times(weeks.index))])
         decisions = pd.concat([self.decisions_[self.decisions_.index < first], new])
@@ -560,20 +563,16 @@ class Monitor(SavesFrames, Estimator):
         self._explain(first)
         return first
 
-    def _drifts_before(self, time: pd.Timestamp, like: pd.DataFrame) -> pd.DataFrame:
-        """Shares of stiffness that were taken out of records before a time."""
-        return self.decisions_[self.decisions_.index < time].reindex(columns=list(like))
-
     def _faults_of(self, state: Any) -> Sequence[Any]:
         return () if state.sensors is None else state.sensors.faults
 
-    def _corrected(self, raw: pd.DataFrame, drifts: pd.DataFrame, **options: bool) -> tuple[pd.DataFrame, pd.DataFrame]:
+    def _corrected(self, raw: pd.DataFrame, **options: bool) -> tuple[pd.DataFrame, pd.DataFrame]:
         """Records as the detector sees them by all that is known now, and what became of their values."""
         said = self.acknowledgements_[self.acknowledgements_["kind"] == FAULT].drop_duplicates("time", keep="last")
         at, faults = said["at"][said["harmless"]].tolist(), self._faults_of(self.states_[-1])
-        return self.corrections_.corrected(faults, raw, drifts.loc[raw.index], at, **options)
+        return self.corrections_.corrected(faults, raw, self.drifts_, at, **options)
 
-    def _decided(self, first: pd.Timestamp, notes: pd.DataFrame, drifts: pd.DataFrame) -> pd.DataFrame:
+    def _decided(self, first: pd.Timestamp, notes: pd.DataFrame) -> pd.DataFrame:
         """Decisions on the records from a stamp on, but for what explains an event."""
         n_before = self.corrected_.index.searchsorted(first)
         records, place = self._with_memory(n_before)
@@ -595,13 +594,12 @@ class Monitor(SavesFrames, Estimator):
         said = [causes(new, self.targets_, temperatures, index, self._outages(), regime), notes["note"]]
         said += [np.where(rows, text, "") for text, rows in remarks.items()]
         reason = ["; ".join(filter(None, parts)) for parts in zip(*said, strict=True)]
-        then = self._index_then(records, place, index, drifts)
+        then = self._index_then(records, place, index)
         columns = {"index": index, "index_then": then, "is_blind": np.asarray(is_blind), "reason": reason}
         if self.mean_test_.errors is not None:
-            rest = residuals(self.detector_, records[self.features_], self.targets_, self.trained_).iloc[place:]
+            rest = self._parts.residuals(records[self.features_]).iloc[place:]
             rest = rest[~is_outside]
-            if self.corrections_.drift is not None:  # what is taken out of the frequencies counts
-                rest = rest + self.corrections_.drift.shifts(drifts.loc[rest.index], self.targets_)
+            rest = rest + self.corrections_.shifts(self.drifts_, rest.index)  # what is taken out counts
             means = rest.groupby(midnights(rest.index)).mean()
             self.means_ = pd.concat([self.means_[self.means_.index < first], means])
         return self._decisions(new.index, **columns, **notes.drop(columns="note"))
@@ -612,11 +610,10 @@ class Monitor(SavesFrames, Estimator):
         times = self.baseline_.index[-1:].append(self.corrected_.index[known])
         return outages_of(times, step, self.lookback_.duration(step))
 
-    def _index_then(self, records: pd.DataFrame, place: int, index: Array, drifts: pd.DataFrame) -> Array:
+    def _index_then(self, records: pd.DataFrame, place: int, index: Array) -> Array:
         """Damage indices as they were before sensors at fault had been found."""
         raw = self.records_[self.records_.index >= records.index[0]]
-        drifts = pd.concat([self._drifts_before(drifts.index[0], drifts), drifts])
-        then = self._corrected(raw, drifts, once_found=True)[0]
+        then = self._corrected(raw, once_found=True)[0]
         if then.equals(records.loc[raw.index]):
             return index
         return rounded(self._index(pd.concat([records[records.index < raw.index[0]], then]))[place:])
@@ -646,9 +643,10 @@ class Monitor(SavesFrames, Estimator):
         records, place = self._with_memory(int(rows[0]))
         places = place + rows - rows[0]
         records = records.iloc[: places[-1] + 1]
-        sizes = departures(self.detector_, records[self.features_], self.targets_, self.trained_)[places]
+        parts, seen = self._parts, records[self.features_]
+        sizes = parts.residuals(seen, in_windows=True).to_numpy()[places] / parts.scales
         sizes = pd.DataFrame(np.round(np.nan_to_num(sizes), 2), columns=list(map(str, self.targets_)))
-        found = group_effects(self.detector_, records[self.features_]).iloc[places]
+        found = parts.effects(seen).iloc[places]
         modes = [leading(row) for _, row in sizes.abs().iterrows()]
         found = found.join(sizes.add_prefix("departure ").set_axis(found.index)).assign(modes=modes)
         found = found.astype({"modes": object})
@@ -658,16 +656,16 @@ class Monitor(SavesFrames, Estimator):
         decisions.loc[found.index, found.columns] = found
         self._tell(decisions_=decisions)
 
-    def _note(self, before: Monitor, first: pd.Timestamp, *done: dict[str, Any]) -> None:
-        """Append the changes since a former state to the transitions, after the actions that made them."""
-        tables = before.known_events_.table, self.known_events_.table
-        old, new = (table[~(table["end"] < first)] for table in tables)
-        found = [*event_changes(old, new), *fault_changes(before.faults_, self.faults_, self.last_)]
-        for one in [*done, *sorted(found, key=lambda change: change["time"])]:
-            plain = {"id": len(self.transitions_) + 1, "what": one["what"], "time": one["time"].isoformat()}
-            plain |= {"newest": self.last_.isoformat(), "kind": one["kind"], "event": one.get("event", 0)}
-            plain |= {"column": one.get("column", ""), "detail": one.get("detail", "")}
-            self.transitions_ = (*self.transitions_, plain)
+    def _become(self, after: Monitor, first: pd.Timestamp, **done: Any) -> None:
+        """Stand as a changed twin does; changes from a stamp on join the transitions, after what was ``done``."""
+        old, new = (one.known_events_.table for one in (self, after))
+        found = [*event_changes(old[~(old["end"] < first)], new[~(new["end"] < first)])]
+        found = sorted([*found, *fault_changes(self.faults_, after.faults_, after.last_)], key=lambda one: one["time"])
+        usual = {"id": 0, "what": "", "time": after.last_, "newest": after.last_, "kind": "", "event": 0}
+        for number, one in enumerate([done, *found] if done else found, len(self.transitions_) + 1):
+            entry = plain(usual | {"column": "", "detail": ""} | one | {"id": number})
+            after.transitions_ = (*after.transitions_, entry)
+        vars(self).update(vars(after))
 
     def update(self, new: pd.DataFrame, *, confirm: bool = False) -> pd.DataFrame:
         """Evaluate records that came since.
@@ -704,28 +702,22 @@ class Monitor(SavesFrames, Estimator):
         """
         check_is_fitted(self)
         max_delay = check_duration(self.max_delay, "max_delay")
-        intake = Intake.sorted_out(
-            *(self._read(new), self.baseline_, self.records_, self.ahead_, max_delay),
-            are_confirmed=check_flag(confirm, "confirm"),
-        )
-        refuse_other_units(intake.fresh.drop(columns=self.targets_), self.baseline_.drop(columns=self.targets_))
-        after, fresh = self._twin(), intake.fresh.index
-        numbers = intake.n_repeated, int((fresh < self.last_).sum()), len(intake.too_late)
-        after.tallies_ = {name: self.tallies_[name] + n for name, n in zip(self.tallies_, numbers, strict=True)}
-        after.ahead_ = intake.ahead
-        reasons = pd.concat([intake.too_late, intake.early])
-        refused = self._decisions(reasons.index, reason=reasons.to_numpy())
+        tables, are_confirmed = (self.baseline_, self.records_, self.ahead_), check_flag(confirm, "confirm")
+        records, ahead, reasons, numbers = sorted_out(self._read(new), *tables, max_delay, are_confirmed=are_confirmed)
+        refuse_other_units(records.drop(columns=self.targets_), self.baseline_.drop(columns=self.targets_))
+        after, fresh = self._twin(), records.index
+        after.tallies_ = {name: known + numbers[name] for name, known in self.tallies_.items()}
+        after.ahead_, refused = ahead, self._decisions(reasons.index, reason=reasons.to_numpy())
         answers = Events(refused, self.weeks_[:0], self.acknowledgements_, 1).evaluations.assign(revised=False)
         if len(fresh):
-            known = pd.concat([self.records_, intake.fresh])
+            known = pd.concat([self.records_, records])
             after.records_ = known if known.index.is_monotonic_increasing else known.sort_index()
             first = after._decide(fresh[0])
-            after._note(self, fresh[0])
             was, now = (one.known_events_.evaluations for one in (self, after))
             news = _news(was[was.index >= first], now[now.index >= first], fresh)
             answers = pd.concat([news, answers]).sort_index(kind="stable") if len(answers) else news
         warn_each(_not_evaluated(answers))
-        vars(self).update(vars(after))
+        self._become(after, fresh[0] if len(fresh) else self.last_)
         return answers
 
     def status(self, now: Any = None, *, max_age: str | timedelta | None = None) -> MonitorStatus:
@@ -839,9 +831,7 @@ class Monitor(SavesFrames, Estimator):
             raise ValueError(f"note is {note!r:.100}; expected text")
         one, after = events.loc[event], self._twin()
         after._say(one["kind"], one["peak_time"], check_flag(harmless, "harmless"), note)
-        done = {"what": "acknowledged", "time": self.last_, "kind": one["kind"], "event": int(event), "detail": note}
-        after._note(after, self.last_, done)
-        vars(self).update(vars(after))
+        self._become(after, self.last_, what="acknowledged", kind=one["kind"], event=int(event), detail=note)
 
     def _say(self, kind: str, time: pd.Timestamp, harmless: bool, note: str) -> None:
         """Note the owner's answer to the event of a kind at a time, at the time of the newest record."""
@@ -914,9 +904,7 @@ class Monitor(SavesFrames, Estimator):
             until = "on" if last is None else f"to {last}"
             raise ValueError(f"no record since the baseline is stamped {first} {until}; expected some to be discarded")
         after._decide(min(first, midnight(after.last_)))
-        done = {"what": "discarded", "time": first, "kind": "", "detail": f"records: {n_discarded}"}
-        after._note(self, first, done)
-        vars(self).update(vars(after))
+        self._become(after, first, what="discarded", time=first, detail=f"records: {n_discarded}")
         return n_discarded
 
     def refit(self, records: pd.DataFrame | None = None, *, until: Any = None, force: bool = False) -> Retraining:
@@ -1016,8 +1004,7 @@ class Monitor(SavesFrames, Estimator):
             after._begin_corrections(trained.join(raw)[list(self.baseline_.columns)], fem)
         after._decide(today)
         what = "rebaseline" if retraining.kind == "new baseline" else retraining.kind
-        after._note(self, today, {"what": what, "time": self.last_, "kind": retraining.kind})
-        vars(self).update(vars(after))
+        self._become(after, today, what=what, kind=retraining.kind)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the monitor to a file, from which `load_monitor` reads it; it goes on there where it stopped.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, is_dataclass
 from datetime import timedelta
 from itertools import pairwise
@@ -105,56 +105,39 @@ def refuse_other_units(new: pd.DataFrame, baseline: pd.DataFrame, far: float = 1
             )
 
 
-@dataclass(frozen=True)
-class Intake:
-    """What a batch brings: ``fresh`` records to evaluate, and others with the reasons why they are not evaluated.
+def sorted_out(
+    batch: pd.DataFrame,
+    baseline: pd.DataFrame,
+    known: pd.DataFrame,
+    ahead: pd.DataFrame,
+    max_delay: pd.Timedelta,
+    *,
+    are_confirmed: bool,
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.Series, dict[str, int]]:
+    """Records of a batch to evaluate, all that are set aside as stamped too far ahead, why others are not evaluated,
+    and numbers of repeated, late and too late ones; by the baseline, the records known since and those set aside.
 
-    ``ahead`` are all records that are set aside as stamped too far ahead, ``early`` the ones of this batch.
+    A record is set aside if it is stamped farther after the one before it than any outage of the baseline explains,
+    until it is of the present by the clock of this computer, or others confirm it.
     """
-
-    fresh: pd.DataFrame
-    too_late: pd.Series
-    early: pd.Series
-    ahead: pd.DataFrame
-    n_repeated: int
-
-    @classmethod
-    def sorted_out(
-        cls,
-        batch: pd.DataFrame,
-        baseline: pd.DataFrame,
-        known: pd.DataFrame,
-        ahead: pd.DataFrame,
-        max_delay: pd.Timedelta,
-        *,
-        are_confirmed: bool = False,
-    ) -> Intake:
-        """Compare a batch with the baseline, the records known since and those set aside.
-
-        A record is set aside if it is stamped farther after the one before it than any outage of the baseline explains,
-        until it is of the present by the clock of this computer, or others confirm it.
-        """
-        n_given, again = len(batch), batch.index.duplicated()
-        if again.any():
-            same_rows(batch[again], batch[~again])
-            batch = batch[~again]
-        is_new = ~np.any([same_rows(batch, table) for table in (known, baseline, ahead)], axis=0)
-        batch, n_repeated = batch[is_new], n_given - int(is_new.sum())
-        end, last = baseline.index[-1], (known if len(known) else baseline).index[-1]
-        is_late = (batch.index <= end) | (batch.index < last - max_delay)
-        late = f"came too late, more than {duration_text(max_delay)} after newer records"
-        stamps = batch.index[is_late]
-        too_late = pd.Series(
-            np.where(stamps <= end, f"before the end of the baseline ({end})", late), stamps, dtype=object
-        )
-        timely = pd.concat([batch[~is_late], ahead]).sort_index() if len(ahead) else batch[~is_late]
-        jump = longest_step(baseline)
-        n_taken = len(timely) if are_confirmed else _n_in_time(timely.index, last, jump)
-        fresh, ahead = timely[:n_taken], timely[n_taken:]
-        newest = max(last, fresh.index[-1]) if len(fresh) else last
-        said = f"stamped more than {duration_text(jump)} after the newest record ({newest}): set aside"
-        early = pd.Series(said, ahead.index[ahead.index.isin(batch.index)], dtype=object)
-        return cls(fresh, too_late, early, ahead, n_repeated)
+    n_given, again = len(batch), batch.index.duplicated()
+    if again.any():
+        same_rows(batch[again], batch[~again])
+        batch = batch[~again]
+    batch = batch[~np.any([same_rows(batch, table) for table in (known, baseline, ahead)], axis=0)]
+    end, last, n_new = baseline.index[-1], (known if len(known) else baseline).index[-1], len(batch)
+    is_late = (batch.index <= end) | (batch.index < last - max_delay)
+    stamps, late = batch.index[is_late], f"came too late, more than {duration_text(max_delay)} after newer records"
+    reasons = pd.Series(late, stamps, dtype=object).mask(stamps <= end, f"before the end of the baseline ({end})")
+    timely = pd.concat([batch[~is_late], ahead]).sort_index() if len(ahead) else batch[~is_late]
+    jump = longest_step(baseline)
+    n_taken = len(timely) if are_confirmed else _n_in_time(timely.index, last, jump)
+    fresh, ahead = timely[:n_taken], timely[n_taken:]
+    newest = max(last, fresh.index[-1]) if len(fresh) else last
+    said = f"stamped more than {duration_text(jump)} after the newest record ({newest}): set aside"
+    early = pd.Series(said, ahead.index[ahead.index.isin(batch.index)], dtype=object)
+    numbers = {"n_repeated": n_given - n_new, "n_late": int((fresh.index < last).sum()), "n_too_late": len(stamps)}
+    return fresh, ahead, pd.concat([reasons, early]), numbers
 
 
 def longest_step(baseline: pd.DataFrame) -> pd.Timedelta:
@@ -208,10 +191,10 @@ class Lookback(SavesFrames):
     time: pd.Timedelta
 
     @classmethod
-    def learned(cls, detector: Any) -> Lookback:
-        """From ``lookback_`` of a fitted detector's parts: those in a row add up, else the largest counts."""
-        rows, nanoseconds = _reach(detector)
-        return cls(rows, pd.Timedelta(nanoseconds, "ns"))
+    def learned(cls, *parts: Any) -> Lookback:
+        """From ``lookback_`` of fitted parts: those in a row add up, else the largest counts."""
+        reaches = [_reach(part) for part in parts]
+        return cls(sum(rows for rows, _ in reaches), pd.Timedelta(sum(time for _, time in reaches), "ns"))
 
     def start(self, times: NDArray[np.int64], place: int) -> int:
         """Position of the earliest record that is needed for the one at a position."""
@@ -268,56 +251,32 @@ def compensators_of(detector: BaseEstimator | None) -> list[Any]:
     return [part for part in parts if isinstance(part, TemperatureCompensator | CompensatedDetector)]
 
 
-@dataclass(frozen=True)
-class Columns:
-    """Roles of columns: ``inputs`` are all but the ``reference``, and ``targets`` the responses among them."""
-
-    inputs: list[Any]
-    reference: list[Any]
-    targets: list[Any]
-    units: dict[Any, str]
-
-    @classmethod
-    def assigned(cls, monitor: Any, columns: list[Any], detector: BaseEstimator | None) -> Columns:
-        """By the parameters of a monitor, the compensators of its detector, or its chain."""
-        reference = _among(monitor.reference or [], columns, "reference")
-        inputs = [name for name in columns if name not in reference]
-        places = [positions_of(one.targets, len(inputs), inputs) for one in compensators_of(detector)]
-        own = [inputs[k] for k in sorted(set(np.concatenate(places).tolist()))] if places else None
-        wanted = own if monitor.targets is None else monitor.targets
-        if wanted is None and monitor.fem is None:
-            raise ValueError(
-                "the detector has no TemperatureCompensator whose targets say which columns are responses, and there "
-                "is no fem; expected targets=[names of the responses]"
-            )
-        if wanted is None:
-            check_is_fitted(monitor.fem)
-            wanted = monitor.fem.mode_names_
-        targets = _among(wanted, inputs, "targets")
-        if not targets or (own is not None and set(targets) != set(own)):
-            expected = f"some of the columns {inputs}" if own is None else f"the targets of the compensator {own}"
-            raise ValueError(f"targets are {targets}; expected {expected}")
-        of_targets = monitor.units if isinstance(monitor.units, str) else "" if monitor.fem is None else "Hz"
-        given = dict(monitor.units) if isinstance(monitor.units, Mapping) else {}
-        if set(given) - set(columns) or not all(isinstance(unit, str) for unit in given.values()):
-            raise ValueError(f"units are {given}; expected a text for some of the columns {columns}")
-        units = {name: of_targets if name in targets else "°C" for name in columns} | given
-        return cls(inputs, reference, [name for name in inputs if name in targets], units)
-
-    def without(self, names: Collection[Any]) -> Columns:
-        """The roles of the other columns."""
-        lists = ([name for name in some if name not in names] for some in (self.inputs, self.reference, self.targets))
-        return Columns(*lists, {name: unit for name, unit in self.units.items() if name not in names})
-
-    def seen(self, detector: BaseEstimator) -> list[Any]:
-        """Columns that a detector gets: without a compensator the responses alone."""
-        return self.inputs if compensators_of(detector) else self.targets
-
-    def default_detector(self, fem: Any) -> BaseEstimator:
-        """Directions of damage for responses in Hz, the Mahalanobis distance for others, of residuals."""
-        in_hertz = {self.units[name] for name in self.targets} == {"Hz"}
-        last = DirectionalDetector("softening" if fem is None else fem) if in_hertz else MahalanobisDetector()
-        return last if len(self.targets) == len(self.inputs) else CompensatedDetector(last, targets=self.targets)
+def roles_of(monitor: Any, columns: list[Any], detector: BaseEstimator | None) -> tuple[list[Any], dict[Any, str]]:
+    """Responses among the columns, and units, by the parameters of a monitor, the compensators of its detector, or its
+    chain."""
+    reference = _among(monitor.reference or [], columns, "reference")
+    inputs = [name for name in columns if name not in reference]
+    places = [positions_of(one.targets, len(inputs), inputs) for one in compensators_of(detector)]
+    own = [inputs[k] for k in sorted(set(np.concatenate(places).tolist()))] if places else None
+    wanted = own if monitor.targets is None else monitor.targets
+    if wanted is None and monitor.fem is None:
+        raise ValueError(
+            "the detector has no TemperatureCompensator whose targets say which columns are responses, and there "
+            "is no fem; expected targets=[names of the responses]"
+        )
+    if wanted is None:
+        check_is_fitted(monitor.fem)
+        wanted = monitor.fem.mode_names_
+    targets = _among(wanted, inputs, "targets")
+    if not targets or (own is not None and set(targets) != set(own)):
+        expected = f"some of the columns {inputs}" if own is None else f"the targets of the compensator {own}"
+        raise ValueError(f"targets are {targets}; expected {expected}")
+    of_targets = monitor.units if isinstance(monitor.units, str) else "" if monitor.fem is None else "Hz"
+    given = dict(monitor.units) if isinstance(monitor.units, Mapping) else {}
+    if set(given) - set(columns) or not all(isinstance(unit, str) for unit in given.values()):
+        raise ValueError(f"units are {given}; expected a text for some of the columns {columns}")
+    units = {name: of_targets if name in targets else "°C" for name in columns} | given
+    return [name for name in inputs if name in targets], units
 
 
 def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
@@ -329,18 +288,28 @@ def _among(names: Any, columns: list[Any], what: str) -> list[Any]:
 
 def usable_baseline(
     monitor: Any, baseline: pd.DataFrame
-) -> tuple[pd.DataFrame, BaseEstimator, Columns, RecordFindings]:
-    """What can be used of a baseline, by which unfitted detector and columns, and what was set aside."""
+) -> tuple[pd.DataFrame, BaseEstimator, list[Any], dict[Any, str], RecordFindings]:
+    """What can be used of a baseline, the unfitted detector, the responses, units, and what was set aside.
+
+    By default, responses in Hz have directions of damage, and others the Mahalanobis distance, of residuals.
+    """
     detector = None if monitor.detector is None else clone(monitor.detector)
-    columns = Columns.assigned(monitor, list(baseline.columns), detector)
-    records, found = without_what_cannot_be(baseline, columns.targets, columns.units)
+    targets, units = roles_of(monitor, list(baseline.columns), detector)
+    records, found = without_what_cannot_be(baseline, targets, units)
     if found.left_out:
         if monitor.fem is not None:
             raise ValueError(f"the chain needs columns that cannot be used: {'; '.join(found.left_out.values())}")
-        records, columns = records.drop(columns=list(found.left_out)), columns.without(found.left_out)
+        records = records.drop(columns=list(found.left_out))
+        targets, units = [name for name in targets if name in records], {name: units[name] for name in records}
         for part in compensators_of(detector):
-            part.set_params(targets=columns.targets)
-    return records, columns.default_detector(monitor.fem) if detector is None else detector, columns, found
+            part.set_params(targets=targets)
+    if detector is None:
+        in_hertz = {units[name] for name in targets} == {"Hz"}
+        directions = "softening" if monitor.fem is None else monitor.fem
+        detector = DirectionalDetector(directions) if in_hertz else MahalanobisDetector()
+        if len(targets) < len(records.columns.difference(monitor.reference or [])):
+            detector = CompensatedDetector(detector, targets=targets)
+    return records, detector, targets, units, found
 
 
 def without_what_cannot_be(

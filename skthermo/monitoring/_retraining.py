@@ -22,10 +22,10 @@ from skthermo._core.frames import (
 )
 from skthermo._core.text import capital, counted, listed, probability_text
 from skthermo._core.warnings import collected
-from skthermo.detection import CompensatedDetector, TemperatureCompensator
+from skthermo.detection import TemperatureCompensator
 from skthermo.monitoring._drift import DailyRegression, daily_means, weather_columns
+from skthermo.monitoring._evaluation import DetectorParts
 from skthermo.monitoring._events import DRIFT, WATCH
-from skthermo.monitoring._records import compensators_of
 
 
 @dataclass(frozen=True)
@@ -299,20 +299,18 @@ def residuals_of(
 
     Also which are relative, ln f - ln f expected. Without weather, they are departures from the mean.
     """
-    plain = TemperatureCompensator(targets=targets)
-    for part in compensators_of(detector):
-        is_whole = isinstance(part, CompensatedDetector)
-        plain = TemperatureCompensator(part.regressor, targets=part.targets, cv=part.cv) if is_whole else clone(part)
+    own = DetectorParts(detector, targets, baseline).compensator
+    plain = TemperatureCompensator(targets=targets) if own is None else clone(own)
     if len(baseline.columns) == len(targets):
         plain = TemperatureCompensator(DummyRegressor(), targets=targets)
         baseline, new = (table.assign(nothing=0.0) for table in (baseline, new))
     with collected(drop_others=True):
         left = np.asarray(plain.fit_transform(baseline)), np.asarray(plain.transform(new))
     names = list(plain.get_feature_names_out())
-    old, own = (
+    old, rest = (
         pd.DataFrame(one, table.index, names)[targets] for one, table in zip(left, (baseline, new), strict=True)
     )
-    return old, own, pd.Series(plain.relative_, names)[targets].to_numpy()
+    return old, rest, pd.Series(plain.relative_, names)[targets].to_numpy()
 
 
 def _fitted(monitor: Any, baseline: pd.DataFrame) -> BaseEstimator:

@@ -237,9 +237,9 @@ def status_of(monitor: Any) -> MonitorStatus:
     state = "not evaluated"
     if len(evaluations):
         found = monitor.known_events_
-        standing, number = found.standing()
-        state = state_of(standing[-1], found.set_aside(number)[0][-1], evaluations["state"].iloc[-1])
-        opened["acknowledged"] &= (opened["event"] != number[-1]) | (standing[-1] not in ("alarm", "drift"))
+        last = found.standing.iloc[-1]
+        state = state_of(last["state"], last["is_unexplained"], evaluations["state"].iloc[-1])
+        opened["acknowledged"] &= (opened["event"] != last["event"]) | (last["state"] not in ("alarm", "drift"))
     shown = ["event", "kind", "since", "peak", "modes", "groups", "size", "n_times", "acknowledged", "harmless"]
     failed = faults[faults["until"].isna()].astype({"column": str})
     levels = ("threshold_", "clear_threshold_", "watch_threshold_", "false_alarms_per_year", "watch_per_year")

@@ -120,11 +120,8 @@ class FakeMonitor(Monitor):
         kinds = set(self.events_["kind"][self.events_["end"].isna()])
         states = {"damage": "alarm", "drift": "drift", "watch": "watch"}
         standing = next((state for kind, state in states.items() if kind in kinds), "")
-        self.known_events_ = SimpleNamespace(
-            standing=lambda: ([standing], [0]),
-            set_aside=lambda number: ([("fault" in kinds)],),
-            reached=real.known_events_.reached,
-        )
+        last = {"state": [standing], "event": [0], "is_unexplained": ["fault" in kinds]}
+        self.known_events_ = SimpleNamespace(standing=pd.DataFrame(last), reached=real.known_events_.reached)
 
     def get_params(self, deep=True):
         return {name: getattr(self, name) for name in inspect.signature(Monitor).parameters}
