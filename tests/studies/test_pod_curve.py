@@ -9,7 +9,7 @@ from scipy.special import expit, logit
 from scipy.stats import beta, norm
 
 from skthermo.studies import pod_curve
-from skthermo.studies.detectability._rates import clopper_pearson, rate_of
+from skthermo.studies._rates import clopper_pearson, rate_of
 
 SEVERITIES = np.array([0.1, 0.15, 0.2, 0.25, 0.3])
 DETECTED = np.array([9.0, 21.0, 33.0, 38.0, 40.0])

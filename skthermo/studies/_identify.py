@@ -21,8 +21,7 @@ from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
 from skthermo.fem.damage import LossKind, check_kind
 from skthermo.residuals.mean_errors import chance_of
-from skthermo.studies._scenarios import UncertainDamage, check_chain, checked_models
-from skthermo.studies.identification._causes import (
+from skthermo.studies._causes import (
     NO_DAMAGE,
     SOMETHING_ELSE,
     Cause,
@@ -33,8 +32,9 @@ from skthermo.studies.identification._causes import (
     read_causes,
     stretches,
 )
-from skthermo.studies.identification._evidence import DRAWS_EACH, DamageExplanation, Evidence, averaged, effects_of
-from skthermo.studies.identification._measured import FrequencyShift, measured_shift, observed
+from skthermo.studies._evidence import DRAWS_EACH, DamageExplanation, Evidence, averaged, effects_of
+from skthermo.studies._measured import FrequencyShift, measured_shift, observed
+from skthermo.studies._scenarios import UncertainDamage, check_chain, checked_models
 from skthermo.surrogate import refitted
 
 

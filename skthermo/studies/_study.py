@@ -21,11 +21,19 @@ from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected, one_of_each_kind, warn_each
 from skthermo.exceptions import ModelWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel
+from skthermo.studies._pod_curve import FamilyRates, PODCurve, families_of
+from skthermo.studies._rates import EvaluatedRecords, evaluated, in_words, rank
+from skthermo.studies._replicates import ReplicateRates, drawn_replicates, in_sentences, replicated
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
-from skthermo.studies.detectability._rates import EvaluatedRecords, in_words, rank
-from skthermo.studies.detectability._replicates import ReplicateRates, Replicates, in_sentences
-from skthermo.studies.detectability._simulation import Candidate, Decided, Simulation, by_detector, scatter_of
+from skthermo.studies._simulation import (
+    Candidate,
+    Decided,
+    Simulation,
+    by_detector,
+    changed_frequencies,
+    joined,
+    scatter_of,
+)
 from skthermo.surrogate import DataInformedFEM
 
 
@@ -334,37 +342,40 @@ class DetectabilityStudy(BaseEstimator):
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
         seeds = as_random_state(self.random_state).randint(np.iinfo(np.int32).max, size=(most_repeats, 2))
-        replicates = Replicates.asked(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
-        T, stages = replicates.years[0], Stages(self, 4 + bool(replicates.parts))
+        asked = self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0]
+        parts, years, models, others = drawn_replicates(*asked)
+        varies_more, T = parts != ["noise"], years[0]
+        stages = Stages(self, 4 + varies_more)
         with collected() as findings, single_blas_thread():
             with stages.stage("detectors"):
                 candidates, errors = self._learned(detectors, baseline, findings)
             with stages.stage("frequencies"):
                 findings += self.fem.thermal_.doubts(self.fem.weather(T))
                 measurement = scatter_of(self.fem, self.noise, self.gaps, self.outliers)
-                simulation = Simulation(self.fem, scenarios, T, measurement, most_repeats, function)
-            with stages.stage("first repeat"):
-                first = simulation.repeat(candidates, 0, seeds[0], given)
-                findings += first.findings
-            with stages.stage("other repeats"):
-                grows = tol if is_auto(self.n_repeats) and replicates.parts else None
-                decided = self._repeats(simulation, candidates, first, seeds, grows, confidence)
-        errors |= decided.errors
-        rows, records = {}, {name: evaluated(decided, name, scenarios) for name in candidates if name not in errors}
-        for name, some in records.items():
+                clean = changed_frequencies(self.fem, scenarios, T, range(most_repeats))
+                simulation = Simulation(self.fem, scenarios, T, measurement, clean, function, given)
+            with stages.stage("repeats"):
+                grows = tol if is_auto(self.n_repeats) and varies_more else None
+                outcomes = self._repeats(simulation, candidates, seeds, grows, confidence)
+        errors |= {name: one for name, one in outcomes.items() if isinstance(one, Exception)}
+        found = {name: one for name, one in outcomes.items() if isinstance(one, Decided)}
+        rows = {}
+        for name, one in found.items():
+            findings += by_detector(one.findings, name, detectors)
             try:
-                rows[name] = [one.summary(confidence) for one in some]
+                rows[name] = [some.summary(confidence) for some in evaluated(name, one, scenarios)]
             except ValueError as error:
                 errors[name] = ValueError(f"{error}{longer_step(T, self.fem.records_.temperatures)}")
         left = still_evaluating({name: candidates[name] for name in rows}, errors)
         texts = {name: f"{type(error).__name__}: {error}" for name, error in errors.items()}
         lines = [row for name in detectors for row in rows.get(name, [{"detector": name, "error": texts.get(name)}])]
         results, rates = pd.DataFrame(lines, columns=list(next(iter(rows.values()))[0])), None
-        if replicates.parts:
-            with stages.stage(f"{len(replicates.seeds)} replicates"):
-                found, failed = replicates.rates(simulation, left, self.n_jobs, max(self.verbose - 1, 0))
-            findings += failures(failed, len(replicates.seeds))
-            rates = ReplicateRates.joined(found, results, replicates)
+        if varies_more:
+            with stages.stage(f"{len(others)} replicates"):
+                drawn = simulation, left, parts, years, models
+                campaigns = self._in_parallel("replicates", replicated, [(*drawn, *one) for one in enumerate(others)])
+            findings += failures([one for one in campaigns if isinstance(one, str)], len(others))
+            rates = ReplicateRates.joined([one for one in campaigns if not isinstance(one, str)], results, parts)
             results = rates.banded(results, confidence)
         findings += many_false_alarms(results)
         self.results_, self.scenarios_, self.confidence_, self.errors_ = results, scenarios, confidence, texts
@@ -372,10 +383,11 @@ class DetectabilityStudy(BaseEstimator):
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
-        kept = {key: one for key, one in decided.decisions.items() if key[0] in left}
-        self.indices_ = {key: one for key, one in decided.indices.items() if key[0] in left}
-        self.decisions_ = {key: one for key, one in kept.items() if key[1] is not None}
-        self.calibration_ = {(name, source): one for (name, of, source), one in kept.items() if of is None}
+        self._decided = {name: found[name] for name in left}
+        every = [(name, key, one) for name in left for key, one in found[name].decisions.items()]
+        self.decisions_ = {(name, *key): one for name, key, one in every if key[0] is not None}
+        self.calibration_ = {(name, key[1]): one for name, key, one in every if key[0] is None}
+        self.indices_ = {(name, *key): one for name in left for key, one in found[name].indices.items()}
         self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()
         self.warnings_ = list(map(str, one_of_each_kind(findings)))
         warn_each(findings)
@@ -395,29 +407,34 @@ class DetectabilityStudy(BaseEstimator):
             findings += by_detector(doubts, name, detectors)
         return still_evaluating(candidates, errors), errors
 
+    def _in_parallel(self, unit: str, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """What a function gives, in joblib's jobs."""
+        options = {"unit": unit, "n_jobs": self.n_jobs, "verbose": max(self.verbose - 1, 0)}
+        return run_jobs((delayed(function)(*some) for some in arguments), len(arguments), **options)
+
     def _repeats(
-        self, simulation: Simulation, ready: dict[str, Any], first: Decided, seeds: Any, tol: Any, confidence: float
-    ) -> Decided:
-        """All repeats: one for each of the seeds or, with ``tol``, as many of them as the bounds need."""
-        left = still_evaluating({k: v for k, v in ready.items() if k not in first.errors}, first.errors)
-        found = [first]
+        self, simulation: Simulation, candidates: dict[str, Candidate], seeds: Any, tol: float | None, confidence: float
+    ) -> dict[str, Decided | Exception]:
+        """What each detector decides in all repeats: one for each of the seeds or, with ``tol``, as many of them as the
+        bounds need. After the first repeat, those that have failed in it are left out."""
+        repeats: list[dict[str, Decided | Exception]] = []
 
-        def add(n_repeats: int) -> Decided:
-            numbers = range(len(found), n_repeats)
-            jobs = (delayed(simulation.repeat)(left, number, seeds[number]) for number in numbers)
-            options = {"n_jobs": self.n_jobs, "verbose": max(self.verbose - 1, 0)}
-            found.extend(run_jobs(jobs, len(numbers), unit="repeats", **options))
-            return Decided.together(found)
+        def add(n_repeats: int) -> dict[str, Decided | Exception]:
+            failed = {name: one for name, one in (repeats[0] if repeats else {}).items() if isinstance(one, Exception)}
+            left = still_evaluating({name: one for name, one in candidates.items() if name not in failed}, failed)
+            numbers = range(len(repeats), n_repeats)
+            repeats.extend(self._in_parallel("repeats", simulation.repeat, [(left, n, seeds[n]) for n in numbers]))
+            return {name: joined([one[name] for one in repeats if name in one]) for name in candidates}
 
-        decided = add(len(seeds) if tol is None else 3)
+        add(1)
+        found = add(len(seeds) if tol is None else 3)
         if tol is None:
-            return decided
+            return found
         rows = [
-            one.summary(confidence)
-            for name in left
-            if name not in decided.errors
-            for one in evaluated(decided, name, simulation.scenarios)
-            if one.source == "simulated" and np.isfinite(one.decisions).any()
+            some.summary(confidence)
+            for name, one in found.items()
+            for some in (evaluated(name, one, simulation.scenarios) if isinstance(one, Decided) else ())
+            if some.source == "simulated" and np.isfinite(some.decisions).any()
         ]
         widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
         return add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
@@ -769,10 +786,8 @@ class DetectabilityStudy(BaseEstimator):
 
     def _records(self, source: str) -> list[EvaluatedRecords]:
         """What the detectors evaluated of one source."""
-        decided = Decided(self.decisions_, {}, indices=self.indices_)
-        return [
-            one for name in self.detectors_ for one in evaluated(decided, name, self.scenarios_) if one.source == source
-        ]
+        found = [evaluated(name, one, self.scenarios_) for name, one in self._decided.items()]
+        return [one for some in found for one in some if one.source == source]
 
     def _family(self, family: str, source: str, detector: str | None) -> FamilyRates:
         name = self.detector_name(detector)
@@ -843,16 +858,6 @@ def longer_step(T: Table, baseline: Table) -> str:
         "window has a value where it holds at least half of the records that it usually has. Give weather by the step "
         "of the baseline"
     )
-
-
-def evaluated(decided: Decided, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
-    """What a detector has evaluated, in the order of the scenarios."""
-    return [
-        EvaluatedRecords(detector, scenario, source, decided.indices[key], decided.decisions[key])
-        for scenario in scenarios
-        for source in ("simulated", "reference")
-        if (key := (detector, scenario.name, source)) in decided.decisions
-    ]
 
 
 def failures(failed: Sequence[str], n_replicates: int) -> list[ModelWarning]:

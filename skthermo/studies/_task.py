@@ -20,10 +20,17 @@ from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.preprocessing.checks import set_aside
+from skthermo.studies._rates import Rate, rate_of
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies.detectability._rates import Rate, rate_of
-from skthermo.studies.detectability._simulation import Simulation, baseline_table, has_targets, scatter_of, sensors_of
-from skthermo.studies.detectability._study import check_detector
+from skthermo.studies._simulation import (
+    Simulation,
+    baseline_table,
+    changed_frequencies,
+    has_targets,
+    scatter_of,
+    sensors_of,
+)
+from skthermo.studies._study import check_detector
 from skthermo.surrogate import DataInformedFEM
 
 
@@ -319,11 +326,12 @@ class DetectionTask(Bunch):
         index = _moved(T, baseline, n_repeats * n_scenarios)
         with collected() as findings, single_blas_thread():
             findings += self.fem.thermal_.doubts(self.fem.weather(T))
-            simulation = Simulation(self.fem, self.scenarios, T, self.measurement, n_repeats)
+            clean = changed_frequencies(self.fem, self.scenarios, T, range(n_repeats))
+            simulation = Simulation(self.fem, self.scenarios, T, self.measurement, clean)
             tables = [
-                one.table[list(baseline)].to_numpy()
+                table[list(baseline)].to_numpy()
                 for repeat, seed in enumerate(seeds)
-                for one in simulation.records(repeat, [seed])
+                for table in simulation.records(repeat, [seed]).values()
             ]
         X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)])
         X = X.rename_axis(baseline.index.name)

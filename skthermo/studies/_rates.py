@@ -14,6 +14,7 @@ from scipy.stats import beta, mannwhitneyu, t
 from skthermo._core.arrays import Array
 from skthermo._core.frames import Table, correlation_times, row_times, time_of
 from skthermo.studies._scenarios import BaseScenario
+from skthermo.studies._simulation import Decided
 
 
 @dataclass(frozen=True)
@@ -107,24 +108,29 @@ def _scatter(decisions: Array) -> Array:
     return decisions - np.nansum(decisions, axis=0 if len(decisions) > 1 else 1, keepdims=True) / counts
 
 
+def from_onset(scenario: BaseScenario, rows: Table, decisions: Array) -> tuple[Array, Array]:
+    """Decisions from the onset of the damage on, in order of time, and the times since then."""
+    times = row_times(rows)
+    start = times.min() if scenario.onset is None else time_of(rows, scenario.onset, "onset")
+    order = np.argsort(times, kind="stable")
+    order = order[times[order] >= start]
+    return decisions[:, order], times[order] - start
+
+
 @dataclass(frozen=True, eq=False)
 class EvaluatedRecords:
     """What a detector makes of the records of one scenario and source: decisions in each repeat, (n_repeats,
-    n_records), NaN where there is none, and ``rows`` with the times of the records."""
+    n_records), NaN where there is none, and the damage index of the first."""
 
     detector: str
     scenario: BaseScenario
     source: str
-    rows: Table
+    index: pd.Series
     decisions: Array
 
     def from_onset(self) -> tuple[Array, Array]:
         """Decisions from the onset of the damage on, in order of time, and the times since then."""
-        times, onset = row_times(self.rows), self.scenario.onset
-        start = times.min() if onset is None else time_of(self.rows, onset, "onset")
-        order = np.argsort(times, kind="stable")
-        order = order[times[order] >= start]
-        return self.decisions[:, order], times[order] - start
+        return from_onset(self.scenario, self.index, self.decisions)
 
     def summary(self, confidence: float) -> dict[str, Any]:
         """Rates, bounds and time to detection, from the onset of the damage on."""
@@ -132,7 +138,7 @@ class EvaluatedRecords:
         rate = rate_of(decisions, confidence, whole_repeats=scenario.n_draws > 1)
         if not rate.n_records:
             raise ValueError(
-                f"none of {len(self.rows)} records of scenario {scenario.name!r}, source {self.source!r}, can "
+                f"none of {len(self.index)} records of scenario {scenario.name!r}, source {self.source!r}, can "
                 "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
                 "after the onset"
             )
@@ -144,7 +150,7 @@ class EvaluatedRecords:
             "source": self.source,
             "measure": "PFA" if scenario.is_healthy else "POD",
             **vars(rate),
-            "time_to_detection": _mean_wait(decisions < 0, waits, self.rows),
+            "time_to_detection": _mean_wait(decisions < 0, waits, self.index),
             "error": "",
         }
 
@@ -168,6 +174,16 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
     if isinstance(getattr(rows, "index", None), pd.DatetimeIndex):
         return pd.Timedelta(int(waits[detected].mean()), "ns") if detected.size else pd.NaT
     return float(detected.mean()) if detected.size else float("nan")
+
+
+def evaluated(detector: str, decided: Decided, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
+    """What a detector has evaluated, in the order of the scenarios."""
+    return [
+        EvaluatedRecords(detector, one, source, decided.indices[one.name, source], decided.decisions[one.name, source])
+        for one in scenarios
+        for source in ("simulated", "reference")
+        if (one.name, source) in decided.decisions
+    ]
 
 
 @dataclass(frozen=True, eq=False)

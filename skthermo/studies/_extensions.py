@@ -19,10 +19,10 @@ from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
+from skthermo.studies._pod_curve import FamilyRates, families_of, fitted_curve
 from skthermo.studies._scenarios import BaseScenario, Scenario
-from skthermo.studies.detectability._pod_curve import FamilyRates, families_of, fitted_curve
-from skthermo.studies.detectability._simulation import Candidate, Simulation, scatter_of, sensors_of
-from skthermo.studies.detectability._study import DetectabilityStudy
+from skthermo.studies._simulation import Candidate, Simulation, changed_frequencies, scatter_of, sensors_of
+from skthermo.studies._study import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM
 
 
@@ -126,8 +126,10 @@ def compare_extensions(
         scatter = check_noise(_scatter(study) if noise is None else noise, len(ranks), names)
         compared = [(fem, T, candidates, dict(zip(ranks, scatter, strict=True)))] if candidates else []
         for chain, weather, others, further in compared + _with_sensors(fem, present, sensors):
-            healthy = Simulation(chain, [Scenario("healthy")], chain.records_.temperatures, measurement)
-            changed = Simulation(chain, scenarios, weather, measurement)
+            states = ([Scenario("healthy")], chain.records_.temperatures), (scenarios, weather)
+            healthy, changed = (
+                Simulation(chain, some, T, measurement, changed_frequencies(chain, some, T)) for some, T in states
+            )
             trials.append(trial(healthy, changed, {None: present} | others, further))
     for repeat in trials:
         jobs = (delayed(repeat)(int(seed)) for seed in seeds)
@@ -163,10 +165,10 @@ def trial(
     def tables(simulation: Simulation, seeds: Sequence[int]) -> list[tuple[BaseScenario, pd.DataFrame]]:
         """Records of each scenario, all with the same noise; further modes are missing where all others are."""
         found, noise = [], np.random.RandomState(seeds[1]).standard_normal((len(names), len(simulation.T))).T * scatter
-        for one in simulation.records(0, seeds):
-            missing = one.table[list(fem.mode_names_)].isna().all(axis=1).to_numpy()[:, np.newaxis]
-            values = further[one.scenario.name] * np.where(missing, np.nan, 1 + noise) if names else noise
-            found.append((one.scenario, one.table.assign(**dict(zip(names, values.T, strict=True)))))
+        for scenario, table in zip(simulation.scenarios, simulation.records(0, seeds).values(), strict=True):
+            missing = table[list(fem.mode_names_)].isna().all(axis=1).to_numpy()[:, np.newaxis]
+            values = further[scenario.name] * np.where(missing, np.nan, 1 + noise) if names else noise
+            found.append((scenario, table.assign(**dict(zip(names, values.T, strict=True)))))
         return found
 
     def repeat(seed: int) -> dict[Any, dict[str, float]]:
