@@ -19,7 +19,7 @@ from skthermo._core.warnings import collected
 from skthermo.fem import FEModel
 from skthermo.metrics import minimum_detectable_damage
 from skthermo.studies._pod_curve import FamilyRates, PODCurve, fitted_curve
-from skthermo.studies._rates import from_onset
+from skthermo.studies._rates import EvaluatedRecords
 from skthermo.studies._scenarios import checked_models
 from skthermo.studies._simulation import Candidate, Simulation, changed_frequencies
 from skthermo.surrogate import DataInformedFEM, refitted, resampled
@@ -90,8 +90,9 @@ def replicated(
                     found = candidate.decided(tables)
                     if isinstance(found, Exception):
                         raise found
-                    for (scenario, _), values in found.decisions.items():
-                        kept = from_onset(scenarios[scenario], T, values[np.newaxis])[0]
+                    for (scenario, source), values in found.decisions.items():
+                        one = EvaluatedRecords(name, scenarios[scenario], source, T, values[np.newaxis])
+                        kept = one.from_onset()[0]
                         rate = float((kept < 0).sum() / max(np.count_nonzero(~np.isnan(kept)), 1))
                         rates.setdefault((name, scenario), []).append(rate)
         except Exception as error:

@@ -20,7 +20,7 @@ from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.preprocessing.checks import set_aside
-from skthermo.studies._rates import Rate, rate_of
+from skthermo.studies._rates import rate_of
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies._simulation import (
     Simulation,
@@ -54,13 +54,13 @@ class Decisions:
     def worth(self, limit: float) -> float:
         """1, or the limit over the lower bound of the false alarms where this is more: the detector will work with its
         own threshold, not with a raised one."""
-        return limit / max(self.false_alarms().ci_low, limit)
+        return limit / max(self.false_alarms()["ci_low"], limit)
 
     def found(self, limit: float) -> float:
         """Share of the damaged records in alarm, mean over scenarios; the threshold is raised where the limit asks."""
-        return float(np.mean([pod.rate for pod in self.pods(limit)]))
+        return float(np.mean([pod["rate"] for pod in self.pods(limit)]))
 
-    def pods(self, limit: float, confidence: float = 0.95, drawn: Collection[int] = ()) -> list[Rate]:
+    def pods(self, limit: float, confidence: float = 0.95, drawn: Collection[int] = ()) -> list[dict[str, Any]]:
         """That share with bounds by scenario; what is not evaluated is not found. Repeats of those ``drawn`` differ."""
         missed = np.where(np.isnan(self.values), 0.0, self.values - self.raised(limit))
         damaged = {
@@ -76,7 +76,7 @@ class Decisions:
             raise ValueError(f"none of {len(healthy)} healthy records is evaluated; expected one or more")
         return float(min(evaluated[int(limit * len(evaluated) + 1e-9)], 0.0))
 
-    def false_alarms(self, confidence: float = 0.95) -> Rate:
+    def false_alarms(self, confidence: float = 0.95) -> dict[str, Any]:
         """Share of the evaluated healthy records beyond the detector's own threshold, with bounds."""
         return rate_of(self.by_repeat(self.values, self.healthy()), confidence)
 
@@ -355,12 +355,12 @@ class DetectionTask(Bunch):
         pods, alarms, worth = found.pods(limit, confidence, drawn), found.false_alarms(confidence), found.worth(limit)
         return {
             "fresh": found.score(limit),
-            "fresh_ci_low": worth * float(np.mean([pod.ci_low for pod in pods])),
-            "fresh_ci_high": worth * float(np.mean([pod.ci_high for pod in pods])),
-            "false_alarms": alarms.rate,
-            "false_alarms_ci_low": alarms.ci_low,
-            "false_alarms_ci_high": alarms.ci_high,
-            "within_limit": alarms.ci_low <= limit,
+            "fresh_ci_low": worth * float(np.mean([pod["ci_low"] for pod in pods])),
+            "fresh_ci_high": worth * float(np.mean([pod["ci_high"] for pod in pods])),
+            "false_alarms": alarms["rate"],
+            "false_alarms_ci_low": alarms["ci_low"],
+            "false_alarms_ci_high": alarms["ci_high"],
+            "within_limit": alarms["ci_low"] <= limit,
             "not_evaluated": float(np.isnan(found.values).mean()),
         }
 

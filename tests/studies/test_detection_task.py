@@ -148,7 +148,7 @@ def test_random_numbers_find_no_more_than_the_limit(fem, own, expected):
     found = task.scoring.decisions(noted(task, decisions), task.X[365:])
     assert abs(found.found(0.02) - expected) < 4 * np.sqrt(2 * expected / (40 * 120))
     score = task.scoring(noted(task, decisions), task.X[365:], task.y[365:])
-    lowest, highest = found.false_alarms().ci_low, found.false_alarms().ci_high
+    lowest, highest = (found.false_alarms()[name] for name in ("ci_low", "ci_high"))
     assert lowest < own < highest
     assert score == pytest.approx(found.found(0.02) * min(0.02 / lowest, 1))
 
