@@ -27,7 +27,6 @@ from skthermo.studies._replicates import ReplicateRates, drawn_replicates, in_se
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
 from skthermo.studies._simulation import (
     Candidate,
-    Decided,
     Simulation,
     by_detector,
     changed_frequencies,
@@ -348,7 +347,7 @@ class DetectabilityStudy(BaseEstimator):
         stages = Stages(self, 4 + varies_more)
         with collected() as findings, single_blas_thread():
             with stages.stage("detectors"):
-                candidates, errors = self._learned(detectors, baseline, findings)
+                learned = self._learned(detectors, baseline, findings)
             with stages.stage("frequencies"):
                 findings += self.fem.thermal_.doubts(self.fem.weather(T))
                 measurement = scatter_of(self.fem, self.noise, self.gaps, self.outliers)
@@ -356,18 +355,17 @@ class DetectabilityStudy(BaseEstimator):
                 simulation = Simulation(self.fem, scenarios, T, measurement, clean, function, given)
             with stages.stage("repeats"):
                 grows = tol if is_auto(self.n_repeats) and varies_more else None
-                outcomes = self._repeats(simulation, candidates, seeds, grows, confidence)
-        errors |= {name: one for name, one in outcomes.items() if isinstance(one, Exception)}
-        found = {name: one for name, one in outcomes.items() if isinstance(one, Decided)}
+                outcomes = self._repeats(simulation, learned, seeds, grows, confidence)
         rows = {}
-        for name, one in found.items():
+        for name, one in without_errors(outcomes).items():
             findings += by_detector(one.findings, name, detectors)
             try:
                 rows[name] = [some.summary(confidence) for some in evaluated(name, one, scenarios)]
             except ValueError as error:
-                errors[name] = ValueError(f"{error}{longer_step(T, self.fem.records_.temperatures)}")
-        left = still_evaluating({name: candidates[name] for name in rows}, errors)
-        texts = {name: f"{type(error).__name__}: {error}" for name, error in errors.items()}
+                outcomes[name] = ValueError(f"{error}{longer_step(T, self.fem.records_.temperatures)}")
+        found = without_errors(outcomes)
+        left = {name: learned[name] for name in found}
+        texts = {name: f"{type(one).__name__}: {one}" for name, one in outcomes.items() if isinstance(one, Exception)}
         lines = [row for name in detectors for row in rows.get(name, [{"detector": name, "error": texts.get(name)}])]
         results, rates = pd.DataFrame(lines, columns=list(next(iter(rows.values()))[0])), None
         if varies_more:
@@ -383,11 +381,11 @@ class DetectabilityStudy(BaseEstimator):
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
-        self._decided = {name: found[name] for name in left}
-        every = [(name, key, one) for name in left for key, one in found[name].decisions.items()]
+        self._decided = found
+        every = [(name, key, one) for name, some in found.items() for key, one in some.decisions.items()]
         self.decisions_ = {(name, *key): one for name, key, one in every if key[0] is not None}
         self.calibration_ = {(name, key[1]): one for name, key, one in every if key[0] is None}
-        self.indices_ = {(name, *key): one for name in left for key, one in found[name].indices.items()}
+        self.indices_ = {(name, *key): one for name, some in found.items() for key, one in some.indices.items()}
         self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()
         self.warnings_ = list(map(str, one_of_each_kind(findings)))
         warn_each(findings)
@@ -395,17 +393,17 @@ class DetectabilityStudy(BaseEstimator):
 
     def _learned(
         self, detectors: Mapping[str, Any], baseline: Any, findings: list[SkthermoWarning]
-    ) -> tuple[dict[str, Candidate], dict[str, Exception]]:
-        """Fitted detectors, and the errors of the others."""
-        candidates, errors, options = {}, {}, (baseline, self.random_state, self.memory)
+    ) -> dict[str, Candidate | Exception]:
+        """Each fitted detector, or its error."""
+        found: dict[str, Candidate | Exception] = {}
         for name, detector in detectors.items():
             with collected() as doubts:
                 try:
-                    candidates[name] = Candidate.learned(self.fem, detector, *options)
+                    found[name] = Candidate.learned(self.fem, detector, baseline, self.random_state, self.memory)
                 except Exception as error:
-                    errors[name] = error
+                    found[name] = error
             findings += by_detector(doubts, name, detectors)
-        return still_evaluating(candidates, errors), errors
+        return found
 
     def _in_parallel(self, unit: str, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
         """What a function gives, in joblib's jobs."""
@@ -413,31 +411,27 @@ class DetectabilityStudy(BaseEstimator):
         return run_jobs((delayed(function)(*some) for some in arguments), len(arguments), **options)
 
     def _repeats(
-        self, simulation: Simulation, candidates: dict[str, Candidate], seeds: Any, tol: float | None, confidence: float
-    ) -> dict[str, Decided | Exception]:
-        """What each detector decides in all repeats: one for each of the seeds or, with ``tol``, as many of them as the
-        bounds need. After the first repeat, those that have failed in it are left out."""
-        repeats: list[dict[str, Decided | Exception]] = []
+        self, simulation: Simulation, learned: Mapping[str, Any], seeds: Any, tol: float | None, confidence: float
+    ) -> dict[str, Any]:
+        """What each detector decides in all repeats, or its first error: one for each of the seeds or, with ``tol``, as
+        many of them as the bounds need. Detectors that fail are left out from then on."""
+        repeats: list[dict[str, Any]] = []
+        outcomes = {**learned}
 
-        def add(n_repeats: int) -> dict[str, Decided | Exception]:
-            failed = {name: one for name, one in (repeats[0] if repeats else {}).items() if isinstance(one, Exception)}
-            left = still_evaluating({name: one for name, one in candidates.items() if name not in failed}, failed)
-            numbers = range(len(repeats), n_repeats)
+        def add(n_repeats: int) -> None:
+            left, numbers = {name: learned[name] for name in without_errors(outcomes)}, range(len(repeats), n_repeats)
             repeats.extend(self._in_parallel("repeats", simulation.repeat, [(left, n, seeds[n]) for n in numbers]))
-            return {name: joined([one[name] for one in repeats if name in one]) for name in candidates}
+            outcomes.update({name: joined([one[name] for one in repeats]) for name in left})
 
         add(1)
-        found = add(len(seeds) if tol is None else 3)
-        if tol is None:
-            return found
-        rows = [
-            some.summary(confidence)
-            for name, one in found.items()
-            for some in (evaluated(name, one, simulation.scenarios) if isinstance(one, Decided) else ())
-            if some.source == "simulated" and np.isfinite(some.decisions).any()
-        ]
-        widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
-        return add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
+        add(len(seeds) if tol is None else 3)
+        if tol is not None:
+            some = [evaluated(name, one, simulation.scenarios) for name, one in without_errors(outcomes).items()]
+            simulated = [one for records in some for one in records if one.source == "simulated"]
+            rows = [one.summary(confidence) for one in simulated if np.isfinite(one.decisions).any()]
+            widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
+            add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
+        return outcomes
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.
@@ -839,10 +833,11 @@ def checked_reference(reference: Any, scenarios: Sequence[BaseScenario]) -> Mapp
     return given
 
 
-def still_evaluating(left: dict[str, Candidate], errors: Mapping[str, Exception]) -> dict[str, Candidate]:
-    """Detectors that have not failed; the first error if all have."""
+def without_errors(outcomes: Mapping[str, Any]) -> dict[str, Any]:
+    """What detectors gave that have not failed; the first error if all have."""
+    left = {name: one for name, one in outcomes.items() if not isinstance(one, Exception)}
     if not left:
-        raise next(iter(errors.values()))
+        raise next(iter(outcomes.values()))
     return left
 
 
