@@ -230,16 +230,12 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ],
     ("studies/_rates.py", "studies/test_ranking.py"): [
         ("Bonferroni in the ranking", "/ 2 / max(n_comparisons, 1)", "/ 2"),
-        (
-            "a threshold moved on all repeats",
-            "known = np.delete(self.calibration, left_out, axis=0)",
-            "known = self.calibration",
-        ),
+        ("a threshold moved on all repeats", "pod_of(others, known, limit)", "pod_of(others, calibration, limit)"),
     ],
     ("studies/_task.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
-        ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
-        ("false alarms that pay", "limit / max(self.false_alarms().ci_low, limit)", "1.0"),
+        ("windows that reach into other states", "np.flatnonzero(np.diff(repeat) | np.diff(scenario)) + 1", "[]"),
+        ("false alarms that pay", 'limit / max(self.false_alarms()["ci_low"], limit)', "1.0"),
         (
             "records that are not evaluated",
             "np.where(np.isnan(self.values), 0.0,",

@@ -21,7 +21,7 @@ from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
 from skthermo.studies._pod_curve import FamilyRates, families_of, fitted_curve
 from skthermo.studies._scenarios import BaseScenario, Scenario
-from skthermo.studies._simulation import Candidate, Simulation, changed_frequencies, scatter_of, sensors_of
+from skthermo.studies._simulation import Candidate, Simulation, scatter_of, sensors_of
 from skthermo.studies._study import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM
 
@@ -126,10 +126,8 @@ def compare_extensions(
         scatter = check_noise(_scatter(study) if noise is None else noise, len(ranks), names)
         compared = [(fem, T, candidates, dict(zip(ranks, scatter, strict=True)))] if candidates else []
         for chain, weather, others, further in compared + _with_sensors(fem, present, sensors):
-            states = ([Scenario("healthy")], chain.records_.temperatures), (scenarios, weather)
-            healthy, changed = (
-                Simulation(chain, some, T, measurement, changed_frequencies(chain, some, T)) for some, T in states
-            )
+            healthy = Simulation.solved(chain, [Scenario("healthy")], chain.records_.temperatures, measurement)
+            changed = Simulation.solved(chain, scenarios, weather, measurement)
             trials.append(trial(healthy, changed, {None: present} | others, further))
     for repeat in trials:
         jobs = (delayed(repeat)(int(seed)) for seed in seeds)

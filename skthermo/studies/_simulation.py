@@ -168,17 +168,17 @@ def scatter_of(fem: DataInformedFEM, noise: Any, gaps: Any, outliers: Any) -> di
 
 
 def changed_frequencies(
-    chain: DataInformedFEM, scenarios: Iterable[BaseScenario], T: Table, repeats: Sequence[int] = (0,)
+    chain: DataInformedFEM, scenarios: Iterable[BaseScenario], T: Table, repeats: Sequence[int]
 ) -> dict[str, list[Array]]:
     """Frequencies without noise, (n_records, n_modes), of each draw of every scenario that some repeats take."""
-    weather, model, found = chain.weather(T), chain.thermal_, {}
-    for one in scenarios:
-        changes = [one.changes(T, repeat % one.n_draws) for repeat in repeats[: one.n_draws]]
-        if len(changes) > 1 and hasattr(chain.model, "with_damage_parameters"):
-            found[one.name] = model.with_each(weather, [change["damage"] for change in changes], one.kind)
-        else:
-            found[one.name] = [model.simulated(weather, **change) for change in changes]
-    return found
+    weather = chain.weather(T)
+    return {
+        one.name: [
+            chain.thermal_.simulated(weather, **one.changes(T, repeat % one.n_draws))
+            for repeat in repeats[: one.n_draws]
+        ]
+        for one in scenarios
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +195,13 @@ class Simulation:
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None = None
     given: Mapping[str, Table] = field(default_factory=dict)
     levels: Any = 1.0
+
+    @classmethod
+    def solved(
+        cls, fem: DataInformedFEM, scenarios: Sequence[BaseScenario], T: Table, measurement: Any, n_repeats: int = 1
+    ) -> Simulation:
+        """A simulation by the chain itself of so many repeats."""
+        return cls(fem, scenarios, T, measurement, changed_frequencies(fem, scenarios, T, range(n_repeats)))
 
     @cached_property
     def weather(self) -> Any:

@@ -29,7 +29,6 @@ from skthermo.studies._simulation import (
     Candidate,
     Simulation,
     by_detector,
-    changed_frequencies,
     joined,
     scatter_of,
 )
@@ -351,8 +350,8 @@ class DetectabilityStudy(BaseEstimator):
             with stages.stage("frequencies"):
                 findings += self.fem.thermal_.doubts(self.fem.weather(T))
                 measurement = scatter_of(self.fem, self.noise, self.gaps, self.outliers)
-                clean = changed_frequencies(self.fem, scenarios, T, range(most_repeats))
-                simulation = Simulation(self.fem, scenarios, T, measurement, clean, function, given)
+                simulation = Simulation.solved(self.fem, scenarios, T, measurement, most_repeats)
+                simulation = replace(simulation, reference=function, given=given)
             with stages.stage("repeats"):
                 grows = tol if is_auto(self.n_repeats) and varies_more else None
                 outcomes = self._repeats(simulation, learned, seeds, grows, confidence)

@@ -22,14 +22,7 @@ from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.preprocessing.checks import set_aside
 from skthermo.studies._rates import rate_of
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies._simulation import (
-    Simulation,
-    baseline_table,
-    changed_frequencies,
-    has_targets,
-    scatter_of,
-    sensors_of,
-)
+from skthermo.studies._simulation import Simulation, baseline_table, has_targets, scatter_of, sensors_of
 from skthermo.studies._study import check_detector
 from skthermo.surrogate import DataInformedFEM
 
@@ -94,13 +87,10 @@ class Decisions:
 class TaskScorer:
     """Scores a fitted detector on simulated records of a task, each state by itself.
 
-    Labels are those of all simulated records; the number of the state of each counts through the scenarios of the first
-    repeat, then through those of the second.
+    ``states`` has the label, scenario and repeat of all simulated records.
     """
 
-    labels: pd.Series
-    state: NDArray[np.intp]
-    n_scenarios: int
+    states: pd.DataFrame
     sensors: Sequence[Hashable]
     max_false_alarms: float
 
@@ -113,27 +103,27 @@ class TaskScorer:
         check_detector(estimator, "the detector")
         self._check_columns(estimator, X)
         rows = self._rows(X)
-        labels = self.labels.to_numpy()[rows] if y is None else np.asarray(y)
+        labels = self.states["label"].to_numpy()[rows] if y is None else np.asarray(y)
         missing = [name for name, label in (("healthy", 1), ("damaged", -1)) if not (labels == label).any()]
         if missing:
             raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
-        order = np.argsort(rows, kind="stable")
-        state, values = self.state[rows[order]], []
+        order, values = np.argsort(rows, kind="stable"), []
+        states = self.states.iloc[rows[order]]
+        repeat, scenario = states["repeat"].to_numpy(), states["scenario"].cat.codes.to_numpy()
         of_first_rows, findings = ("not-evaluated", "no-earlier-records"), list[SkthermoWarning]()
-        for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
+        for one in np.split(order, np.flatnonzero(np.diff(repeat) | np.diff(scenario)) + 1):
             with collected() as found:
                 values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
             is_none = np.isnan(values[-1]).all()
             findings += [finding for finding in found if is_none or finding.kind not in of_first_rows]
         warn_each(findings)
-        repeat, scenario = np.divmod(state, self.n_scenarios)
         return Decisions(np.concatenate(values), labels[order], scenario, repeat)
 
     def _rows(self, X: Table) -> NDArray[np.intp]:
         """Positions of the rows among the simulated ones."""
         if not isinstance(X, pd.DataFrame):
             raise ValueError(f"X is of type {type(X).__name__}; expected a frame: rows of the task's X, with its index")
-        rows = self.labels.index.get_indexer(X.index)
+        rows = self.states.index.get_indexer(X.index)
         if (rows < 0).any():
             raise ValueError(
                 f"{(rows < 0).sum()} of {len(rows)} rows are no simulated records of the task, the first "
@@ -206,9 +196,6 @@ class DetectionTask(Bunch):
     scoring: TaskScorer
     baseline: pd.DataFrame
     states: pd.DataFrame
-
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
 
     def refit(self, detector: BaseEstimator) -> BaseEstimator:
         """A detector, or the best one of a search, fitted to the baseline alone.
@@ -326,8 +313,7 @@ class DetectionTask(Bunch):
         index = _moved(T, baseline, n_repeats * n_scenarios)
         with collected() as findings, single_blas_thread():
             findings += self.fem.thermal_.doubts(self.fem.weather(T))
-            clean = changed_frequencies(self.fem, self.scenarios, T, range(n_repeats))
-            simulation = Simulation(self.fem, self.scenarios, T, self.measurement, clean)
+            simulation = Simulation.solved(self.fem, self.scenarios, T, self.measurement, n_repeats)
             tables = [
                 table[list(baseline)].to_numpy()
                 for repeat, seed in enumerate(seeds)
@@ -342,8 +328,7 @@ class DetectionTask(Bunch):
         states = pd.DataFrame({"scenario": names, "repeat": np.r_[before, repeat]}, X.index)
         groups = np.array_split(np.arange(n_repeats), n_splits)
         cv = [(np.arange(n_baseline), n_baseline + np.flatnonzero(np.isin(repeat, group))) for group in groups]
-        state, sensors = repeat * n_scenarios + scenario, sensors_of(self.fem)
-        scoring = TaskScorer(y.iloc[n_baseline:], state, n_scenarios, sensors, limit)
+        scoring = TaskScorer(states.assign(label=y).iloc[n_baseline:], sensors_of(self.fem), limit)
         simulated = {"X": X, "y": y, "cv": cv, "scoring": scoring, "states": states, "T": T, "seeds": seeds}
         return DetectionTask(**{**self, **simulated}), findings
 

@@ -102,7 +102,7 @@ def test_states_have_stamps_of_their_own(fem, n_repeats):
     stamps = task.X.index
     assert stamps.is_monotonic_increasing
     assert stamps.is_unique
-    state = np.r_[-1 * np.ones(365, dtype=int), task.scoring.state]
+    state = 5 * task.states["repeat"] + task.states["scenario"].cat.codes
     steps = np.diff(stamps)[np.diff(state) != 0]
     assert (steps >= pd.Timedelta(days=30)).all()
     assert len(steps) == 5 * n_repeats
