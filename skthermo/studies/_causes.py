@@ -274,3 +274,36 @@ def stretches(
     total = sum(one.share for one in found)
     found = [replace(one, share=0.75 * one.share / total) for one in found]
     return [replace(cause, rows=members, share=0.25 if found else 1.0), *found]
+
+
+def divided_causes(
+    asked: Sequence[Cause], model: Any, structure: Structure
+) -> tuple[list[Cause], list[Cause], dict[str, dict[str, set[Hashable]]], dict[Hashable, dict[str, Any]]]:
+    """Causes with stretches in place of damaged groups; pieces, the sums of whose effects are those of stretches;
+    members of each piece by group of the model, which is divided so; and the group and place of each member."""
+    causes: list[Cause] = []
+    pieces: list[Cause] = []
+    parts: dict[str, dict[str, set[Hashable]]] = {}
+    members: dict[Hashable, dict[str, Any]] = {}
+    for cause in asked:
+        if cause.kind != "damage":
+            causes.append(cause)
+        if cause.kind != "damage" or cause.alone:
+            continue
+        lines = lines_of(structure, members_of(model, cause.of))
+        for place, line in enumerate(lines, 1):
+            for number, member in enumerate(line, 1):
+                middle = np.mean([structure.nodes[node] for node in structure.members[member].nodes], axis=0)
+                at = dict(zip("xyz", middle.tolist(), strict=False))
+                members[member] = {"group": cause.name, "line": place, "element": number} | at
+        divided = pieces_of(lines)
+        named = {
+            f"{cause.name}, piece {number}": set(piece)
+            for number, piece in enumerate((piece for line in divided for piece in line), 1)
+        }
+        for name in cause.of:
+            inside = set(members_of(model, [name]))
+            parts[name] = {piece: rows & inside for piece, rows in named.items() if rows & inside}
+        pieces += [Cause(name, of=(name,)) for name in named]
+        causes += stretches(structure, cause, divided, [*named])
+    return causes, pieces, parts, members

@@ -25,13 +25,7 @@ from skthermo.studies._pod_curve import FamilyRates, PODCurve, families_of
 from skthermo.studies._rates import EvaluatedRecords, evaluated, in_words, rank
 from skthermo.studies._replicates import ReplicateRates, drawn_replicates, in_sentences, replicated
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies._simulation import (
-    Candidate,
-    Simulation,
-    by_detector,
-    joined,
-    scatter_of,
-)
+from skthermo.studies._simulation import Candidate, Simulation, by_detector, joined, scatter_of
 from skthermo.surrogate import DataInformedFEM
 
 

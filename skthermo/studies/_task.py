@@ -289,7 +289,9 @@ class DetectionTask(Bunch):
         if not named:
             raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
         seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
-        fresh, findings = self._simulated(T, self.scoring.max_false_alarms, 1, seeds)
+        limit, ends = self.scoring.max_false_alarms, ("ci_low", "ci_high")
+        drawn = {number for number, scenario in enumerate(self.scenarios) if scenario.n_draws > 1}
+        fresh, findings = self._simulated(T, limit, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
             text = "the weather is that of the task: the optimism is that of the noise alone. Give that of another year"
             findings.append(WeatherWarning(text, "other-weather"))
@@ -297,8 +299,14 @@ class DetectionTask(Bunch):
         for name, detector in named.items():
             fitted = self.refit(detector)
             tuned = np.mean([self.scoring(fitted, self.X.iloc[test], self.y.iloc[test]) for _, test in self.cv])
+            found = fresh.scoring.decisions(fitted, fresh.X.iloc[len(fresh.baseline) :])
+            pods, alarms = found.pods(limit, confidence, drawn), found.false_alarms(confidence)
             row = {"detector": name or type(last_step(fitted)).__name__, "tuned": float(tuned)}
-            rows.append(row | fresh._rates(fitted, confidence))
+            row |= {"fresh": found.score(limit)}
+            row |= {f"fresh_{end}": found.worth(limit) * np.mean([pod[end] for pod in pods]) for end in ends}
+            row |= {"false_alarms": alarms["rate"]} | {f"false_alarms_{end}": alarms[end] for end in ends}
+            row |= {"within_limit": alarms["ci_low"] <= limit, "not_evaluated": np.isnan(found.values).mean()}
+            rows.append(row)
         warn_each(findings)
         table = pd.DataFrame(rows).set_index("detector")
         table.insert(4, "optimism", table["tuned"] - table["fresh"])
@@ -331,23 +339,6 @@ class DetectionTask(Bunch):
         scoring = TaskScorer(states.assign(label=y).iloc[n_baseline:], sensors_of(self.fem), limit)
         simulated = {"X": X, "y": y, "cv": cv, "scoring": scoring, "states": states, "T": T, "seeds": seeds}
         return DetectionTask(**{**self, **simulated}), findings
-
-    def _rates(self, detector: BaseEstimator, confidence: float) -> dict[str, Any]:
-        """Score and false alarms of a fitted detector on all simulated records, with bounds."""
-        limit = self.scoring.max_false_alarms
-        found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
-        drawn = {number for number, scenario in enumerate(self.scenarios) if scenario.n_draws > 1}
-        pods, alarms, worth = found.pods(limit, confidence, drawn), found.false_alarms(confidence), found.worth(limit)
-        return {
-            "fresh": found.score(limit),
-            "fresh_ci_low": worth * float(np.mean([pod["ci_low"] for pod in pods])),
-            "fresh_ci_high": worth * float(np.mean([pod["ci_high"] for pod in pods])),
-            "false_alarms": alarms["rate"],
-            "false_alarms_ci_low": alarms["ci_low"],
-            "false_alarms_ci_high": alarms["ci_high"],
-            "within_limit": alarms["ci_low"] <= limit,
-            "not_evaluated": float(np.isnan(found.values).mean()),
-        }
 
 
 def detection_task(
@@ -464,7 +455,10 @@ def detection_task(
     limit = check_probability(max_false_alarms, "max_false_alarms")
     check_chain(fem)
     table, findings = _baseline(fem, baseline)
-    table = table[_columns(table, columns, fem.mode_names_)]
+    chosen = list(table) if columns is None else check_names(columns, "columns", list(table))
+    if not set(chosen) & set(fem.mode_names_):
+        raise ValueError(f"columns are {chosen}; expected some of {list(table)}, modes among them")
+    table = table[[name for name in table if name in chosen]]
     measurement = scatter_of(fem, noise, gaps, outliers)
     given = {"scenarios": read_scenarios(scenarios, fem.model), "baseline": table, "measurement": measurement}
     task, doubts = DetectionTask(fem=fem, **given)._simulated(T, limit, n_splits, seeds)
@@ -527,14 +521,6 @@ def _labels(scenarios: Sequence[BaseScenario], T: Table) -> NDArray[np.intp]:
             names = [one.name for one in scenarios]
             raise ValueError(f"none of the scenarios {names} has {name} records; expected a healthy and a damaged one")
     return labels
-
-
-def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) -> list[Hashable]:
-    """Those columns of the baseline that a detector shall see, in the order of the baseline."""
-    chosen = list(baseline.columns) if columns is None else check_names(columns, "columns", list(baseline))
-    if not set(chosen) & set(modes):
-        raise ValueError(f"columns are {chosen}; expected some of {list(baseline.columns)}, modes among them")
-    return [name for name in baseline.columns if name in chosen]
 
 
 def _seeds(n_repeats: Any, random_state: np.random.RandomState | None) -> NDArray[np.intp]:
