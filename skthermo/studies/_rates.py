@@ -14,7 +14,6 @@ from scipy.stats import beta, mannwhitneyu, t
 from skthermo._core.arrays import Array
 from skthermo._core.frames import Table, correlation_times, row_times, time_of
 from skthermo.studies._scenarios import BaseScenario
-from skthermo.studies._simulation import Decided
 
 
 def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = False) -> dict[str, Any]:
@@ -162,13 +161,15 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
     return float(detected.mean()) if detected.size else float("nan")
 
 
-def evaluated(detector: str, decided: Decided, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
+def evaluated(
+    detector: str, decisions: Mapping[Any, Array], indices: Mapping[Any, pd.Series], scenarios: Sequence[BaseScenario]
+) -> list[EvaluatedRecords]:
     """What a detector has evaluated, in the order of the scenarios."""
     return [
-        EvaluatedRecords(detector, one, source, decided.indices[one.name, source], decided.decisions[one.name, source])
+        EvaluatedRecords(detector, one, source, indices[key], decisions[key])
         for one in scenarios
         for source in ("simulated", "reference")
-        if (one.name, source) in decided.decisions
+        if (key := (detector, one.name, source)) in decisions
     ]
 
 
@@ -202,8 +203,8 @@ def area_under_curve(healthy: Array, damaged: Sequence[Array]) -> float:
     """Area under the ROC curve, the chance that a damaged record is further off than a healthy one; mean over the
     damaged scenarios."""
     healthy = healthy[~np.isnan(healthy)].astype(float)
-    evaluated = [one[~np.isnan(one)] for one in damaged]
-    chances = [mannwhitneyu(healthy, one, method="asymptotic").statistic / len(one) for one in evaluated]
+    known = [one[~np.isnan(one)] for one in damaged]
+    chances = [mannwhitneyu(healthy, one, method="asymptotic").statistic / len(one) for one in known]
     return float(np.mean(chances)) / len(healthy)
 
 

@@ -69,13 +69,10 @@ def replicated(
     chain, scenarios = fem, {one.name: one for one in simulation.scenarios}
     with collected(drop_others=True), single_blas_thread():
         try:
-            for part in parts:
-                if part == "noise":
-                    continue
-                if part == "weather" and len(years) > 1:
-                    T = years[number % len(years)]
-                elif part == "weather":
-                    T = resampled_days(T, np.random.RandomState(weather))
+            for part in [one for one in parts if one != "noise"]:
+                if part == "weather":
+                    days = np.random.RandomState(weather)
+                    T = years[number % len(years)] if len(years) > 1 else resampled_days(T, days)
                 if part == "model":
                     chain = refitted(fem, model=models[number % len(models)])
                 if part == "baseline" or (part == "model" and "baseline" in parts):
@@ -87,10 +84,10 @@ def replicated(
                 here = replace(simulation, T=T, clean=clean, levels=levels, reference=None)
                 tables = here.records(0, [noise if "noise" in parts else 0])
                 for name, candidate in candidates.items():
-                    found = candidate.decided(tables)
+                    found = candidate.decided(name, tables)
                     if isinstance(found, Exception):
                         raise found
-                    for (scenario, source), values in found.decisions.items():
+                    for (_, scenario, source), values in found.decisions.items():
                         one = EvaluatedRecords(name, scenarios[scenario], source, T, values[np.newaxis])
                         kept = one.from_onset()[0]
                         rate = float((kept < 0).sum() / max(np.count_nonzero(~np.isnan(kept)), 1))

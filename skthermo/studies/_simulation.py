@@ -23,13 +23,13 @@ from skthermo.exceptions import SkthermoWarning
 from skthermo.studies._scenarios import BaseScenario
 from skthermo.surrogate import DataInformedFEM
 
-Key: TypeAlias = tuple[str | None, str]
-"""Scenario, None for healthy records with noise of other seeds, by which thresholds are moved, and source."""
+Key: TypeAlias = tuple[str, str | None, str]
+"""Detector; scenario, None for healthy records with noise of other seeds, by which thresholds are moved; source."""
 
 
 class Decided(NamedTuple):
-    """A detector's decisions of one repeat, (n_records,), or of several, (n_repeats, n_records), by scenario and
-    source, and damage indices and warnings of the first."""
+    """A detector's decisions of one repeat, (n_records,), or of several, (n_repeats, n_records), and damage indices and
+    warnings of the first."""
 
     decisions: dict[Key, Array]
     indices: dict[Key, pd.Series]
@@ -125,7 +125,9 @@ class Candidate:
         seen = table[self.columns]
         return seen if self.is_frame else seen.to_numpy()
 
-    def decided(self, tables: Mapping[Key, pd.DataFrame], is_first: bool = False) -> Decided | Exception:
+    def decided(
+        self, name: str, tables: Mapping[tuple[str | None, str], pd.DataFrame], is_first: bool = False
+    ) -> Decided | Exception:
         """What the detector decides on tables by scenario and source, or its error.
 
         Damage indices and warnings are those of the first repeat alone. As float32, decisions are as exact as alarms
@@ -138,10 +140,10 @@ class Candidate:
                 try:
                     seen = self.seen(table, f"the {source} of scenario {scenario!r}")
                     decisions = np.asarray(self.detector.decision_function(seen), dtype=np.float32)
-                    found.decisions[scenario, source] = decisions
+                    found.decisions[name, scenario, source] = decisions
                     if is_shown:
                         index = -np.asarray(self.detector.score_samples(seen), dtype=float)
-                        found.indices[scenario, source] = pd.Series(index, table.index, name="damage_index")
+                        found.indices[name, scenario, source] = pd.Series(index, table.index, name="damage_index")
                 except Exception as error:
                     return error
             found.findings.extend(doubts if is_shown else [])
@@ -252,11 +254,11 @@ class Simulation:
         """What each detector decides on one repeat of all scenarios, in the first one on records that are given, and on
         other healthy ones, by which thresholds are moved."""
         with single_blas_thread():
-            tables: dict[Key, pd.DataFrame] = {**self.records(number, seeds)}
+            tables: dict[tuple[str | None, str], pd.DataFrame] = {**self.records(number, seeds)}
             for name in self.given if number == 0 else ():
                 tables[name, "reference"] = self.measured(name, self.given[name], self.temperatures)
             healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
             others = np.random.RandomState(seeds).randint(np.iinfo(np.int32).max, size=2)
             again = self.records(number, others, healthy) if healthy else {}
             tables |= {(None, source): table for (_, source), table in again.items()}
-            return {name: one.decided(tables, number == 0) for name, one in candidates.items()}
+            return {name: one.decided(name, tables, number == 0) for name, one in candidates.items()}

@@ -337,7 +337,7 @@ class DetectabilityStudy(BaseEstimator):
         asked = self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0]
         parts, years, models, others = drawn_replicates(*asked)
         varies_more, T = parts != ["noise"], years[0]
-        stages = Stages(self, 4 + varies_more)
+        stages = Stages(self, 3 + varies_more)
         with collected() as findings, single_blas_thread():
             with stages.stage("detectors"):
                 learned = self._learned(detectors, baseline, findings)
@@ -353,7 +353,8 @@ class DetectabilityStudy(BaseEstimator):
         for name, one in without_errors(outcomes).items():
             findings += by_detector(one.findings, name, detectors)
             try:
-                rows[name] = [some.summary(confidence) for some in evaluated(name, one, scenarios)]
+                records = evaluated(name, one.decisions, one.indices, scenarios)
+                rows[name] = [some.summary(confidence) for some in records]
             except ValueError as error:
                 outcomes[name] = ValueError(f"{error}{longer_step(T, self.fem.records_.temperatures)}")
         found = without_errors(outcomes)
@@ -374,11 +375,10 @@ class DetectabilityStudy(BaseEstimator):
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
-        self._decided = found
-        every = [(name, key, one) for name, some in found.items() for key, one in some.decisions.items()]
-        self.decisions_ = {(name, *key): one for name, key, one in every if key[0] is not None}
-        self.calibration_ = {(name, key[1]): one for name, key, one in every if key[0] is None}
-        self.indices_ = {(name, *key): one for name, some in found.items() for key, one in some.indices.items()}
+        decisions = {key: one for some in found.values() for key, one in some.decisions.items()}
+        self.decisions_ = {key: one for key, one in decisions.items() if key[1] is not None}
+        self.calibration_ = {(name, source): one for (name, of, source), one in decisions.items() if of is None}
+        self.indices_ = {key: one for some in found.values() for key, one in some.indices.items()}
         self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()
         self.warnings_ = list(map(str, one_of_each_kind(findings)))
         warn_each(findings)
@@ -419,9 +419,12 @@ class DetectabilityStudy(BaseEstimator):
         add(1)
         add(len(seeds) if tol is None else 3)
         if tol is not None:
-            some = [evaluated(name, one, simulation.scenarios) for name, one in without_errors(outcomes).items()]
-            simulated = [one for records in some for one in records if one.source == "simulated"]
-            rows = [one.summary(confidence) for one in simulated if np.isfinite(one.decisions).any()]
+            rows = [
+                some.summary(confidence)
+                for name, one in without_errors(outcomes).items()
+                for some in evaluated(name, one.decisions, one.indices, simulation.scenarios)
+                if some.source == "simulated" and np.isfinite(some.decisions).any()
+            ]
             widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
             add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
         return outcomes
@@ -773,8 +776,8 @@ class DetectabilityStudy(BaseEstimator):
 
     def _records(self, source: str) -> list[EvaluatedRecords]:
         """What the detectors evaluated of one source."""
-        found = [evaluated(name, one, self.scenarios_) for name, one in self._decided.items()]
-        return [one for some in found for one in some if one.source == source]
+        tables = self.decisions_, self.indices_, self.scenarios_
+        return [one for name in self.detectors_ for one in evaluated(name, *tables) if one.source == source]
 
     def _family(self, family: str, source: str, detector: str | None) -> FamilyRates:
         name = self.detector_name(detector)
