@@ -120,7 +120,7 @@ def compare_extensions(
     n_repeats = int(study.results_["n_repeats"].max())
     seeds = as_random_state(study.random_state).randint(np.iinfo(np.int32).max, size=n_repeats)
     measurement = scatter_of(fem, study.noise, study.gaps, study.outliers)
-    scenarios, trials, rows = scenarios_of(study, name), [], []
+    scenarios, rows = scenarios_of(study, name), []
     with collected() as findings, single_blas_thread():
         findings += fem.thermal_.doubts(fem.weather(T)) + (_doubtful_modes(fem, ranks) if ranks else [])
         scatter = check_noise(_scatter(study) if noise is None else noise, len(ranks), names)
@@ -128,15 +128,14 @@ def compare_extensions(
         for chain, weather, others, further in compared + _with_sensors(fem, present, sensors):
             healthy = Simulation.solved(chain, [Scenario("healthy")], chain.records_.temperatures, measurement)
             changed = Simulation.solved(chain, scenarios, weather, measurement)
-            trials.append(trial(healthy, changed, {None: present} | others, further))
-    for repeat in trials:
-        jobs = (delayed(repeat)(int(seed)) for seed in seeds)
-        repeats = run_jobs(jobs, len(seeds), unit="repeats", n_jobs=study.n_jobs)
-        rows += [
-            _row(*key, family, np.array([[one[None][family], one[key][family]] for one in repeats]))
-            for key in filter(None, repeats[0])
-            for family in repeats[0][None]
-        ]
+            repeat = trial(healthy, changed, {None: present} | others, further)
+            jobs = (delayed(repeat)(int(seed)) for seed in seeds)
+            repeats = run_jobs(jobs, len(seeds), unit="repeats", n_jobs=study.n_jobs)
+            rows += [
+                _row(*key, family, np.array([[one[None][family], one[key][family]] for one in repeats]))
+                for key in others
+                for family in repeats[0][None]
+            ]
     if not rows:
         raise ValueError("there is no candidate; expected modes, baseline_factors or sensors")
     warn_each(findings)
