@@ -384,11 +384,9 @@ class DetectabilityStudy(BaseEstimator):
         warn_each(findings)
         return results
 
-    def _learned(
-        self, detectors: Mapping[str, Any], baseline: Any, findings: list[SkthermoWarning]
-    ) -> dict[str, Candidate | Exception]:
+    def _learned(self, detectors: Mapping[str, Any], baseline: Any, findings: list[SkthermoWarning]) -> dict[str, Any]:
         """Each fitted detector, or its error."""
-        found: dict[str, Candidate | Exception] = {}
+        found: dict[str, Any] = {}
         for name, detector in detectors.items():
             with collected() as doubts:
                 try:

@@ -197,6 +197,9 @@ class DetectionTask(Bunch):
     baseline: pd.DataFrame
     states: pd.DataFrame
 
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+
     def refit(self, detector: BaseEstimator) -> BaseEstimator:
         """A detector, or the best one of a search, fitted to the baseline alone.
 
