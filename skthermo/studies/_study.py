@@ -406,15 +406,14 @@ class DetectabilityStudy(BaseEstimator):
     ) -> dict[str, Any]:
         """What each detector decides in all repeats, or its first error: one for each of the seeds or, with ``tol``, as
         many of them as the bounds need. Detectors that fail are left out from then on."""
-        repeats: list[dict[str, Any]] = []
-        outcomes = {**learned}
+        repeats = [simulation.repeat(without_errors(learned), 0, seeds[0])]  # here, where warnings are collected
+        outcomes = {**learned, **repeats[0]}
 
         def add(n_repeats: int) -> None:
             left, numbers = {name: learned[name] for name in without_errors(outcomes)}, range(len(repeats), n_repeats)
             repeats.extend(self._in_parallel("repeats", simulation.repeat, [(left, n, seeds[n]) for n in numbers]))
             outcomes.update({name: joined([one[name] for one in repeats]) for name in left})
 
-        add(1)
         add(len(seeds) if tol is None else 3)
         if tol is not None:
             rows = [
