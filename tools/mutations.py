@@ -217,29 +217,25 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("fem/_terms.py", "fem/test_divide.py"): [
         ("parts of calibrated terms", "terms.with_factors(self.factors[origin])", "terms"),
     ],
-    ("studies/identification/_evidence.py", "studies/test_identify.py"): [
+    ("studies/_evidence.py", "studies/test_identify.py"): [
         ("probability of the bounds", "logs = logs + logsumexp(", "logs = logs + 0 * logsumexp("),
         ("exact effects of several causes", "self.rotation\n        added", "0 * self.rotation\n        added"),
     ],
-    ("studies/detectability/_simulation.py", "studies/test_study.py"): [
+    ("studies/_simulation.py", "studies/test_study.py"): [
         (
             "noise of reference records",
             "self.reference(scenario, int(seeds[1]))",
             "self.reference(scenario, int(seeds[0]))",
         ),
     ],
-    ("studies/detectability/_rates.py", "studies/test_ranking.py"): [
+    ("studies/_rates.py", "studies/test_ranking.py"): [
         ("Bonferroni in the ranking", "/ 2 / max(n_comparisons, 1)", "/ 2"),
-        (
-            "a threshold moved on all repeats",
-            "known = np.delete(self.calibration, left_out, axis=0)",
-            "known = self.calibration",
-        ),
+        ("a threshold moved on all repeats", "pod_of(others, known, limit)", "pod_of(others, calibration, limit)"),
     ],
-    ("studies/detectability/_task.py", "studies/test_detection_task.py"): [
+    ("studies/_task.py", "studies/test_detection_task.py"): [
         ("a threshold lowered to the limit", "+ 1e-9)], 0.0))", "+ 1e-9)], np.inf))"),
-        ("windows that reach into other states", "np.flatnonzero(np.diff(state)) + 1", "[]"),
-        ("false alarms that pay", "limit / max(self.false_alarms().ci_low, limit)", "1.0"),
+        ("windows that reach into other states", "np.flatnonzero(np.diff(repeat) | np.diff(scenario)) + 1", "[]"),
+        ("false alarms that pay", 'limit / max(self.false_alarms()["ci_low"], limit)', "1.0"),
         (
             "records that are not evaluated",
             "np.where(np.isnan(self.values), 0.0,",
@@ -251,7 +247,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
     ("surrogate/_records.py", "surrogate/test_service_records.py"): [
         ("gaps in any weather", 'kind="stable")[:25]', 'kind="stable")'),
     ],
-    ("studies/detectability/_rates.py", "studies/test_pod_curve.py"): [
+    ("studies/_rates.py", "studies/test_pod_curve.py"): [
         ("length of the blocks of a rate", "length: int = 10", "length: int = 1"),
     ],
     ("metrics/_detectability.py", "metrics/test_metrics.py"): [

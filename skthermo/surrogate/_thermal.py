@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -238,18 +238,9 @@ class ThermalModel(SavesFrames):
                 simulator = simulator.with_damage_parameters(list(growing), severities.min(), severities.max(), kind)
                 theta = np.hstack([theta, 1 - severities])
         frequencies = simulator.frequencies(theta, self.n_jobs)
-        return self.measured(frequencies, weather) if modes is None else frequencies
-
-    def measured(self, frequencies: Array, weather: Weather) -> Array:
-        """Frequencies of a model in the measured domain, times the discrepancy."""
+        if modes is not None:
+            return frequencies
         return as_floats(self.aligner.inverse_transform(frequencies)) * np.exp(weather.delta)
-
-    def with_each(self, weather: Weather, draws: Sequence[Mapping[str, float]], kind: LossKind) -> list[Array]:
-        """Frequencies with one damage of the same groups after the other, solved together by one model."""
-        numbers = np.tile(np.arange(len(weather)), len(draws))
-        repeated = replace(weather, given=numbers, theta=weather.theta[numbers], delta=weather.delta[numbers])
-        damage = {group: np.repeat([draw[group] for draw in draws], len(weather)) for group in draws[0]}
-        return np.split(self.simulated(repeated, damage=damage, kind=kind), len(draws))
 
     def elasticity(self, theta: Array, *, step: float = 0.01) -> Array:
         """Relative changes of measured frequencies by those of the model's, (n_rows, n_modes), over a relative step;

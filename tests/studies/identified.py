@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from skthermo.studies import IdentifiedDamage
-from skthermo.studies.identification._causes import Cause
-from skthermo.studies.identification._evidence import DamageExplanation
-from skthermo.studies.identification._identify import tabulated
+from skthermo.studies._causes import Cause
+from skthermo.studies._evidence import DamageExplanation
+from skthermo.studies._identify import tabulated
 
 
 def identified(explanations, *, groups=None, unobservable=(), alike=(), **changed):

@@ -102,7 +102,7 @@ def test_states_have_stamps_of_their_own(fem, n_repeats):
     stamps = task.X.index
     assert stamps.is_monotonic_increasing
     assert stamps.is_unique
-    state = np.r_[-1 * np.ones(365, dtype=int), task.scoring.state]
+    state = 5 * task.states["repeat"] + task.states["scenario"].cat.codes
     steps = np.diff(stamps)[np.diff(state) != 0]
     assert (steps >= pd.Timedelta(days=30)).all()
     assert len(steps) == 5 * n_repeats
@@ -148,7 +148,7 @@ def test_random_numbers_find_no_more_than_the_limit(fem, own, expected):
     found = task.scoring.decisions(noted(task, decisions), task.X[365:])
     assert abs(found.found(0.02) - expected) < 4 * np.sqrt(2 * expected / (40 * 120))
     score = task.scoring(noted(task, decisions), task.X[365:], task.y[365:])
-    lowest, highest = found.false_alarms().ci_low, found.false_alarms().ci_high
+    lowest, highest = (found.false_alarms()[name] for name in ("ci_low", "ci_high"))
     assert lowest < own < highest
     assert score == pytest.approx(found.found(0.02) * min(0.02 / lowest, 1))
 

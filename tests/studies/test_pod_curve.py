@@ -9,7 +9,7 @@ from scipy.special import expit, logit
 from scipy.stats import beta, norm
 
 from skthermo.studies import pod_curve
-from skthermo.studies.detectability._rates import clopper_pearson, rate_of
+from skthermo.studies._rates import clopper_pearson, rate_of
 
 SEVERITIES = np.array([0.1, 0.15, 0.2, 0.25, 0.3])
 DETECTED = np.array([9.0, 21.0, 33.0, 38.0, 40.0])
@@ -178,7 +178,7 @@ def test_bounds_hold_the_rate_as_often_as_they_say(n_repeats, correlation, rate)
     for _ in range(150):
         values, truth = decisions(random, rate, correlation, n_repeats, 365)
         found = rate_of(values)
-        held.append(found.ci_low <= truth <= found.ci_high)
+        held.append(found["ci_low"] <= truth <= found["ci_high"])
     assert np.mean(held) > 0.9  # 95 % asked, of 150: 2.8 standard errors
 
 
@@ -189,7 +189,7 @@ def test_effective_number_is_that_of_the_correlation_of_the_alarms(n_repeats):
     for _ in range(30):
         values, _ = decisions(random, 0.5, 0.8, n_repeats, 3650 // n_repeats + 365)
         found = rate_of(values)
-        ratios.append(found.n_records / found.n_effective)
+        ratios.append(found["n_records"] / found["n_effective"])
     lags = np.arange(1, 60)  # correlation of the signs of a Gaussian process: 2/pi arcsin(rho)
     expected = 1 + 2 * (2 / np.pi * np.arcsin(0.8**lags)).sum()
     assert np.median(ratios) == pytest.approx(expected, rel=0.25)
@@ -208,10 +208,10 @@ def test_rates_of_0_and_1_of_correlated_records_have_wide_bounds(sign):
     random = np.random.RandomState(0)
     independent, correlated = (decisions(random, 0.5, rho, 20, 365)[0] + sign * 20 for rho in (0.0, 0.9))
     first, second = rate_of(independent), rate_of(correlated)
-    assert first.rate == second.rate == (sign < 0)
-    assert first.n_effective > 0.9 * 7300
-    assert second.n_effective == pytest.approx(7300 / 19, rel=0.3)  # (1 + 0.9) / (1 - 0.9)
-    assert second.ci_high - second.ci_low > 10 * (first.ci_high - first.ci_low)
+    assert first["rate"] == second["rate"] == (sign < 0)
+    assert first["n_effective"] > 0.9 * 7300
+    assert second["n_effective"] == pytest.approx(7300 / 19, rel=0.3)  # (1 + 0.9) / (1 - 0.9)
+    assert second["ci_high"] - second["ci_low"] > 10 * (first["ci_high"] - first["ci_low"])
 
 
 def test_records_without_a_decision_do_not_count():
@@ -219,26 +219,26 @@ def test_records_without_a_decision_do_not_count():
     gaps = np.random.RandomState(1).uniform(size=values.shape) < 0.2
     gaps[:, 40:90] = True
     found = rate_of(np.where(gaps, np.nan, values))
-    assert found.n_records == np.count_nonzero(~gaps)
-    assert found.rate == np.mean(values[~gaps] < 0)
-    assert found.ci_low < found.rate < found.ci_high
+    assert found["n_records"] == np.count_nonzero(~gaps)
+    assert found["rate"] == np.mean(values[~gaps] < 0)
+    assert found["ci_low"] < found["rate"] < found["ci_high"]
     nothing = rate_of(np.full((2, 10), np.nan))
-    assert nothing.n_records == 0
-    assert np.isnan(nothing.rate)
+    assert nothing["n_records"] == 0
+    assert np.isnan(nothing["rate"])
 
 
 def test_repeats_that_are_all_alike_count_once():
     once, _ = decisions(np.random.RandomState(0), 0.3, 0.5, 1, 365)
     single, repeated = rate_of(once), rate_of(np.repeat(once, 20, axis=0))
-    assert repeated.n_effective == pytest.approx(single.n_effective)
-    assert (repeated.ci_low, repeated.ci_high) == pytest.approx((single.ci_low, single.ci_high))
+    assert repeated["n_effective"] == pytest.approx(single["n_effective"])
+    assert (repeated["ci_low"], repeated["ci_high"]) == pytest.approx((single["ci_low"], single["ci_high"]))
 
 
 def test_repeats_with_other_damage_count_as_one_record_each():
     """Half of the repeats have alarms throughout, half have none: 20 coins, whatever the number of records."""
     decisions = np.repeat(np.where(np.arange(20) % 2, 1.0, -1.0)[:, np.newaxis], 400, axis=1)
     whole = rate_of(decisions, whole_repeats=True)
-    assert whole.rate == 0.5
-    assert 10 < whole.n_effective <= 20
-    assert whole.ci_low < 0.3
-    assert whole.ci_high > 0.7
+    assert whole["rate"] == 0.5
+    assert 10 < whole["n_effective"] <= 20
+    assert whole["ci_low"] < 0.3
+    assert whole["ci_high"] > 0.7

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -25,6 +24,25 @@ from skthermo.studies._scenarios import BaseScenario
 from skthermo.surrogate import DataInformedFEM
 
 Key: TypeAlias = tuple[str, str | None, str]
+"""Detector; scenario, None for healthy records with noise of other seeds, by which thresholds are moved; source."""
+
+
+class Decided(NamedTuple):
+    """A detector's decisions of one repeat, (n_records,), or of several, (n_repeats, n_records), and damage indices and
+    warnings of the first."""
+
+    decisions: dict[Key, Array]
+    indices: dict[Key, pd.Series]
+    findings: list[SkthermoWarning]
+
+
+def joined(repeats: Sequence[Decided | Exception]) -> Decided | Exception:
+    """One repeat after the other, or the first error; measured records are in the first repeat alone."""
+    failed = [one for one in repeats if isinstance(one, Exception)]
+    if failed:
+        return failed[0]
+    found = {key: [one.decisions[key] for one in repeats if key in one.decisions] for key in repeats[0].decisions}
+    return repeats[0]._replace(decisions={key: np.array(some) for key, some in found.items()})
 
 
 def sensors_of(fem: DataInformedFEM) -> list[Hashable]:
@@ -63,14 +81,6 @@ def has_targets(detector: BaseEstimator) -> bool:
     return any(name.rsplit("__", 1)[-1] == "targets" for name in detector.get_params())
 
 
-class Records(NamedTuple):
-    """Records of a scenario from one source."""
-
-    scenario: BaseScenario
-    source: str
-    table: pd.DataFrame
-
-
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A detector that has learned ``n_baseline`` healthy records, and the columns that it sees, as a frame or not."""
@@ -106,71 +116,43 @@ class Candidate:
         offset = getattr(last_step(self.detector), "offset_", None)
         return None if offset is None else -float(np.squeeze(offset))
 
-    def seen(self, table: pd.DataFrame) -> Table:
+    def seen(self, table: pd.DataFrame, what: str = "the baseline") -> Table:
         """The detector's columns of a table."""
+        lacking = [name for name in self.columns if name not in table]
+        if lacking:
+            expected = "expected those that the detector sees, or frequencies in the rows of T"
+            raise ValueError(f"{what} lacks the columns {lacking}; {expected}")
         seen = table[self.columns]
         return seen if self.is_frame else seen.to_numpy()
 
-    def entering(self, records: Records) -> Table:
-        """What the detector sees of records."""
-        lacking = [name for name in self.columns if name not in records.table]
-        if lacking:
-            text = f"the {records.source} of scenario {records.scenario.name!r} lacks the columns {lacking}"
-            raise ValueError(f"{text}; expected those that the detector sees, or frequencies in the rows of T")
-        return self.seen(records.table)
+    def decided(
+        self, name: str, tables: Mapping[tuple[str | None, str], pd.DataFrame], is_first: bool = False
+    ) -> Decided | Exception:
+        """What the detector decides on tables by scenario and source, or its error.
+
+        Damage indices and warnings are those of the first repeat alone. As float32, decisions are as exact as alarms
+        and intervals need.
+        """
+        found = Decided({}, {}, [])
+        for (scenario, source), table in tables.items():
+            is_shown = is_first and scenario is not None
+            with collected(drop_others=not is_shown) as doubts:
+                try:
+                    seen = self.seen(table, f"the {source} of scenario {scenario!r}")
+                    decisions = np.asarray(self.detector.decision_function(seen), dtype=np.float32)
+                    found.decisions[name, scenario, source] = decisions
+                    if is_shown:
+                        index = -np.asarray(self.detector.score_samples(seen), dtype=float)
+                        found.indices[name, scenario, source] = pd.Series(index, table.index, name="damage_index")
+                except Exception as error:
+                    return error
+            found.findings.extend(doubts if is_shown else [])
+        return found
 
 
 def fitted_to(detector: BaseEstimator, table: Table) -> BaseEstimator:
     """The detector, fitted to the table."""
     return detector.fit(table)
-
-
-@dataclass(frozen=True, eq=False)
-class Decided:
-    """Decisions of detectors by detector, scenario and source: (n_records,) of one repeat, (n_repeats, n_records) of
-    several. The scenario is None for healthy records with noise of other seeds, by which thresholds are moved.
-
-    ``indices`` are damage indices of the first repeat, ``errors`` those of detectors that failed, and ``findings`` what
-    others doubt.
-    """
-
-    decisions: Mapping[Key, Array]
-    errors: Mapping[str, Exception]
-    findings: Sequence[SkthermoWarning] = ()
-    indices: Mapping[Key, pd.Series] = field(default_factory=dict)
-
-    @classmethod
-    def by(cls, candidates: Mapping[str, Candidate], records: Iterable[Records], *, is_first: bool = False) -> Decided:
-        """What detectors decide on records one after the other; those that fail are left out from then on.
-
-        Damage indices are those of the first repeat alone, and so are warnings. As float32, decisions are as exact as
-        alarms and intervals need.
-        """
-        decisions, indices, errors, findings = {}, {}, {}, []
-        for one in records:
-            for name, candidate in candidates.items():
-                if name in errors:
-                    continue
-                key, detector = (name, one.scenario.name, one.source), candidate.detector
-                with collected(drop_others=not is_first) as doubts:
-                    try:
-                        seen = candidate.entering(one)
-                        decisions[key] = np.asarray(detector.decision_function(seen), dtype=np.float32)
-                        if is_first:
-                            index = -np.asarray(detector.score_samples(seen), dtype=float)
-                            indices[key] = pd.Series(index, one.table.index, name="damage_index")
-                    except Exception as error:
-                        errors[name] = error
-                findings += by_detector(doubts, name, candidates)
-        return cls(decisions, errors, findings, indices)
-
-    @classmethod
-    def together(cls, repeats: Sequence[Decided]) -> Decided:
-        """Several repeats, one after the other; findings and measured records are those of the first."""
-        errors = {name: error for one in reversed(repeats) for name, error in one.errors.items()}
-        keys = [key for key in repeats[0].decisions if key[0] not in errors]
-        joined = {key: np.array([one.decisions[key] for one in repeats if key in one.decisions]) for key in keys}
-        return cls(joined, errors, repeats[0].findings, repeats[0].indices)
 
 
 def by_detector(findings: Iterable[SkthermoWarning], name: str, detectors: Mapping[str, Any]) -> list[SkthermoWarning]:
@@ -187,34 +169,41 @@ def scatter_of(fem: DataInformedFEM, noise: Any, gaps: Any, outliers: Any) -> di
     return {"noise": noise, "gaps": gaps, "outliers": outliers}
 
 
+def changed_frequencies(
+    chain: DataInformedFEM, scenarios: Iterable[BaseScenario], T: Table, repeats: Sequence[int]
+) -> dict[str, list[Array]]:
+    """Frequencies without noise, (n_records, n_modes), of each draw of every scenario that some repeats take."""
+    weather = chain.weather(T)
+    return {
+        one.name: [
+            chain.thermal_.simulated(weather, **one.changes(T, repeat % one.n_draws))
+            for repeat in repeats[: one.n_draws]
+        ]
+        for one in scenarios
+    }
+
+
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """One weather, and the frequencies without noise, (n_records, n_modes), of each draw of every scenario that repeats
-    from the ``first`` on take; those of another ``chain`` where one is given. ``reference`` gives true frequencies for
-    a scenario and a seed, ``levels`` are factors of the noise of each mode."""
+    """One weather, what measures in it, and the frequencies that `changed_frequencies` gives. ``reference`` gives true
+    frequencies for a scenario and a seed, ``given`` has measured ones by scenario, and ``levels`` are factors of the
+    noise of each mode."""
 
     fem: DataInformedFEM
     scenarios: Sequence[BaseScenario]
     T: Table
     measurement: Mapping[str, Any]
-    n_repeats: int = 1
+    clean: Mapping[str, Sequence[Array]]
     reference: Callable[[BaseScenario, int], ArrayLike | None] | None = None
-    chain: DataInformedFEM | None = None
-    first: int = 0
+    given: Mapping[str, Table] = field(default_factory=dict)
     levels: Any = 1.0
-    clean: Mapping[str, Sequence[Array]] = field(init=False)
 
-    def __post_init__(self) -> None:
-        chain, clean = self.fem if self.chain is None else self.chain, {}
-        weather, model = chain.weather(self.T), chain.thermal_
-        for one in self.scenarios:
-            numbers = np.arange(self.first, self.first + min(one.n_draws, self.n_repeats)) % one.n_draws
-            changes = [one.changes(self.T, int(number)) for number in numbers]
-            if len(changes) > 1 and hasattr(chain.model, "with_damage_parameters"):
-                clean[one.name] = model.with_each(weather, [change["damage"] for change in changes], one.kind)
-            else:
-                clean[one.name] = [model.simulated(weather, **change) for change in changes]
-        object.__setattr__(self, "clean", clean)
+    @classmethod
+    def solved(
+        cls, fem: DataInformedFEM, scenarios: Sequence[BaseScenario], T: Table, measurement: Any, n_repeats: int = 1
+    ) -> Simulation:
+        """A simulation by the chain itself of so many repeats."""
+        return cls(fem, scenarios, T, measurement, changed_frequencies(fem, scenarios, T, range(n_repeats)))
 
     @cached_property
     def weather(self) -> Any:
@@ -228,8 +217,8 @@ class Simulation:
 
     def records(
         self, repeat: int, seeds: Sequence[int], scenarios: Sequence[BaseScenario] | None = None
-    ) -> Iterator[Records]:
-        """Records of scenarios from every source, one after the other, all with the same noise, gaps and outliers.
+    ) -> dict[tuple[str, str], pd.DataFrame]:
+        """Tables by scenario and source, all with the same noise, gaps and outliers.
 
         These are drawn by the first seed; the second is that of the reference.
         """
@@ -238,40 +227,38 @@ class Simulation:
         if isinstance(options["gaps"], str) and np.isnan(as_floats(self.fem.records_.temperatures)).any():
             del options["noise"]
             T = T.mask(self.fem.recorder_.gaps(self.weather, **options)[0])
+        tables = {}
         for scenario in self.scenarios if scenarios is None else scenarios:
             draws = self.clean[scenario.name]
-            frequencies = draws[repeat % len(draws)] * (1 + noise)
-            yield Records(scenario, "simulated", side_by_side(self.fem, T, frequencies))
+            simulated = draws[repeat % len(draws)] * (1 + noise)
+            tables[scenario.name, "simulated"] = side_by_side(self.fem, T, simulated)
             values = None if self.reference is None else self.reference(scenario, int(seeds[1]))
             if values is not None:
                 if np.shape(values)[0] != len(T):
                     what = f"the reference of scenario {scenario.name!r} has shape {np.shape(values)}"
                     raise ValueError(f"{what}; expected frequencies for the {len(T)} rows of T")
-                yield self.measured(scenario, values, T)
+                tables[scenario.name, "reference"] = self.measured(scenario.name, values, T)
+        return tables
 
-    def measured(self, scenario: BaseScenario, values: Table, T: pd.DataFrame | None = None) -> Records:
+    def measured(self, scenario: str, values: Table, T: pd.DataFrame) -> pd.DataFrame:
         """Given records of a scenario; those without times of their own have the rows of the weather, if as many, and
         those in its rows have its temperatures where they have none."""
-        T = self.temperatures if T is None else T
-        table = named(self.fem, values, f"the reference of scenario {scenario.name!r}")
+        table = named(self.fem, values, f"the reference of scenario {scenario!r}")
         if not isinstance(values, pd.DataFrame) and len(table) == len(T):
             table = table.set_axis(T.index)
-        if table.index.equals(T.index):
-            table = table.join(T[[name for name in T if name not in table]])
-        return Records(scenario, "reference", table)
+        return table.join(T[[name for name in T if name not in table]]) if table.index.equals(T.index) else table
 
     def repeat(
-        self, candidates: Mapping[str, Candidate], number: int, seeds: Sequence[int], given: Any = None
-    ) -> Decided:
-        """Decisions on one repeat of all scenarios, on those that are given, and on other healthy records, by which
-        thresholds are moved."""
+        self, candidates: Mapping[str, Candidate], number: int, seeds: Sequence[int]
+    ) -> dict[str, Decided | Exception]:
+        """What each detector decides on one repeat of all scenarios, in the first one on records that are given, and on
+        other healthy ones, by which thresholds are moved."""
         with single_blas_thread():
-            measured = [self.measured(one, given[one.name]) for one in self.scenarios if one.name in (given or {})]
-            records = itertools.chain(self.records(number, seeds), measured)
-            found = Decided.by(candidates, records, is_first=given is not None)
+            tables: dict[tuple[str | None, str], pd.DataFrame] = {**self.records(number, seeds)}
+            for name in self.given if number == 0 else ():
+                tables[name, "reference"] = self.measured(name, self.given[name], self.temperatures)
             healthy = [scenario for scenario in self.scenarios if scenario.is_healthy][:1]
-            left = {name: one for name, one in candidates.items() if name not in found.errors}
             others = np.random.RandomState(seeds).randint(np.iinfo(np.int32).max, size=2)
-            again = Decided.by(left, self.records(number, others, healthy) if healthy else [])
-        moving = {(name, None, source): decisions for (name, _, source), decisions in again.decisions.items()}
-        return Decided(found.decisions | moving, {**found.errors, **again.errors}, found.findings, found.indices)
+            again = self.records(number, others, healthy) if healthy else {}
+            tables |= {(None, source): table for (_, source), table in again.items()}
+            return {name: one.decided(name, tables, number == 0) for name, one in candidates.items()}

@@ -19,10 +19,10 @@ from skthermo._core.parallel import run_jobs, single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning
 from skthermo.fem import FEModel, linearise
+from skthermo.studies._pod_curve import FamilyRates, families_of, fitted_curve
 from skthermo.studies._scenarios import BaseScenario, Scenario
-from skthermo.studies.detectability._pod_curve import FamilyRates, families_of, fitted_curve
-from skthermo.studies.detectability._simulation import Candidate, Simulation, scatter_of, sensors_of
-from skthermo.studies.detectability._study import DetectabilityStudy
+from skthermo.studies._simulation import Candidate, Simulation, scatter_of, sensors_of
+from skthermo.studies._study import DetectabilityStudy
 from skthermo.surrogate import DataInformedFEM
 
 
@@ -120,23 +120,22 @@ def compare_extensions(
     n_repeats = int(study.results_["n_repeats"].max())
     seeds = as_random_state(study.random_state).randint(np.iinfo(np.int32).max, size=n_repeats)
     measurement = scatter_of(fem, study.noise, study.gaps, study.outliers)
-    scenarios, trials, rows = scenarios_of(study, name), [], []
+    scenarios, rows = scenarios_of(study, name), []
     with collected() as findings, single_blas_thread():
         findings += fem.thermal_.doubts(fem.weather(T)) + (_doubtful_modes(fem, ranks) if ranks else [])
         scatter = check_noise(_scatter(study) if noise is None else noise, len(ranks), names)
         compared = [(fem, T, candidates, dict(zip(ranks, scatter, strict=True)))] if candidates else []
         for chain, weather, others, further in compared + _with_sensors(fem, present, sensors):
-            healthy = Simulation(chain, [Scenario("healthy")], chain.records_.temperatures, measurement)
-            changed = Simulation(chain, scenarios, weather, measurement)
-            trials.append(trial(healthy, changed, {None: present} | others, further))
-    for repeat in trials:
-        jobs = (delayed(repeat)(int(seed)) for seed in seeds)
-        repeats = run_jobs(jobs, len(seeds), unit="repeats", n_jobs=study.n_jobs)
-        rows += [
-            _row(*key, family, np.array([[one[None][family], one[key][family]] for one in repeats]))
-            for key in filter(None, repeats[0])
-            for family in repeats[0][None]
-        ]
+            healthy = Simulation.solved(chain, [Scenario("healthy")], chain.records_.temperatures, measurement)
+            changed = Simulation.solved(chain, scenarios, weather, measurement)
+            repeat = trial(healthy, changed, {None: present} | others, further)
+            jobs = (delayed(repeat)(int(seed)) for seed in seeds)
+            repeats = run_jobs(jobs, len(seeds), unit="repeats", n_jobs=study.n_jobs)
+            rows += [
+                _row(*key, family, np.array([[one[None][family], one[key][family]] for one in repeats]))
+                for key in others
+                for family in repeats[0][None]
+            ]
     if not rows:
         raise ValueError("there is no candidate; expected modes, baseline_factors or sensors")
     warn_each(findings)
@@ -163,10 +162,10 @@ def trial(
     def tables(simulation: Simulation, seeds: Sequence[int]) -> list[tuple[BaseScenario, pd.DataFrame]]:
         """Records of each scenario, all with the same noise; further modes are missing where all others are."""
         found, noise = [], np.random.RandomState(seeds[1]).standard_normal((len(names), len(simulation.T))).T * scatter
-        for one in simulation.records(0, seeds):
-            missing = one.table[list(fem.mode_names_)].isna().all(axis=1).to_numpy()[:, np.newaxis]
-            values = further[one.scenario.name] * np.where(missing, np.nan, 1 + noise) if names else noise
-            found.append((one.scenario, one.table.assign(**dict(zip(names, values.T, strict=True)))))
+        for scenario, table in zip(simulation.scenarios, simulation.records(0, seeds).values(), strict=True):
+            missing = table[list(fem.mode_names_)].isna().all(axis=1).to_numpy()[:, np.newaxis]
+            values = further[scenario.name] * np.where(missing, np.nan, 1 + noise) if names else noise
+            found.append((scenario, table.assign(**dict(zip(names, values.T, strict=True)))))
         return found
 
     def repeat(seed: int) -> dict[Any, dict[str, float]]:

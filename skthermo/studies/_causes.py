@@ -222,12 +222,12 @@ def _by_place(line: Array, middles: Array) -> list[int]:
     return line[np.lexsort(middles[line][:, axes].round(9).T)].tolist()
 
 
-def pieces_of(lines: Sequence[MemberLine], most: int = 24) -> list[list[MemberLine]]:
-    """Pieces of lines, about so many in all, each of members that follow each other."""
+def pieces_of(lines: Sequence[MemberLine], most: int = 24) -> list[tuple[int, MemberLine]]:
+    """Pieces of lines, about so many in all, each of members that follow each other, with the number of the line."""
     size, found = -(-sum(map(len, lines)) // most), []
-    for line in lines:
+    for number, line in enumerate(lines):
         edges = np.linspace(0, len(line), -(-len(line) // size) + 1).round().astype(int)
-        found.append([line[low:high] for low, high in pairwise(edges)])
+        found += [(number, line[low:high]) for low, high in pairwise(edges)]
     return found
 
 
@@ -243,34 +243,62 @@ def place_of(structure: Structure, members: Sequence[Hashable], group: Sequence[
 
 
 def stretches(
-    structure: Structure, cause: Cause, lines: Sequence[Sequence[MemberLine]], names: Sequence[str]
+    structure: Structure, cause: Cause, pieces: Sequence[tuple[int, MemberLine]], names: Sequence[str]
 ) -> list[Cause]:
-    """The whole group, and each run of pieces of its lines, which have these names in the divided model, as causes.
+    """The whole group, and each run of pieces of one line, which have these names in the divided model, as causes.
 
     Every length is less probable the longer it is, and every place of a length equally probable.
     """
-    members = tuple(member for line in lines for piece in line for member in piece)
-    found, first = [], 0
-    for line in lines:
-        for low, high in combinations_with_replacement(range(len(line)), 2):
-            number = high - low + 1
-            if number == len(names):
-                continue
-            rows = tuple(member for piece in line[low : high + 1] for member in piece)
-            which = f"{rows[0]} to {rows[-1]}" if len(rows) > 1 else f"{rows[0]}"
-            found.append(
-                Cause(
-                    f"{cause.name}: {which}",
-                    of=tuple(names[first + low : first + high + 1]),
-                    scale=float(min(np.sqrt(len(members) / len(rows)), 3.0)),  # what is smaller may be more severe
-                    rows=rows,
-                    group=cause.name,
-                    share=len(line) / number / (len(line) - number + 1),
-                    alone=True,
-                    place=place_of(structure, rows, members),
-                )
+    members, found = tuple(member for _, piece in pieces for member in piece), []
+    of_line = [line for line, _ in pieces]
+    for low, high in combinations_with_replacement(range(len(pieces)), 2):
+        number, most = high - low + 1, of_line.count(of_line[low])
+        if of_line[low] != of_line[high] or number == len(names):
+            continue
+        rows = tuple(member for _, piece in pieces[low : high + 1] for member in piece)
+        which = f"{rows[0]} to {rows[-1]}" if len(rows) > 1 else f"{rows[0]}"
+        found.append(
+            Cause(
+                f"{cause.name}: {which}",
+                of=tuple(names[low : high + 1]),
+                scale=float(min(np.sqrt(len(members) / len(rows)), 3.0)),  # what is smaller may be more severe
+                rows=rows,
+                group=cause.name,
+                share=most / number / (most - number + 1),
+                alone=True,
+                place=place_of(structure, rows, members),
             )
-        first += len(line)
+        )
     total = sum(one.share for one in found)
     found = [replace(one, share=0.75 * one.share / total) for one in found]
     return [replace(cause, rows=members, share=0.25 if found else 1.0), *found]
+
+
+def divided_causes(
+    asked: Sequence[Cause], model: Any, structure: Structure
+) -> tuple[list[Cause], list[Cause], dict[str, dict[str, set[Hashable]]], dict[Hashable, dict[str, Any]]]:
+    """Causes with stretches in place of damaged groups; pieces, the sums of whose effects are those of stretches;
+    members of each piece by group of the model, which is divided so; and the group and place of each member."""
+    causes: list[Cause] = []
+    pieces: list[Cause] = []
+    parts: dict[str, dict[str, set[Hashable]]] = {}
+    members: dict[Hashable, dict[str, Any]] = {}
+    for cause in asked:
+        if cause.kind != "damage":
+            causes.append(cause)
+        if cause.kind != "damage" or cause.alone:
+            continue
+        lines = lines_of(structure, members_of(model, cause.of))
+        for place, line in enumerate(lines, 1):
+            for number, member in enumerate(line, 1):
+                middle = np.mean([structure.nodes[node] for node in structure.members[member].nodes], axis=0)
+                at = dict(zip("xyz", middle.tolist(), strict=False))
+                members[member] = {"group": cause.name, "line": place, "element": number} | at
+        divided = pieces_of(lines)
+        named = {f"{cause.name}, piece {number}": set(piece) for number, (_, piece) in enumerate(divided, 1)}
+        for name in cause.of:
+            inside = set(members_of(model, [name]))
+            parts[name] = {piece: rows & inside for piece, rows in named.items() if rows & inside}
+        pieces += [Cause(name, of=(name,)) for name in named]
+        causes += stretches(structure, cause, divided, [*named])
+    return causes, pieces, parts, members

@@ -21,20 +21,10 @@ from skthermo.exceptions import ResultWarning, SkthermoWarning
 from skthermo.fem import Structure
 from skthermo.fem.damage import LossKind, check_kind
 from skthermo.residuals.mean_errors import chance_of
+from skthermo.studies._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior, divided_causes, read_causes
+from skthermo.studies._evidence import DRAWS_EACH, DamageExplanation, Evidence, averaged, effects_of
+from skthermo.studies._measured import FrequencyShift, measured_shift, observed
 from skthermo.studies._scenarios import UncertainDamage, check_chain, checked_models
-from skthermo.studies.identification._causes import (
-    NO_DAMAGE,
-    SOMETHING_ELSE,
-    Cause,
-    DamagePrior,
-    lines_of,
-    members_of,
-    pieces_of,
-    read_causes,
-    stretches,
-)
-from skthermo.studies.identification._evidence import DRAWS_EACH, DamageExplanation, Evidence, averaged, effects_of
-from skthermo.studies.identification._measured import FrequencyShift, measured_shift, observed
 from skthermo.surrogate import refitted
 
 
@@ -255,31 +245,7 @@ def _located(
     evidence: Evidence, shift: FrequencyShift, structure: Structure, fem: Any, measured: Mapping[str, Any]
 ) -> tuple[Evidence, pd.DataFrame]:
     """Evidence of stretches of all groups that may be damaged, and the members of these groups."""
-    causes: list[Cause] = []
-    pieces: list[Cause] = []  # the sums of whose effects are those of stretches
-    parts: dict[str, dict[str, set[Hashable]]] = {}
-    members: dict[Hashable, dict[str, Any]] = {}
-    for cause in evidence.causes:
-        if cause.kind != "damage":
-            causes.append(cause)
-        if cause.kind != "damage" or cause.alone:
-            continue
-        lines = lines_of(structure, members_of(fem.model, cause.of))
-        for place, line in enumerate(lines, 1):
-            for number, member in enumerate(line, 1):
-                middle = np.mean([structure.nodes[node] for node in structure.members[member].nodes], axis=0)
-                at = dict(zip("xyz", middle.tolist(), strict=False))
-                members[member] = {"group": cause.name, "line": place, "element": number} | at
-        divided = pieces_of(lines)
-        named = {
-            f"{cause.name}, piece {number}": set(piece)
-            for number, piece in enumerate((piece for line in divided for piece in line), 1)
-        }
-        for name in cause.of:
-            inside = set(members_of(fem.model, [name]))
-            parts[name] = {piece: rows & inside for piece, rows in named.items() if rows & inside}
-        pieces += [Cause(name, of=(name,)) for name in named]
-        causes += stretches(structure, cause, divided, [*named])
+    causes, pieces, parts, members = divided_causes(evidence.causes, fem.model, structure)
     seen = observed(fem, structure.divide(fem.model, parts), shift, **measured)
     units = pieces + [cause for cause in causes if not cause.alone]
     by_unit = dict(zip([unit.name for unit in units], effects_of(seen, units, 7).swapaxes(0, 1), strict=True))

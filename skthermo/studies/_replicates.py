@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from joblib import delayed
 from scipy.special import expit, logit
 from scipy.stats import t
 
 from skthermo._core.arrays import Array, as_floats, positive_integer
 from skthermo._core.frames import DAY, DAY_NS, Table, frame_like, has_stamps, row_times
-from skthermo._core.parallel import run_jobs, single_blas_thread
+from skthermo._core.parallel import single_blas_thread
 from skthermo._core.text import listed
 from skthermo._core.warnings import collected
 from skthermo.fem import FEModel
 from skthermo.metrics import minimum_detectable_damage
+from skthermo.studies._pod_curve import FamilyRates, PODCurve, fitted_curve
+from skthermo.studies._rates import EvaluatedRecords
 from skthermo.studies._scenarios import checked_models
-from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, fitted_curve
-from skthermo.studies.detectability._rates import EvaluatedRecords
-from skthermo.studies.detectability._simulation import Candidate, Decided, Simulation
+from skthermo.studies._simulation import Candidate, Simulation, changed_frequencies
 from skthermo.surrogate import DataInformedFEM, refitted, resampled
 from skthermo.updating import ModelUpdater
 
@@ -30,79 +29,72 @@ PARTS = {"noise": "noise", "weather": "the weather", "baseline": "the training r
 """What a replicate draws, in the order in which one is added to the others, and how it is called."""
 
 
-@dataclass(frozen=True, eq=False)
-class Replicates:
-    """What may vary beside the noise, ``parts``; years of weather, of which the first is that of the study; models.
+def drawn_replicates(
+    fem: DataInformedFEM, uncertainty: str | Sequence[str], T: Table, models: Any, number: Any, seed: Any
+) -> tuple[list[str], list[Table], Sequence[FEModel], list[int]]:
+    """What varies; years of weather, of which the first is that of the study; models, which are drawn from the training
+    records where none are given; and a seed of each replicate."""
+    parts = checked_parts(uncertainty, with_models=models is not None)
+    years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
+    if positive_integer(number, "n_replicates") < 2:
+        raise ValueError(f"n_replicates is {number}; expected at least 2, 10 or more for bands of 90 %")
+    seeds = np.random.RandomState(seed).randint(np.iinfo(np.int32).max, size=number + 1).tolist()
+    if models is not None:
+        models = checked_models(fem, models)
+        if "model" not in parts:
+            raise ValueError(
+                f"models came, but uncertainty is {uncertainty!r}; expected 'model' among it, 'auto' or 'all'"
+            )
+    elif "model" in parts:
+        models = drawn_models(fem, number, seeds[-1])
+    return parts, years, models or [], seeds[:-1]
 
-    Every replicate is drawn from its own seed alone. Without "noise" among what varies, all replicates have the same.
+
+def replicated(
+    simulation: Simulation,
+    candidates: Mapping[str, Candidate],
+    parts: Sequence[str],
+    years: Sequence[Table],
+    models: Sequence[FEModel],
+    number: int,
+    seed: int,
+) -> dict[tuple[str, str], list[float]] | str:
+    """Rates of alarms of one replicate by detector and scenario, as one part after the other varies, or its error.
+
+    All is drawn from its own seed. Without "noise" among the parts, all replicates have the same.
     """
-
-    parts: Sequence[str]
-    with_noise: bool
-    years: Sequence[Table]
-    models: Sequence[FEModel]
-    seeds: Sequence[int]
-
-    @classmethod
-    def asked(
-        cls, fem: DataInformedFEM, uncertainty: str | Sequence[str], T: Table, models: Any, number: Any, seed: Any
-    ) -> Replicates:
-        """So many replicates; without models, these are drawn from the training records where they are asked for."""
-        parts = checked_parts(uncertainty, with_models=models is not None)
-        years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
-        if positive_integer(number, "n_replicates") < 2:
-            raise ValueError(f"n_replicates is {number}; expected at least 2, 10 or more for bands of 90 %")
-        seeds = np.random.RandomState(seed).randint(np.iinfo(np.int32).max, size=number + 1).tolist()
-        if models is not None:
-            models = checked_models(fem, models)
-            if "model" not in parts:
-                raise ValueError(
-                    f"models came, but uncertainty is {uncertainty!r}; expected 'model' among it, 'auto' or 'all'"
-                )
-        elif "model" in parts:
-            models = drawn_models(fem, number, seeds[-1])
-        return cls([part for part in parts if part != "noise"], "noise" in parts, years, models or [], seeds[:-1])
-
-    def rates(
-        self, simulation: Simulation, candidates: Mapping[str, Candidate], n_jobs: int | None, verbose: int
-    ) -> tuple[list[dict[Any, list[float]]], list[str]]:
-        """Rates of alarms of every replicate as one part after the other varies, and the errors of those that fail."""
-        jobs = (delayed(self._rates)(simulation, candidates, number) for number in range(len(self.seeds)))
-        outcomes = run_jobs(jobs, len(self.seeds), unit="replicates", n_jobs=n_jobs, verbose=verbose)
-        return [one for one in outcomes if isinstance(one, dict)], [one for one in outcomes if isinstance(one, str)]
-
-    def _rates(self, simulation: Simulation, candidates: Mapping[str, Candidate], number: int) -> Any:
-        random = np.random.RandomState(self.seeds[number])
-        weather, records, noise = random.randint(np.iinfo(np.int32).max, size=3).tolist()
-        chain, T, levels, rates = simulation.fem, self.years[0], 1.0, {}
-        scenarios = {one.name: one for one in simulation.scenarios}
-        with collected(drop_others=True), single_blas_thread():
-            try:
-                for part in self.parts:
-                    if part == "weather" and len(self.years) > 1:
-                        T = self.years[number % len(self.years)]
-                    elif part == "weather":
-                        T = resampled_days(T, np.random.RandomState(weather))
-                    if part == "model":
-                        chain = refitted(simulation.fem, model=self.models[number % len(self.models)])
-                    if part == "baseline" or (part == "model" and "baseline" in self.parts):
-                        chain = resampled(chain, records)
-                    if part == "baseline":  # the training records determine the noise up to an error
-                        errors = simulation.fem.recorder_.residuals.level_errors
-                        levels = np.exp(errors * random.standard_normal(len(errors)))
-                    drawn = {"n_repeats": 1, "first": number, "levels": levels, "reference": None}
-                    here = replace(simulation, T=T, chain=chain, **drawn)
-                    found = Decided.by(candidates, here.records(0, [noise if self.with_noise else 0]))
-                    if found.errors:
-                        raise next(iter(found.errors.values()))
-                    for (name, scenario, source), values in found.decisions.items():
+    random = np.random.RandomState(seed)
+    weather, records, noise = random.randint(np.iinfo(np.int32).max, size=3).tolist()
+    fem, T, levels, rates = simulation.fem, years[0], 1.0, {}
+    chain, scenarios = fem, {one.name: one for one in simulation.scenarios}
+    with collected(drop_others=True), single_blas_thread():
+        try:
+            for part in [one for one in parts if one != "noise"]:
+                if part == "weather":
+                    days = np.random.RandomState(weather)
+                    T = years[number % len(years)] if len(years) > 1 else resampled_days(T, days)
+                if part == "model":
+                    chain = refitted(fem, model=models[number % len(models)])
+                if part == "baseline" or (part == "model" and "baseline" in parts):
+                    chain = resampled(chain, records)
+                if part == "baseline":  # the training records determine the noise up to an error
+                    errors = fem.recorder_.residuals.level_errors
+                    levels = np.exp(errors * random.standard_normal(len(errors)))
+                clean = changed_frequencies(chain, simulation.scenarios, T, [number])
+                here = replace(simulation, T=T, clean=clean, levels=levels, reference=None)
+                tables = here.records(0, [noise if "noise" in parts else 0])
+                for name, candidate in candidates.items():
+                    found = candidate.decided(name, tables)
+                    if isinstance(found, Exception):
+                        raise found
+                    for (_, scenario, source), values in found.decisions.items():
                         one = EvaluatedRecords(name, scenarios[scenario], source, T, values[np.newaxis])
                         kept = one.from_onset()[0]
                         rate = float((kept < 0).sum() / max(np.count_nonzero(~np.isnan(kept)), 1))
                         rates.setdefault((name, scenario), []).append(rate)
-            except Exception as error:
-                return f"{type(error).__name__}: {error}"
-        return rates
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"
+    return rates
 
 
 def checked_parts(uncertainty: str | Sequence[str], with_models: bool = False) -> list[str]:
@@ -169,43 +161,36 @@ class ReplicateRates:
     with_noise: bool
 
     @classmethod
-    def joined(
-        cls, found: Sequence[Mapping[Any, Any]], results: pd.DataFrame, replicates: Replicates
-    ) -> ReplicateRates:
+    def joined(cls, found: Sequence[Mapping[Any, Any]], results: pd.DataFrame, parts: Sequence[str]) -> ReplicateRates:
         """The rates of all replicates beside the results of the study."""
         own = results[(results["source"] == "simulated") & (results["error"] == "")]
         own = own.set_index(["detector", "scenario"])
         rates = {key: np.array([one[key] for one in found]) for key in own.index}
-        return cls(rates, own, replicates.parts, replicates.with_noise)
+        return cls(rates, own, [part for part in parts if part != "noise"], "noise" in parts)
 
     def campaigns(self, key: tuple[str, str]) -> Array:
-        """Rates of single campaigns with all that varies, (n_replicates,), about the study's own rate.
+        """Rates of single campaigns with all that varies, (n_campaigns,), about the study's own rate.
 
         Chains of other training records differ from what detectors have learned to either side, so that alarms rise in
         the mean: on the scale of the logit, this mean rise is taken out.
         """
-        logits = self._logits(self.rates[key][:, -1], key)
-        return self._rates(logits - logits.mean() + self._logits(self.own.at[key, "rate"], key), key)
+        logits, own, rates_at = self._logits(key)
+        return rates_at(logits - logits.mean() + own)
 
     def prediction_interval(self, key: tuple[str, str], confidence: float) -> tuple[float, float]:
         """Rates between which that of a measured campaign should lie with this probability: of few replicates,
         Student's law on the scale of the logit."""
-        logits, number = self._logits(self.rates[key][:, -1], key), len(self.rates[key])
-        margin = t.ppf((1 + confidence) / 2, number - 1) * logits.std(ddof=1) * np.sqrt(1 + 1 / number)
-        lowest, highest = self._logits(self.own.at[key, "rate"], key) + np.array([-margin, margin])
-        return float(self._rates(lowest, key)), float(self._rates(highest, key))
+        logits, own, rates_at = self._logits(key)
+        margin = t.ppf((1 + confidence) / 2, len(logits) - 1) * logits.std(ddof=1) * np.sqrt(1 + 1 / len(logits))
+        lowest, highest = rates_at(own + np.array([-margin, margin])).tolist()
+        return lowest, highest
 
-    def _logits(self, rates: Any, key: tuple[str, str]) -> Any:
-        """Logits, finite also where all records or none are in alarm."""
-        n = self._n_records(key)
-        return logit((rates * n + 0.5) / (n + 1))
-
-    def _rates(self, logits: Any, key: tuple[str, str]) -> Any:
-        n = self._n_records(key)
-        return np.clip(((n + 1) * expit(logits) - 0.5) / n, 0, 1)
-
-    def _n_records(self, key: tuple[str, str]) -> float:
-        return self.own.at[key, "n_records"] / self.own.at[key, "n_repeats"]
+    def _logits(self, key: tuple[str, str]) -> tuple[Array, float, Callable[[Array], Array]]:
+        """Logits of the rates of the replicates and of the study, finite also where all records or none are in alarm,
+        and what gives rates at logits."""
+        n = self.own.at[key, "n_records"] / self.own.at[key, "n_repeats"]
+        logits = logit((np.append(self.rates[key][:, -1], self.own.at[key, "rate"]) * n + 0.5) / (n + 1))
+        return logits[:-1], logits[-1], lambda some: np.clip(((n + 1) * expit(some) - 0.5) / n, 0, 1)
 
     def banded(self, results: pd.DataFrame, confidence: float) -> pd.DataFrame:
         """The table of a study, whose simulated rows have the bands of the replicates."""
@@ -249,18 +234,14 @@ class ReplicateRates:
         That of the noise in one campaign follows from the effective number of records; the first of the other parts
         has what is more than that, and each later part what it adds in the same replicates.
         """
-        rows = {}
-        for key, rates in self.rates.items():
-            row = self.own.loc[key]
-            noise = row["rate"] * (1 - row["rate"]) / (row["n_effective"] / row["n_repeats"]) * self.with_noise
-            variances = {"noise": noise} if self.with_noise else {}
-            variances[self.parts[0]] = max(rates[:, 0].var(ddof=1) - noise, 0.0)
-            variances |= dict(zip(self.parts[1:], np.diff(rates, axis=1).var(axis=0, ddof=1), strict=True))
-            total = sum(variances.values())
-            deviations = {part: np.sqrt(one) for part, one in {**variances, "together": total}.items()}
-            shares = {f"{part} share": one / total if total > 0 else np.nan for part, one in variances.items()}
-            rows[key] = deviations | shares
-        return pd.DataFrame.from_dict(rows, orient="index").rename_axis(["detector", "scenario"])
+        own, rates = self.own, np.array(list(self.rates.values()))
+        noise = own["rate"] * (1 - own["rate"]) / (own["n_effective"] / own["n_repeats"]) * self.with_noise
+        variances = noise.to_frame("noise") if self.with_noise else pd.DataFrame(index=own.index)
+        variances[self.parts[0]] = np.maximum(rates[:, :, 0].var(axis=1, ddof=1) - noise, 0.0)
+        variances[list(self.parts[1:])] = np.diff(rates, axis=2).var(axis=1, ddof=1)
+        total = variances.sum(axis=1)
+        shares = variances.div(total.where(total > 0), axis=0).add_suffix(" share")
+        return np.sqrt(variances.assign(together=total)).join(shares)
 
 
 def in_sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, confidence: float) -> str:

@@ -16,25 +16,9 @@ from skthermo._core.frames import Table, correlation_times, row_times, time_of
 from skthermo.studies._scenarios import BaseScenario
 
 
-@dataclass(frozen=True)
-class Rate:
-    """Rate of alarms over evaluated records (NaN without any) and its bounds, the range of one more repeat, and counts,
-    among them the number of independent records with the same error."""
-
-    rate: float
-    ci_low: float
-    ci_high: float
-    pi_low: float
-    pi_high: float
-    n_alarms: int
-    n_records: int
-    n_not_evaluated: int
-    n_effective: float
-    n_repeats: int
-
-
-def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = False) -> Rate:
-    """Rate of negative decisions, with Clopper-Pearson bounds of the effective number of records.
+def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = False) -> dict[str, Any]:
+    """Rate of negative decisions (NaN without any), with Clopper-Pearson bounds of the effective number of records, the
+    range of one more repeat, and counts, among them the number of independent records with the same error.
 
     Decisions, (n_repeats, n_records), are of the same records with different noise, in order of time, and NaN where
     there is none. With ``whole_repeats``, all records of a repeat depend on each other.
@@ -45,9 +29,16 @@ def rate_of(decisions: Array, confidence: float = 0.95, whole_repeats: bool = Fa
         once = 1 if is_constant(decisions) else len(decisions)  # repeats without noise count once
         n_effective = _n_effective(decisions[:once], confidence, whole_repeats and once > 1)
     bounds = clopper_pearson(np.nan_to_num(rate) * n_effective, n_effective, confidence)
-    ends = prediction_interval(decisions, confidence)
-    counts = n_alarms, n_records, decisions.size - n_records, n_effective, len(decisions)
-    return Rate(rate, *bounds, *ends, *counts)
+    return {
+        "rate": rate,
+        **dict(zip(("ci_low", "ci_high"), bounds, strict=True)),
+        **dict(zip(("pi_low", "pi_high"), prediction_interval(decisions, confidence), strict=True)),
+        "n_alarms": n_alarms,
+        "n_records": n_records,
+        "n_not_evaluated": decisions.size - n_records,
+        "n_effective": n_effective,
+        "n_repeats": len(decisions),
+    }
 
 
 def is_constant(decisions: Array) -> bool:
@@ -130,7 +121,7 @@ class EvaluatedRecords:
         """Rates, bounds and time to detection, from the onset of the damage on."""
         scenario, (decisions, waits) = self.scenario, self.from_onset()
         rate = rate_of(decisions, confidence, whole_repeats=scenario.n_draws > 1)
-        if not rate.n_records:
+        if not rate["n_records"]:
             raise ValueError(
                 f"none of {len(self.rows)} records of scenario {scenario.name!r}, source {self.source!r}, can "
                 "be evaluated: they lack what the detector needs, or are before the onset; expected complete records "
@@ -143,7 +134,7 @@ class EvaluatedRecords:
             "severity": scenario.severity,
             "source": self.source,
             "measure": "PFA" if scenario.is_healthy else "POD",
-            **vars(rate),
+            **rate,
             "time_to_detection": _mean_wait(decisions < 0, waits, self.rows),
             "error": "",
         }
@@ -170,51 +161,51 @@ def _mean_wait(alarms: NDArray[np.bool_], waits: Array, rows: Table) -> Any:
     return float(detected.mean()) if detected.size else float("nan")
 
 
-@dataclass(frozen=True, eq=False)
-class Contender:
-    """One detector's decisions on records of one source: of the healthy structure, of every damaged scenario, and of
-    healthy records with other noise, by which a threshold is moved; each (n_repeats, n_records), or None."""
+def evaluated(
+    detector: str, decisions: Mapping[Any, Array], indices: Mapping[Any, pd.Series], scenarios: Sequence[BaseScenario]
+) -> list[EvaluatedRecords]:
+    """What a detector has evaluated, in the order of the scenarios."""
+    return [
+        EvaluatedRecords(detector, one, source, indices[key], decisions[key])
+        for one in scenarios
+        for source in ("simulated", "reference")
+        if (key := (detector, one.name, source)) in decisions
+    ]
 
-    healthy: Array
-    damaged: Sequence[Array]
-    calibration: Array | None
 
-    def pod(self, limit: float | None = None, left_out: int | Sequence[int] = ()) -> float:
-        """Mean probability of detection over the damaged scenarios, without one of the repeats if asked.
+def pod_of(damaged: Sequence[Array], calibration: Array, limit: float | None = None) -> float:
+    """Mean probability of detection over damaged scenarios, each (n_repeats, n_records).
 
-        With a limit, the threshold is moved so that as many of the calibration's records are alarms; NaN without any.
-        """
-        threshold = 0.0 if limit is None else self._threshold(limit, left_out)
-        parts = [np.delete(decisions, left_out, axis=0) for decisions in self.damaged]
-        shares = [(part < threshold).sum() / np.count_nonzero(~np.isnan(part)) for part in parts]
-        return float("nan") if np.isnan(threshold) else float(np.mean(shares))
-
-    def jackknife(self, limit: float | None = None) -> Array:
-        """Pseudo-values of that probability, whose mean has its error and that of the moved threshold.
-
-        Empty where there is one repeat, or repeats differ in number.
-        """
-        n = len(self.damaged[0])
-        if n < 2 or any(len(one) != n for one in self.damaged):
-            return np.empty(0)
-        return n * self.pod(limit) - (n - 1) * np.array([self.pod(limit, number) for number in range(n)])
-
-    def auc(self) -> float:
-        """Area under the ROC curve, the chance that a damaged record is further off than a healthy one; mean over the
-        damaged scenarios."""
-        healthy = self.healthy[~np.isnan(self.healthy)].astype(float)
-        evaluated = [one[~np.isnan(one)] for one in self.damaged]
-        chances = [mannwhitneyu(healthy, one, method="asymptotic").statistic / len(one) for one in evaluated]
-        return float(np.mean(chances)) / len(healthy)
-
-    def _threshold(self, limit: float, left_out: int | Sequence[int]) -> float:
-        """Decision below which as many of the calibration's records lie as the limit allows."""
-        if self.calibration is None:
-            return float("nan")
-        known = np.delete(self.calibration, left_out, axis=0)
-        known = known[~np.isnan(known)]
+    With a limit, the threshold is moved so that as many records of the calibration are alarms; NaN without any.
+    """
+    threshold, known = 0.0, calibration[~np.isnan(calibration)]
+    if limit is not None:
         place = int(limit * known.size + 1e-9)  # of products such as 0.29 * 100
-        return float(np.partition(known, place)[place]) if known.size else float("nan")
+        threshold = float(np.partition(known, place)[place]) if known.size else float("nan")
+    shares = [(part < threshold).sum() / np.count_nonzero(~np.isnan(part)) for part in damaged]
+    return float("nan") if np.isnan(threshold) else float(np.mean(shares))
+
+
+def jackknife(damaged: Sequence[Array], calibration: Array, limit: float | None = None) -> Array:
+    """Pseudo-values of that probability, whose mean has its error and that of the moved threshold.
+
+    Empty where there is one repeat, or repeats differ in number.
+    """
+    n = len(damaged[0])
+    if n < 2 or any(len(one) != n for one in damaged):
+        return np.empty(0)
+    whole = pod_of(damaged, calibration, limit)
+    without = ([np.delete(one, number, axis=0) for one in (calibration, *damaged)] for number in range(n))
+    return n * whole - (n - 1) * np.array([pod_of(others, known, limit) for known, *others in without])
+
+
+def area_under_curve(healthy: Array, damaged: Sequence[Array]) -> float:
+    """Area under the ROC curve, the chance that a damaged record is further off than a healthy one; mean over the
+    damaged scenarios."""
+    healthy = healthy[~np.isnan(healthy)].astype(float)
+    known = [one[~np.isnan(one)] for one in damaged]
+    chances = [mannwhitneyu(healthy, one, method="asymptotic").statistic / len(one) for one in known]
+    return float(np.mean(chances)) / len(healthy)
 
 
 def rank(
@@ -232,25 +223,25 @@ def rank(
     By NaN of the moved threshold, which measured records have, the order is that of the probability of detection.
     """
     names = list(dict.fromkeys(one.detector for one in records))
-    contenders = {name: _contender(name, records, calibration.get(name)) for name in names}
-    table = pd.DataFrame.from_dict(
-        {
-            name: _rates(rows[rows["detector"] == name], limit)
-            | {"pod_at_equal_pfa": contender.pod(limit), "auc": contender.auc()}
-            | _by_family({family: one for (detector, family), one in families.items() if detector == name})
-            for name, contender in contenders.items()
-        },
-        orient="index",
-    )
+    found, pseudo, varies = {}, {}, False
+    for name in names:
+        mine = [one for one in records if one.detector == name]
+        healthy = np.hstack([one.decisions.ravel() for one in mine if one.scenario.is_healthy])
+        damaged = [one.from_onset()[0] for one in mine if not one.scenario.is_healthy]
+        moving = calibration.get(name, np.empty((len(damaged[0]), 0)))
+        found[name] = _rates(rows[rows["detector"] == name], limit)
+        found[name] |= {"pod_at_equal_pfa": pod_of(damaged, moving, limit), "auc": area_under_curve(healthy, damaged)}
+        found[name] |= _by_family({family: one for (detector, family), one in families.items() if detector == name})
+        pseudo[name] = jackknife(damaged, moving, None if by == "pod" else limit)
+        varies |= not all(map(is_constant, damaged))
+    table = pd.DataFrame.from_dict(found, orient="index")
     table = table.infer_objects().rename_axis("detector")
     table["beyond"] = table["false_alarms"].where(~table["within_limit"], 0.0)
     keys = ["within_limit", "beyond", by, "auc", "false_alarms", "detector"]
     table = table.sort_values(keys, ascending=[False, True, False, False, True, True]).drop(columns="beyond")
-    pseudo = {name: one.jackknife(None if by == "pod" else limit) for name, one in contenders.items()}
     table["pod_deficit"] = table[by].iloc[0] - table[by]
     margin = [_margin(pseudo[table.index[0]], pseudo[name], confidence, len(names) - 1) for name in table.index]
-    if all(is_constant(decisions) for one in contenders.values() for decisions in one.damaged):
-        margin = [np.nan] * len(names)
+    margin = margin if varies else [np.nan] * len(names)
     table["pod_deficit_ci_low"] = table["pod_deficit"] - margin
     table["pod_deficit_ci_high"] = table["pod_deficit"] + margin
     table["significantly_worse"] = table["pod_deficit_ci_low"] > 0
@@ -264,12 +255,6 @@ def rank(
 def with_bounds(name: str, before: str = "_") -> list[str]:
     """Columns of a rate and its bounds."""
     return [name, f"{name}{before}ci_low", f"{name}{before}ci_high"]
-
-
-def _contender(name: str, records: Sequence[EvaluatedRecords], calibration: Array | None) -> Contender:
-    mine = [one for one in records if one.detector == name]
-    healthy = np.hstack([one.decisions.ravel() for one in mine if one.scenario.is_healthy])
-    return Contender(healthy, [one.from_onset()[0] for one in mine if not one.scenario.is_healthy], calibration)
 
 
 def _rates(rows: pd.DataFrame, limit: float) -> dict[str, Any]:

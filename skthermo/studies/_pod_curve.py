@@ -15,7 +15,7 @@ from skthermo._core.arrays import Array, check_flag, check_probability, is_auto,
 from skthermo._core.warnings import warn_each
 from skthermo.exceptions import ResultWarning
 from skthermo.metrics import minimum_detectable_damage
-from skthermo.studies.detectability._rates import clopper_pearson
+from skthermo.studies._rates import clopper_pearson
 
 
 @dataclass(frozen=True, eq=False, repr=False)

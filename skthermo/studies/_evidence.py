@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 from scipy.special import log_ndtr, logsumexp, ndtr, ndtri_exp
 
 from skthermo._core.arrays import Array
-from skthermo.studies.identification._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior
-from skthermo.studies.identification._measured import ObservedChange
+from skthermo.studies._causes import NO_DAMAGE, SOMETHING_ELSE, Cause, DamagePrior
+from skthermo.studies._measured import ObservedChange
 
 DRAWS_EACH = 500
 

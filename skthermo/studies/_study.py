@@ -21,11 +21,11 @@ from skthermo._core.text import duration_text
 from skthermo._core.warnings import collected, one_of_each_kind, warn_each
 from skthermo.exceptions import ModelWarning, ResultWarning, SkthermoWarning
 from skthermo.fem import FEModel
+from skthermo.studies._pod_curve import FamilyRates, PODCurve, families_of
+from skthermo.studies._rates import EvaluatedRecords, evaluated, in_words, rank
+from skthermo.studies._replicates import ReplicateRates, drawn_replicates, in_sentences, replicated
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies.detectability._pod_curve import FamilyRates, PODCurve, families_of
-from skthermo.studies.detectability._rates import EvaluatedRecords, in_words, rank
-from skthermo.studies.detectability._replicates import ReplicateRates, Replicates, in_sentences
-from skthermo.studies.detectability._simulation import Candidate, Decided, Simulation, by_detector, scatter_of
+from skthermo.studies._simulation import Candidate, Simulation, by_detector, joined, scatter_of
 from skthermo.surrogate import DataInformedFEM
 
 
@@ -334,37 +334,40 @@ class DetectabilityStudy(BaseEstimator):
         check_probability(confidence, "confidence")
         check_jobs(self.n_jobs)
         seeds = as_random_state(self.random_state).randint(np.iinfo(np.int32).max, size=(most_repeats, 2))
-        replicates = Replicates.asked(self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0])
-        T, stages = replicates.years[0], Stages(self, 4 + bool(replicates.parts))
+        asked = self.fem, self.uncertainty, T, self.models, self.n_replicates, seeds[0]
+        parts, years, models, others = drawn_replicates(*asked)
+        varies_more, T = parts != ["noise"], years[0]
+        stages = Stages(self, 3 + varies_more)
         with collected() as findings, single_blas_thread():
             with stages.stage("detectors"):
-                candidates, errors = self._learned(detectors, baseline, findings)
+                learned = self._learned(detectors, baseline, findings)
             with stages.stage("frequencies"):
                 findings += self.fem.thermal_.doubts(self.fem.weather(T))
                 measurement = scatter_of(self.fem, self.noise, self.gaps, self.outliers)
-                simulation = Simulation(self.fem, scenarios, T, measurement, most_repeats, function)
-            with stages.stage("first repeat"):
-                first = simulation.repeat(candidates, 0, seeds[0], given)
-                findings += first.findings
-            with stages.stage("other repeats"):
-                grows = tol if is_auto(self.n_repeats) and replicates.parts else None
-                decided = self._repeats(simulation, candidates, first, seeds, grows, confidence)
-        errors |= decided.errors
-        rows, records = {}, {name: evaluated(decided, name, scenarios) for name in candidates if name not in errors}
-        for name, some in records.items():
+                simulation = Simulation.solved(self.fem, scenarios, T, measurement, most_repeats)
+                simulation = replace(simulation, reference=function, given=given)
+            with stages.stage("repeats"):
+                grows = tol if is_auto(self.n_repeats) and varies_more else None
+                outcomes = self._repeats(simulation, learned, seeds, grows, confidence)
+        rows = {}
+        for name, one in without_errors(outcomes).items():
+            findings += by_detector(one.findings, name, detectors)
             try:
-                rows[name] = [one.summary(confidence) for one in some]
+                records = evaluated(name, one.decisions, one.indices, scenarios)
+                rows[name] = [some.summary(confidence) for some in records]
             except ValueError as error:
-                errors[name] = ValueError(f"{error}{longer_step(T, self.fem.records_.temperatures)}")
-        left = still_evaluating({name: candidates[name] for name in rows}, errors)
-        texts = {name: f"{type(error).__name__}: {error}" for name, error in errors.items()}
+                outcomes[name] = ValueError(f"{error}{longer_step(T, self.fem.records_.temperatures)}")
+        found = without_errors(outcomes)
+        left = {name: learned[name] for name in found}
+        texts = {name: f"{type(one).__name__}: {one}" for name, one in outcomes.items() if isinstance(one, Exception)}
         lines = [row for name in detectors for row in rows.get(name, [{"detector": name, "error": texts.get(name)}])]
         results, rates = pd.DataFrame(lines, columns=list(next(iter(rows.values()))[0])), None
-        if replicates.parts:
-            with stages.stage(f"{len(replicates.seeds)} replicates"):
-                found, failed = replicates.rates(simulation, left, self.n_jobs, max(self.verbose - 1, 0))
-            findings += failures(failed, len(replicates.seeds))
-            rates = ReplicateRates.joined(found, results, replicates)
+        if varies_more:
+            with stages.stage(f"{len(others)} replicates"):
+                drawn = simulation, left, parts, years, models
+                campaigns = self._in_parallel("replicates", replicated, [(*drawn, *one) for one in enumerate(others)])
+            findings += failures([one for one in campaigns if isinstance(one, str)], len(others))
+            rates = ReplicateRates.joined([one for one in campaigns if not isinstance(one, str)], results, parts)
             results = rates.banded(results, confidence)
         findings += many_false_alarms(results)
         self.results_, self.scenarios_, self.confidence_, self.errors_ = results, scenarios, confidence, texts
@@ -372,55 +375,56 @@ class DetectabilityStudy(BaseEstimator):
         self.detectors_ = {name: one.detector for name, one in left.items()}
         self.thresholds_ = {name: one.threshold for name, one in left.items()}
         self.columns_ = {name: one.columns for name, one in left.items()}
-        kept = {key: one for key, one in decided.decisions.items() if key[0] in left}
-        self.indices_ = {key: one for key, one in decided.indices.items() if key[0] in left}
-        self.decisions_ = {key: one for key, one in kept.items() if key[1] is not None}
-        self.calibration_ = {(name, source): one for (name, of, source), one in kept.items() if of is None}
+        decisions = {key: one for some in found.values() for key, one in some.decisions.items()}
+        self.decisions_ = {key: one for key, one in decisions.items() if key[1] is not None}
+        self.calibration_ = {(name, source): one for (name, of, source), one in decisions.items() if of is None}
+        self.indices_ = {key: one for some in found.values() for key, one in some.indices.items()}
         self.replicates_, self.uncertainty_ = rates, None if rates is None else rates.table()
         self.warnings_ = list(map(str, one_of_each_kind(findings)))
         warn_each(findings)
         return results
 
-    def _learned(
-        self, detectors: Mapping[str, Any], baseline: Any, findings: list[SkthermoWarning]
-    ) -> tuple[dict[str, Candidate], dict[str, Exception]]:
-        """Fitted detectors, and the errors of the others."""
-        candidates, errors, options = {}, {}, (baseline, self.random_state, self.memory)
+    def _learned(self, detectors: Mapping[str, Any], baseline: Any, findings: list[SkthermoWarning]) -> dict[str, Any]:
+        """Each fitted detector, or its error."""
+        found: dict[str, Any] = {}
         for name, detector in detectors.items():
             with collected() as doubts:
                 try:
-                    candidates[name] = Candidate.learned(self.fem, detector, *options)
+                    found[name] = Candidate.learned(self.fem, detector, baseline, self.random_state, self.memory)
                 except Exception as error:
-                    errors[name] = error
+                    found[name] = error
             findings += by_detector(doubts, name, detectors)
-        return still_evaluating(candidates, errors), errors
+        return found
+
+    def _in_parallel(self, unit: str, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """What a function gives, in joblib's jobs."""
+        options = {"unit": unit, "n_jobs": self.n_jobs, "verbose": max(self.verbose - 1, 0)}
+        return run_jobs((delayed(function)(*some) for some in arguments), len(arguments), **options)
 
     def _repeats(
-        self, simulation: Simulation, ready: dict[str, Any], first: Decided, seeds: Any, tol: Any, confidence: float
-    ) -> Decided:
-        """All repeats: one for each of the seeds or, with ``tol``, as many of them as the bounds need."""
-        left = still_evaluating({k: v for k, v in ready.items() if k not in first.errors}, first.errors)
-        found = [first]
+        self, simulation: Simulation, learned: Mapping[str, Any], seeds: Any, tol: float | None, confidence: float
+    ) -> dict[str, Any]:
+        """What each detector decides in all repeats, or its first error: one for each of the seeds or, with ``tol``, as
+        many of them as the bounds need. Detectors that fail are left out from then on."""
+        repeats = [simulation.repeat(without_errors(learned), 0, seeds[0])]  # here, where warnings are collected
+        outcomes = {**learned, **repeats[0]}
 
-        def add(n_repeats: int) -> Decided:
-            numbers = range(len(found), n_repeats)
-            jobs = (delayed(simulation.repeat)(left, number, seeds[number]) for number in numbers)
-            options = {"n_jobs": self.n_jobs, "verbose": max(self.verbose - 1, 0)}
-            found.extend(run_jobs(jobs, len(numbers), unit="repeats", **options))
-            return Decided.together(found)
+        def add(n_repeats: int) -> None:
+            left, numbers = {name: learned[name] for name in without_errors(outcomes)}, range(len(repeats), n_repeats)
+            repeats.extend(self._in_parallel("repeats", simulation.repeat, [(left, n, seeds[n]) for n in numbers]))
+            outcomes.update({name: joined([one[name] for one in repeats]) for name in left})
 
-        decided = add(len(seeds) if tol is None else 3)
-        if tol is None:
-            return decided
-        rows = [
-            one.summary(confidence)
-            for name in left
-            if name not in decided.errors
-            for one in evaluated(decided, name, simulation.scenarios)
-            if one.source == "simulated" and np.isfinite(one.decisions).any()
-        ]
-        widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
-        return add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
+        add(len(seeds) if tol is None else 3)
+        if tol is not None:
+            rows = [
+                some.summary(confidence)
+                for name, one in without_errors(outcomes).items()
+                for some in evaluated(name, one.decisions, one.indices, simulation.scenarios)
+                if some.source == "simulated" and np.isfinite(some.decisions).any()
+            ]
+            widest = max((row["ci_high"] - row["ci_low"] for row in rows), default=0.0) / 2
+            add(min(int(np.ceil(3 * (widest / tol) ** 2)), len(seeds)))
+        return outcomes
 
     def detector_name(self, detector: str | None = None) -> str:
         """Name of the only detector, or a name that is known.
@@ -769,10 +773,8 @@ class DetectabilityStudy(BaseEstimator):
 
     def _records(self, source: str) -> list[EvaluatedRecords]:
         """What the detectors evaluated of one source."""
-        decided = Decided(self.decisions_, {}, indices=self.indices_)
-        return [
-            one for name in self.detectors_ for one in evaluated(decided, name, self.scenarios_) if one.source == source
-        ]
+        tables = self.decisions_, self.indices_, self.scenarios_
+        return [one for name in self.detectors_ for one in evaluated(name, *tables) if one.source == source]
 
     def _family(self, family: str, source: str, detector: str | None) -> FamilyRates:
         name = self.detector_name(detector)
@@ -824,10 +826,11 @@ def checked_reference(reference: Any, scenarios: Sequence[BaseScenario]) -> Mapp
     return given
 
 
-def still_evaluating(left: dict[str, Candidate], errors: Mapping[str, Exception]) -> dict[str, Candidate]:
-    """Detectors that have not failed; the first error if all have."""
+def without_errors(outcomes: Mapping[str, Any]) -> dict[str, Any]:
+    """What detectors gave that have not failed; the first error if all have."""
+    left = {name: one for name, one in outcomes.items() if not isinstance(one, Exception)}
     if not left:
-        raise next(iter(errors.values()))
+        raise next(iter(outcomes.values()))
     return left
 
 
@@ -843,16 +846,6 @@ def longer_step(T: Table, baseline: Table) -> str:
         "window has a value where it holds at least half of the records that it usually has. Give weather by the step "
         "of the baseline"
     )
-
-
-def evaluated(decided: Decided, detector: str, scenarios: Sequence[BaseScenario]) -> list[EvaluatedRecords]:
-    """What a detector has evaluated, in the order of the scenarios."""
-    return [
-        EvaluatedRecords(detector, scenario, source, decided.indices[key], decided.decisions[key])
-        for scenario in scenarios
-        for source in ("simulated", "reference")
-        if (key := (detector, scenario.name, source)) in decided.decisions
-    ]
 
 
 def failures(failed: Sequence[str], n_replicates: int) -> list[ModelWarning]:

@@ -18,7 +18,7 @@ from skthermo.exceptions import FewRecordsWarning, RecordsWarning, SkthermoWarni
 from skthermo.fem.damage import LossKind
 from skthermo.preprocessing.checks import set_aside
 from skthermo.residuals.mean_errors import MeanErrors
-from skthermo.studies.identification._causes import Cause, changed
+from skthermo.studies._causes import Cause, changed
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ from skthermo._core.parallel import single_blas_thread
 from skthermo._core.warnings import collected, warn_each
 from skthermo.exceptions import ResultWarning, SkthermoWarning, WeatherWarning
 from skthermo.preprocessing.checks import set_aside
+from skthermo.studies._rates import rate_of
 from skthermo.studies._scenarios import BaseScenario, check_chain, read_scenarios
-from skthermo.studies.detectability._rates import Rate, rate_of
-from skthermo.studies.detectability._simulation import Simulation, baseline_table, has_targets, scatter_of, sensors_of
-from skthermo.studies.detectability._study import check_detector
+from skthermo.studies._simulation import Simulation, baseline_table, has_targets, scatter_of, sensors_of
+from skthermo.studies._study import check_detector
 from skthermo.surrogate import DataInformedFEM
 
 
@@ -47,13 +47,13 @@ class Decisions:
     def worth(self, limit: float) -> float:
         """1, or the limit over the lower bound of the false alarms where this is more: the detector will work with its
         own threshold, not with a raised one."""
-        return limit / max(self.false_alarms().ci_low, limit)
+        return limit / max(self.false_alarms()["ci_low"], limit)
 
     def found(self, limit: float) -> float:
         """Share of the damaged records in alarm, mean over scenarios; the threshold is raised where the limit asks."""
-        return float(np.mean([pod.rate for pod in self.pods(limit)]))
+        return float(np.mean([pod["rate"] for pod in self.pods(limit)]))
 
-    def pods(self, limit: float, confidence: float = 0.95, drawn: Collection[int] = ()) -> list[Rate]:
+    def pods(self, limit: float, confidence: float = 0.95, drawn: Collection[int] = ()) -> list[dict[str, Any]]:
         """That share with bounds by scenario; what is not evaluated is not found. Repeats of those ``drawn`` differ."""
         missed = np.where(np.isnan(self.values), 0.0, self.values - self.raised(limit))
         damaged = {
@@ -69,7 +69,7 @@ class Decisions:
             raise ValueError(f"none of {len(healthy)} healthy records is evaluated; expected one or more")
         return float(min(evaluated[int(limit * len(evaluated) + 1e-9)], 0.0))
 
-    def false_alarms(self, confidence: float = 0.95) -> Rate:
+    def false_alarms(self, confidence: float = 0.95) -> dict[str, Any]:
         """Share of the evaluated healthy records beyond the detector's own threshold, with bounds."""
         return rate_of(self.by_repeat(self.values, self.healthy()), confidence)
 
@@ -87,13 +87,10 @@ class Decisions:
 class TaskScorer:
     """Scores a fitted detector on simulated records of a task, each state by itself.
 
-    Labels are those of all simulated records; the number of the state of each counts through the scenarios of the first
-    repeat, then through those of the second.
+    ``states`` has the label, scenario and repeat of all simulated records.
     """
 
-    labels: pd.Series
-    state: NDArray[np.intp]
-    n_scenarios: int
+    states: pd.DataFrame
     sensors: Sequence[Hashable]
     max_false_alarms: float
 
@@ -106,27 +103,27 @@ class TaskScorer:
         check_detector(estimator, "the detector")
         self._check_columns(estimator, X)
         rows = self._rows(X)
-        labels = self.labels.to_numpy()[rows] if y is None else np.asarray(y)
+        labels = self.states["label"].to_numpy()[rows] if y is None else np.asarray(y)
         missing = [name for name, label in (("healthy", 1), ("damaged", -1)) if not (labels == label).any()]
         if missing:
             raise ValueError(f"none of {len(labels)} rows is {missing[0]}; expected the rows of a split of the task")
-        order = np.argsort(rows, kind="stable")
-        state, values = self.state[rows[order]], []
+        order, values = np.argsort(rows, kind="stable"), []
+        states = self.states.iloc[rows[order]]
+        repeat, scenario = states["repeat"].to_numpy(), states["scenario"].cat.codes.to_numpy()
         of_first_rows, findings = ("not-evaluated", "no-earlier-records"), list[SkthermoWarning]()
-        for one in np.split(order, np.flatnonzero(np.diff(state)) + 1):
+        for one in np.split(order, np.flatnonzero(np.diff(repeat) | np.diff(scenario)) + 1):
             with collected() as found:
                 values.append(np.asarray(estimator.decision_function(X.iloc[one]), dtype=float))
             is_none = np.isnan(values[-1]).all()
             findings += [finding for finding in found if is_none or finding.kind not in of_first_rows]
         warn_each(findings)
-        repeat, scenario = np.divmod(state, self.n_scenarios)
         return Decisions(np.concatenate(values), labels[order], scenario, repeat)
 
     def _rows(self, X: Table) -> NDArray[np.intp]:
         """Positions of the rows among the simulated ones."""
         if not isinstance(X, pd.DataFrame):
             raise ValueError(f"X is of type {type(X).__name__}; expected a frame: rows of the task's X, with its index")
-        rows = self.labels.index.get_indexer(X.index)
+        rows = self.states.index.get_indexer(X.index)
         if (rows < 0).any():
             raise ValueError(
                 f"{(rows < 0).sum()} of {len(rows)} rows are no simulated records of the task, the first "
@@ -295,7 +292,9 @@ class DetectionTask(Bunch):
         if not named:
             raise ValueError("detectors is empty; expected a detector, a search, or {name: detector or search}")
         seeds = _seeds(len(self.seeds) if n_repeats is None else n_repeats, random_state)[:, 1]
-        fresh, findings = self._simulated(T, self.scoring.max_false_alarms, 1, seeds)
+        limit, ends = self.scoring.max_false_alarms, ("ci_low", "ci_high")
+        drawn = {number for number, scenario in enumerate(self.scenarios) if scenario.n_draws > 1}
+        fresh, findings = self._simulated(T, limit, 1, seeds)
         if np.array_equal(as_floats(T), as_floats(self.T), equal_nan=True):
             text = "the weather is that of the task: the optimism is that of the noise alone. Give that of another year"
             findings.append(WeatherWarning(text, "other-weather"))
@@ -303,8 +302,14 @@ class DetectionTask(Bunch):
         for name, detector in named.items():
             fitted = self.refit(detector)
             tuned = np.mean([self.scoring(fitted, self.X.iloc[test], self.y.iloc[test]) for _, test in self.cv])
+            found = fresh.scoring.decisions(fitted, fresh.X.iloc[len(fresh.baseline) :])
+            pods, alarms = found.pods(limit, confidence, drawn), found.false_alarms(confidence)
             row = {"detector": name or type(last_step(fitted)).__name__, "tuned": float(tuned)}
-            rows.append(row | fresh._rates(fitted, confidence))
+            row |= {"fresh": found.score(limit)}
+            row |= {f"fresh_{end}": found.worth(limit) * np.mean([pod[end] for pod in pods]) for end in ends}
+            row |= {"false_alarms": alarms["rate"]} | {f"false_alarms_{end}": alarms[end] for end in ends}
+            row |= {"within_limit": alarms["ci_low"] <= limit, "not_evaluated": np.isnan(found.values).mean()}
+            rows.append(row)
         warn_each(findings)
         table = pd.DataFrame(rows).set_index("detector")
         table.insert(4, "optimism", table["tuned"] - table["fresh"])
@@ -319,11 +324,11 @@ class DetectionTask(Bunch):
         index = _moved(T, baseline, n_repeats * n_scenarios)
         with collected() as findings, single_blas_thread():
             findings += self.fem.thermal_.doubts(self.fem.weather(T))
-            simulation = Simulation(self.fem, self.scenarios, T, self.measurement, n_repeats)
+            simulation = Simulation.solved(self.fem, self.scenarios, T, self.measurement, n_repeats)
             tables = [
-                one.table[list(baseline)].to_numpy()
+                table[list(baseline)].to_numpy()
                 for repeat, seed in enumerate(seeds)
-                for one in simulation.records(repeat, [seed])
+                for table in simulation.records(repeat, [seed]).values()
             ]
         X = pd.concat([baseline, pd.DataFrame(np.vstack(tables), index, baseline.columns)])
         X = X.rename_axis(baseline.index.name)
@@ -334,27 +339,9 @@ class DetectionTask(Bunch):
         states = pd.DataFrame({"scenario": names, "repeat": np.r_[before, repeat]}, X.index)
         groups = np.array_split(np.arange(n_repeats), n_splits)
         cv = [(np.arange(n_baseline), n_baseline + np.flatnonzero(np.isin(repeat, group))) for group in groups]
-        state, sensors = repeat * n_scenarios + scenario, sensors_of(self.fem)
-        scoring = TaskScorer(y.iloc[n_baseline:], state, n_scenarios, sensors, limit)
+        scoring = TaskScorer(states.assign(label=y).iloc[n_baseline:], sensors_of(self.fem), limit)
         simulated = {"X": X, "y": y, "cv": cv, "scoring": scoring, "states": states, "T": T, "seeds": seeds}
         return DetectionTask(**{**self, **simulated}), findings
-
-    def _rates(self, detector: BaseEstimator, confidence: float) -> dict[str, Any]:
-        """Score and false alarms of a fitted detector on all simulated records, with bounds."""
-        limit = self.scoring.max_false_alarms
-        found = self.scoring.decisions(detector, self.X.iloc[len(self.baseline) :])
-        drawn = {number for number, scenario in enumerate(self.scenarios) if scenario.n_draws > 1}
-        pods, alarms, worth = found.pods(limit, confidence, drawn), found.false_alarms(confidence), found.worth(limit)
-        return {
-            "fresh": found.score(limit),
-            "fresh_ci_low": worth * float(np.mean([pod.ci_low for pod in pods])),
-            "fresh_ci_high": worth * float(np.mean([pod.ci_high for pod in pods])),
-            "false_alarms": alarms.rate,
-            "false_alarms_ci_low": alarms.ci_low,
-            "false_alarms_ci_high": alarms.ci_high,
-            "within_limit": alarms.ci_low <= limit,
-            "not_evaluated": float(np.isnan(found.values).mean()),
-        }
 
 
 def detection_task(
@@ -471,7 +458,10 @@ def detection_task(
     limit = check_probability(max_false_alarms, "max_false_alarms")
     check_chain(fem)
     table, findings = _baseline(fem, baseline)
-    table = table[_columns(table, columns, fem.mode_names_)]
+    chosen = list(table) if columns is None else check_names(columns, "columns", list(table))
+    if not set(chosen) & set(fem.mode_names_):
+        raise ValueError(f"columns are {chosen}; expected some of {list(table)}, modes among them")
+    table = table[[name for name in table if name in chosen]]
     measurement = scatter_of(fem, noise, gaps, outliers)
     given = {"scenarios": read_scenarios(scenarios, fem.model), "baseline": table, "measurement": measurement}
     task, doubts = DetectionTask(fem=fem, **given)._simulated(T, limit, n_splits, seeds)
@@ -534,14 +524,6 @@ def _labels(scenarios: Sequence[BaseScenario], T: Table) -> NDArray[np.intp]:
             names = [one.name for one in scenarios]
             raise ValueError(f"none of the scenarios {names} has {name} records; expected a healthy and a damaged one")
     return labels
-
-
-def _columns(baseline: pd.DataFrame, columns: Any, modes: Sequence[Hashable]) -> list[Hashable]:
-    """Those columns of the baseline that a detector shall see, in the order of the baseline."""
-    chosen = list(baseline.columns) if columns is None else check_names(columns, "columns", list(baseline))
-    if not set(chosen) & set(modes):
-        raise ValueError(f"columns are {chosen}; expected some of {list(baseline.columns)}, modes among them")
-    return [name for name in baseline.columns if name in chosen]
 
 
 def _seeds(n_repeats: Any, random_state: np.random.RandomState | None) -> NDArray[np.intp]:
