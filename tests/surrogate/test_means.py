@@ -9,7 +9,7 @@ from sklearn.pipeline import make_pipeline
 
 from skthermo.datasets import make_truss_campaign
 from skthermo.detection import TemperatureCompensator
-from skthermo.preprocessing import ExponentialMeans, LagFeatures
+from skthermo.preprocessing import BlockedKFold, ExponentialMeans, LagFeatures
 from skthermo.surrogate import DataInformedFEM, TemperatureMapper
 from tests.surrogate.chains import TRUSS
 
@@ -102,8 +102,8 @@ def test_rows_after_an_outage_have_no_prediction_until_means_know_the_weather():
 @pytest.mark.filterwarnings("ignore:.*set-aside")
 def test_folds_of_a_compensator_have_means_of_all_records():
     T, F, _ = bridge(5, 400, "28D")
-    compensator = TemperatureCompensator(targets=["f1", "f2"]).set_output(transform="pandas")
-    residuals = compensator.fit_transform(T.join(spoiled(F)))
+    compensator = TemperatureCompensator(targets=["f1", "f2"], cv=BlockedKFold(5, block="7D"))
+    residuals = compensator.set_output(transform="pandas").fit_transform(T.join(spoiled(F)))
     assert residuals.notna().mean().min() > 0.85
     assert 1.48 * residuals[200:].abs().median().max() < 2.6e-3  # the noise is 2e-3; means lack the weather before
     assert isinstance(compensator.estimator_[0], ExponentialMeans)
