@@ -378,7 +378,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         correlated for long, the blocks of the second are longer.
         """
         Y, in_time = as_floats(F), np.argsort(row_times(T), kind="stable")
-        cv = BlockedKFold(5) if self.cv is None else self.cv
+        cv = BlockedKFold() if self.cv is None else self.cv
         for _ in range(2):
             folds = read_folds(cv, T)
             with collected() as found:
@@ -386,11 +386,12 @@ class TemperatureCompensator(TransformerMixin, Estimator):
                 predicted = self.regression_.out_of_fold(estimator, T, F, folds)
             residuals = self._difference(Y, predicted)
             far = np.abs(residuals - median(residuals)) > 8 * robust_deviation(residuals)
-            memory = 5 * correlation_times(np.where(far, np.nan, residuals)[in_time]).max()
-            longer = cv.remembering(T, memory) if self.cv is None else cv
-            if not far.any() and longer is cv:
+            shorter, usual = cv, np.where(far, np.nan, residuals)
+            if self.cv is None:
+                cv = shorter.remembering(T, 5.0 * correlation_times(usual[in_time]).max())
+            if not far.any() and cv is shorter:
                 break
-            F, cv = frame_like(F, np.where(far, np.nan, Y)), longer
+            F = frame_like(F, np.where(far, np.nan, Y))
         self.estimator_ = self.regression_.estimator
         return predicted, folds, found
 

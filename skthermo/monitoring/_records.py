@@ -307,7 +307,7 @@ def usable_baseline(
         in_hertz = {units[name] for name in targets} == {"Hz"}
         directions = "softening" if monitor.fem is None else monitor.fem
         detector = DirectionalDetector(directions) if in_hertz else MahalanobisDetector()
-        if len(targets) < len(records.columns.difference(monitor.reference or [])):
+        if len(targets) < len(records.columns.difference(monitor.reference or [], sort=False)):
             detector = CompensatedDetector(detector, targets=targets)
     return records, detector, targets, units, found
 
