@@ -542,9 +542,9 @@ class Taken:
     """What has been taken in from which files, kept beside the monitor.
 
     ``layouts`` are the sets of columns that the files of the baseline have, ``fitted`` is the time of the fit,
-    ``settings`` are those of the fit, ``state`` is what the last call said. For each file there are its size, the time
-    of its last change, and how many of its first rows are done, with a checksum of these. If a command is killed after
-    it has saved the monitor, rows come again, and the monitor knows them.
+    ``settings`` are those of the fit, and ``state`` is what the last call said. For each file there are its size,
+    the time of its last change, and how many of its first rows are done, with a checksum of these. If a command is
+    killed after it has saved the monitor, rows come again, and the monitor knows them.
     """
 
     file: Path
