@@ -147,7 +147,7 @@ fig.legend(loc="outside upper center", markerscale=3, ncols=3)
 #
 # The damage index over time, for four of them. The Mahalanobis distance of raw frequencies hides the damage in the
 # range that frost has opened. Neighbours among the raw records show it, since no healthy record looks like a damaged
-# one, and so do residuals.
+# one, and so do residuals in two regimes.
 
 
 def baseline_index(detector):
@@ -182,7 +182,7 @@ plot_indices(
 # %%
 # .. image:: /images/z24_detection.png
 #    :alt: Damage index over time in four panels: of raw frequencies, the Mahalanobis distance leaves nearly all
-#          damaged records below the threshold; by neighbours and by residuals, nearly all lie above it
+#          damaged records below the threshold; by neighbours and by residuals in two regimes, nearly all lie above
 #
 # Does it depend on the threshold?
 # --------------------------------
@@ -300,10 +300,10 @@ plot_indices(
 
 # %%
 # .. image:: /images/z24_days.png
-#    :alt: Damage index of means of 24 hours and of 24 records; after the first damaged days, it lies above the
-#          threshold
+#    :alt: Damage index of means of 24 hours and of 24 records; after the first damaged days, that of 24 records
+#          lies above the threshold
 #
-# This damage is so large that single records show it first, and means later. Damage was done little by little. By
+# This damage is so large that single records show it first, and means later or not at all. Damage was done little by little. By
 # day, in percent of its records:
 
 print(found_by_day(records, compensated()).round(1).to_string())
