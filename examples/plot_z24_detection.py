@@ -303,8 +303,8 @@ plot_indices(
 #    :alt: Damage index of means of 24 hours and of 24 records; after the first damaged days, that of 24 records
 #          lies above the threshold
 #
-# This damage is so large that single records show it first, and means later or not at all. Damage was done little by little. By
-# day, in percent of its records:
+# This damage is so large that single records show it first, and means later or not at all. Damage was done little by
+# little. By day, in percent of its records:
 
 print(found_by_day(records, compensated()).round(1).to_string())
 
