@@ -186,7 +186,7 @@ def may_train(
 
     A change may have begun within the ``margin`` before the first alarm of an event, or in the 30 days whose mean has
     moved.
-    Modes that were exchanged for a time stand in their place already with ``is_in_place``.
+    Columns that were exchanged for a time stand in their place already with ``is_in_place``.
     """
     said = {True: "acknowledged", False: "not acknowledged"}
     spans = [

@@ -1,4 +1,4 @@
-"""Faults of sensors in service: dead, stuck, off or drifting thermometers, responses that no damage explains."""
+"""Faults of sensors in service: dead, stuck, drifting or exchanged thermometers, responses that no damage explains."""
 
 from __future__ import annotations
 
@@ -64,10 +64,20 @@ def in_place(records: pd.DataFrame, faults: Sequence[Fault], once_found: bool = 
     """Records with exchanged values back in their columns."""
     placed = records.copy()
     for fault in faults:
-        if fault.kind == "swapped":
+        if fault.kind == "swapped" and fault.column in placed:
             rows = fault.covers(records.index, once_found)
             placed.loc[rows, fault.column] = records.loc[rows, fault.other]
     return placed
+
+
+def exchange(
+    pair: Sequence[Hashable], since: pd.Timestamp, today: pd.Timestamp, lasting: Mapping[Hashable, Fault]
+) -> tuple[dict[Fault, Fault], list[Fault]]:
+    """Lasting faults that end as two columns are exchanged back, else the faults that begin as they are exchanged."""
+    ended = {lasting[name]: replace(lasting[name], until=since) for name in pair if name in lasting}
+    detail = "its values are in the column of {!r}; put back in place"
+    begun = [Fault(a, "swapped", since, today, detail.format(b), other=b) for a, b in (pair, pair[::-1])]
+    return ended, [] if ended else begun
 
 
 def season_of(days: pd.DatetimeIndex) -> Array:
@@ -139,6 +149,26 @@ class Thermometers:
             rest = values[known, place] - expected
             found[known, place] = np.sign(rest) * np.maximum(np.abs(rest) - np.abs(expected - within) / 2, 0.0)
         return pd.DataFrame(found, means.index, means.columns)
+
+    def agree(self, means: pd.DataFrame, trusted: list[Hashable]) -> bool:
+        """Whether no trusted thermometer departs from the other ones by more than its limits."""
+        return bool(self.excess(self.departures(means, trusted))[trusted].max() <= 1)
+
+    def exchanged(self, means: pd.DataFrame, pair: list[Hashable], trusted: list[Hashable]) -> pd.Timestamp | None:
+        """The day since which two thermometers are exchanged, if that explains all departures.
+
+        In weather of the baseline, what the others alone predict of the two has to be less than half as far then, which
+        tells an exchange from an offset of one of them.
+        """
+        others, changed = [name for name in trusted if name not in pair], means.copy()
+        is_known = means.isna() | ((means >= self.known[0]) & (means <= self.known[1]))
+        known = means.where(is_known[others].all(axis=1))
+        rest, values = self.departures(known, others)[pair].to_numpy(), known[pair].to_numpy()
+        here, there = ((some**2).sum(axis=1) for some in (rest, rest + values[:, ::-1] - values))
+        first = int(np.argmax(np.nan_to_num(here - there)[::-1].cumsum()[::-1]))
+        changed.loc[means.index[first] :, pair] = means[pair[::-1]].to_numpy()[first:]
+        is_nearer = np.nansum(there[first:]) < np.nansum(here[first:]) / 4
+        return means.index[first] if is_nearer and self.agree(changed, trusted) else None
 
     def excess(self, rest: pd.DataFrame) -> pd.Series:
         """The largest median departure of each thermometer at the end, over its limit."""
@@ -299,7 +329,7 @@ class SensorWatch:
         *,
         once_found: bool = False,
     ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-        """Records without what sensors showed since they were at fault: NaN there, and exchanged responses in place.
+        """Records without what sensors showed since they were at fault: NaN there, and exchanged values in place.
 
         Or since they were found to be. Also, of each record, ``n_held`` responses that were set aside although the
         structure may have moved them, and their names ``held``; ``n_left_out`` values, columns ``at_fault``, and a
@@ -314,7 +344,7 @@ class SensorWatch:
             rows, name = fault.covers(stamps, once_found), fault.column
             text = f"{name} is left out ({fault.kind} since {fault.since:%Y-%m-%d})"
             if fault.kind == "swapped":
-                is_first = self.modes.index(name) < self.modes.index(fault.other)
+                is_first = given.columns.get_loc(name) < given.columns.get_loc(fault.other)
                 text = f"{name} and {fault.other} are exchanged and were put back in place" if is_first else ""
             else:
                 out.loc[rows, name] = True
@@ -363,16 +393,13 @@ class SensorWatch:
 
     def _with_exchanges(self, state: WatchState, today: pd.Timestamp) -> WatchState:
         """Modes that are exchanged from now on, or no longer."""
-        begin = max([days_later(today, -4), *(one.detected for one in state.faults if one.kind == "swapped")])
+        begin = max([days_later(today, -4), *(one.detected for one in state.faults if one.other in self.modes)])
         recent, lasting = in_place(state.records.loc[begin:], state.faults), state.lasting("swapped")
         changes, found = {}, []
         for places, since in self.expected.exchanged(*self._evaluated(recent)[1:], recent.index):
             pair = [self.modes[place] for place in places]
-            known = [lasting[name] for name in pair if name in lasting]
-            changes |= {fault: replace(fault, until=since) for fault in known}
-            for name, other in () if known else (pair, pair[::-1]):
-                detail = f"its values are in the column of {other!r}; put back in place"
-                found.append(Fault(name, "swapped", since, today, detail, other=other))
+            ended, begun = exchange(pair, since, today, lasting)
+            changes, found = changes | ended, found + begun
         return state.updated(changes, found)
 
     def _with_runs(self, state: WatchState, today: pd.Timestamp) -> WatchState:
@@ -398,12 +425,13 @@ class SensorWatch:
     def _with_departures(self, state: WatchState, today: pd.Timestamp, n_days: int = 4) -> WatchState:
         """Thermometers that have come back to less than half of their departure for some days are used again.
 
-        In its first two months, an offset that goes on may turn out to be a drift. The thermometer that departs from
-        the others is left out if without it, and without no other one, none does.
+        In its first two months, an offset that goes on may turn out to be a drift. Two that are exchanged are put back
+        in place, after some days, in which an offset of one may look alike. Else the thermometer that departs from the
+        others is left out if without it, and without no other one, none does.
         """
-        means, changes, found, lasting = state.means.copy(), {}, [], state.lasting("offset", "drift")
+        means, changes, found, lasting = in_place(state.means, state.faults), {}, [], state.lasting("offset", "drift")
         for fault in state.faults:
-            if fault.column in self.sensors and fault not in lasting.values():
+            if fault.column in self.sensors and fault not in lasting.values() and fault.kind != "swapped":
                 is_in = (means.index >= midnight(fault.since)) & (means.index < (fault.until or days_later(today, 1)))
                 means.loc[is_in, fault.column] = np.nan
         trusted = [name for name in self.sensors if name not in state.left_out()]
@@ -417,12 +445,22 @@ class SensorWatch:
                 changes[fault] = replace(fault, **change_of(own))
         excess = self.thermometers.excess(rest)[trusted]
         if (excess > 1).any() and 2 * (1 + len(lasting)) <= len(self.sensors):
-            resolved = []
-            for name in excess.index[excess > excess.max() / 2].difference(self.reference, sort=False):
-                others = [other for other in trusted if other != name]
-                if self.thermometers.excess(self.thermometers.departures(means, others))[others].max() <= 1:
-                    resolved.append(name)
-            if len(resolved) == 1:
+            suspects, exchanges = excess.index[excess > excess.max() / 2].difference(self.reference, sort=False), []
+            resolved = [
+                name for name in suspects if self.thermometers.agree(means, [one for one in trusted if one != name])
+            ]
+            swapped = state.lasting("swapped")
+            for pair in map(list, combinations([name for name in trusted if name not in self.reference], 2)):
+                is_free = all(name not in swapped or swapped[name].other in pair for name in pair)
+                if is_free and set(resolved) <= set(pair) and suspects.isin(pair).any():
+                    since = self.thermometers.exchanged(means, pair, trusted)
+                    exchanges += [] if since is None else [(pair, since)]
+            if len(exchanges) == 1:
+                pair, since = exchanges[0]
+                if since <= days_later(today, 1 - n_days):
+                    ended, found = exchange(pair, since, today, swapped)
+                    changes |= ended
+            elif len(resolved) == 1:
                 found = [Fault(column=resolved[0], detected=today, **change_of(rest[resolved[0]].dropna()))]
         return state.updated(changes, found)
 

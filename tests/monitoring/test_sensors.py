@@ -8,7 +8,7 @@ import pytest
 
 from skthermo.detection import MahalanobisDetector
 from skthermo.monitoring import Monitor
-from tests.monitoring.nightly import quietly
+from tests.monitoring.nightly import assert_same_history, quietly
 
 N_BASELINE, N_DAYS, PER_DAY = 200, 50, 4
 ONSET = N_BASELINE + 10
@@ -126,6 +126,56 @@ def test_damage_is_not_taken_for_a_fault(monitor, records, lost):
     served = after_service(monitor, damaged, 20)
     assert served.faults_.empty
     assert served.corrected_[MODES].equals(damaged.loc[served.records_.index, MODES])
+
+
+@pytest.fixture(scope="module")
+def four():
+    """Records of four thermometers, of which T0 and T1 show nearly the same, and their monitor after the baseline."""
+    random, truth = np.random.default_rng(1), bridge(4)
+    for name, apart in (("T0", 0.2), ("T3", -6.0)):
+        truth[name] = truth["T1"] + random.normal(apart, 0.6, len(truth))
+    return truth, fitted(truth)
+
+
+def exchanged(records, *columns, day=ONSET):
+    changed, columns = records.copy(), list(columns)
+    changed.loc[late(records, day), columns] = records.loc[late(records, day), [*columns[1:], columns[0]]].to_numpy()
+    return changed
+
+
+@pytest.mark.parametrize("missing", [None, "T2"])
+def test_exchanged_thermometers_are_named_and_put_back_in_place_until_they_are_again(four, missing):
+    truth, own = four
+    truth = truth.copy()
+    truth.loc[late(truth, ONSET - 8), [missing] if missing else []] = np.nan
+    truth.loc[late(truth)[1::9], "T1"] = np.nan
+    changed = exchanged(exchanged(truth, "T1", "T3"), "T1", "T3", day=ONSET + 15)
+    served, in_parts = after_service(own, changed), copy.deepcopy(own)
+    for part in np.array_split(np.arange(N_BASELINE * PER_DAY, (N_BASELINE + 30) * PER_DAY + 1), 7):
+        quietly(in_parts.update, changed.iloc[part])
+    assert_same_history(served, in_parts)
+    faults = served.faults_[served.faults_["kind"] != "dead"]
+    assert faults[["column", "kind"]].to_numpy().tolist() == [["T1", "swapped"], ["T3", "swapped"]]
+    assert "'T3'" in faults["detail"].iloc[0]
+    for name, day in (("since", ONSET), ("until", ONSET + 15)):
+        assert (faults[name] == late(truth, day)[0]).all()
+    assert (faults["detected"] - faults["since"] <= pd.Timedelta(days=3)).all()
+    assert served.corrected_[["T1", "T3"]].equals(truth.loc[served.records_.index, ["T1", "T3"]])
+
+
+@pytest.mark.parametrize("case", ["twins", "three", "offset", "drift"])
+def test_what_may_be_no_exchange_of_two_thermometers_is_not_named_as_one(four, case):
+    truth, own = four
+    changed, days = truth.copy(), (late(truth) - late(truth)[0]) / pd.Timedelta(days=1)
+    if case == "offset":  # as far to the other side of T1 as it was
+        changed.loc[late(truth), "T3"] += 12.0
+    elif case == "drift":
+        changed.loc[late(truth), "T3"] += 0.3 * days
+    else:
+        changed = exchanged(truth, *(["T0", "T1"] if case == "twins" else ["T1", "T3", "T2"]))
+    kinds = set(after_service(own, changed).faults_["kind"])
+    assert "swapped" not in kinds
+    assert kinds == {case} or case in ("twins", "three")
 
 
 @pytest.mark.nightly
