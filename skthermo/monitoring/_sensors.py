@@ -154,20 +154,22 @@ class Thermometers:
         """Whether no trusted thermometer departs from the other ones by more than its limits."""
         return bool(self.excess(self.departures(means, trusted))[trusted].max() <= 1)
 
-    def exchanged(self, means: pd.DataFrame, pair: list[Hashable], trusted: list[Hashable]) -> pd.Timestamp | None:
+    def exchanged(
+        self, means: pd.DataFrame, pair: list[Hashable], trusted: list[Hashable], is_back: bool
+    ) -> pd.Timestamp | None:
         """The day since which two thermometers are exchanged, if that explains all departures.
 
-        In weather of the baseline, what the others alone predict of the two has to be less than half as far then, which
-        tells an exchange from an offset of one of them.
+        Unless it takes them back to where they belong, what the others alone predict of the two in weather of the
+        baseline has to be less than half as far then, which tells an exchange from an offset of one of them.
         """
-        others, changed = [name for name in trusted if name not in pair], means.copy()
+        others, values, changed = [name for name in trusted if name not in pair], means[pair].to_numpy(), means.copy()
+        rest = self.departures(means, others)[pair].to_numpy()
+        here, there = (np.nan_to_num((some**2).sum(axis=1)) for some in (rest, rest + values[:, ::-1] - values))
+        first = int(np.argmax((here - there)[::-1].cumsum()[::-1]))
+        changed.loc[means.index[first] :, pair] = values[first:, ::-1]
         is_known = means.isna() | ((means >= self.known[0]) & (means <= self.known[1]))
-        known = means.where(is_known[others].all(axis=1))
-        rest, values = self.departures(known, others)[pair].to_numpy(), known[pair].to_numpy()
-        here, there = ((some**2).sum(axis=1) for some in (rest, rest + values[:, ::-1] - values))
-        first = int(np.argmax(np.nan_to_num(here - there)[::-1].cumsum()[::-1]))
-        changed.loc[means.index[first] :, pair] = means[pair[::-1]].to_numpy()[first:]
-        is_nearer = np.nansum(there[first:]) < np.nansum(here[first:]) / 4
+        rows = is_known[others].all(axis=1) & (means.index >= means.index[first])
+        is_nearer = is_back or there[rows].sum() < here[rows].sum() / 4
         return means.index[first] if is_nearer and self.agree(changed, trusted) else None
 
     def excess(self, rest: pd.DataFrame) -> pd.Series:
@@ -453,7 +455,7 @@ class SensorWatch:
             for pair in map(list, combinations([name for name in trusted if name not in self.reference], 2)):
                 is_free = all(name not in swapped or swapped[name].other in pair for name in pair)
                 if is_free and set(resolved) <= set(pair) and suspects.isin(pair).any():
-                    since = self.thermometers.exchanged(means, pair, trusted)
+                    since = self.thermometers.exchanged(means, pair, trusted, pair[0] in swapped)
                     exchanges += [] if since is None else [(pair, since)]
             if len(exchanges) == 1:
                 pair, since = exchanges[0]
