@@ -159,17 +159,16 @@ class Thermometers:
     ) -> pd.Timestamp | None:
         """The day since which two thermometers are exchanged, if that explains all departures.
 
-        Unless it takes them back to where they belong, what the others alone predict of the two in weather of the
-        baseline has to be less than half as far then, which tells an exchange from an offset of one of them.
+        Unless it takes them back to where they belong, they have to be less than half as far then from what the others
+        alone and the season predict, which tells an exchange from an offset of one of them.
         """
         others, values, changed = [name for name in trusted if name not in pair], means[pair].to_numpy(), means.copy()
         rest = self.departures(means, others)[pair].to_numpy()
         here, there = (np.nan_to_num((some**2).sum(axis=1)) for some in (rest, rest + values[:, ::-1] - values))
         first = int(np.argmax((here - there)[::-1].cumsum()[::-1]))
         changed.loc[means.index[first] :, pair] = values[first:, ::-1]
-        is_known = means.isna() | ((means >= self.known[0]) & (means <= self.known[1]))
-        rows = is_known[others].all(axis=1) & (means.index >= means.index[first])
-        is_nearer = is_back or there[rows].sum() < here[rows].sum() / 4
+        has_season = len(self.together.mean) > len(self.limits.T)
+        is_nearer = is_back or (has_season and there[first:].sum() < here[first:].sum() / 4)
         return means.index[first] if is_nearer and self.agree(changed, trusted) else None
 
     def excess(self, rest: pd.DataFrame) -> pd.Series:
