@@ -63,10 +63,10 @@ class Service:
         self.name, self.columns, self.can_compare = name, columns or list(T), len(T.columns) > 1
         self.T, self.F = T.iloc[n_baseline:], F.iloc[n_baseline:]
         self.baseline = T.iloc[:n_baseline], F.iloc[:n_baseline]
-        self.watch = SensorWatch.fitted(*self.baseline, reference=reference)
+        units = dict.fromkeys(T, "°C") | dict.fromkeys(F, "Hz")
+        self.watch = SensorWatch.fitted(*self.baseline, reference, units)
         self.days = days_of(self.T)
-        start = getattr(self.watch, "start", None)  # of 0.2
-        self.states = [start() if start else self.watch.start_]
+        self.states = [self.watch.start_]
         for _, rows in self.days:
             self.states.append(self.watch.advance(self.states[-1], self.T.iloc[rows], self.F.iloc[rows]))
         self.healthy = self.watch.faults(self.states[-1])
