@@ -119,5 +119,6 @@ def test_a_fleet_is_that_of_one_process():
     for name, year in years.items():
         first, other = (fleet.chains[name].predict(year.temperatures) for fleet in (here, there))
         np.testing.assert_array_equal(other, first)
-    assert there.warnings.equals(here.warnings)
+    assert set(there.warnings["bridge"]) == set(years)
+    assert (there.warnings["kind"] == "not-kept").all()  # Dask works in threads
     assert there.table["is_fitted"].all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import re
+import threading
 import time
 import traceback
 from collections import Counter
@@ -111,6 +112,8 @@ class KnownBridge:
     def warned(self, stage: str, found: Iterable[SkthermoWarning]) -> KnownBridge:
         """The bridge with the warnings of a stage in place of earlier ones."""
         counts = Counter((stage, one.kind, str(one.args[0])) for one in found)
+        if threading.current_thread() is not threading.main_thread():
+            counts[stage, "not-kept", "fitted or updated in a thread: its warnings are in the log of that process"] = 1
         others = tuple(one for one in self.warnings if one[0] != stage)
         return replace(self, warnings=(*others, *((*one, times) for one, times in counts.items())))
 
@@ -261,7 +264,9 @@ def fit_fleet(
     Notes
     -----
     The result is the same, bit for bit, whatever the number of jobs, the back end of joblib (its own processes, Dask,
-    Ray) and the other bridges are. Parallel parts within a bridge run one after another.
+    Ray) and the other bridges are. Parallel parts within a bridge run one after another. Where bridges are fitted in
+    threads (joblib's, or Dask's), their warnings go to the log of that process, and ``fleet.warnings`` has one row of
+    the kind ``not-kept`` for each of these bridges.
 
     If a process is killed, for lack of memory, say, joblib ends the call with an error. With ``folder``, the bridges
     that are finished are kept, and the same call goes on with the others (:ref:`fleet-cluster`).

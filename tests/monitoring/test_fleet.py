@@ -118,8 +118,10 @@ def test_other_processes_and_other_bridges_give_the_same_bits(fleet, backend):
         other = fit_fleet({n: makers[n] for n in some}, {n: records[n] for n in some}, monitor=watch, n_jobs=2)
     assert bits(other) == bits(fleet, some)
     assert (other.chains["odd"].process_ != os.getpid()) == (backend == "loky")
-    if backend == "loky":  # in threads, warnings are Python's
+    if backend == "loky":
         pd.testing.assert_frame_equal(other.warnings, fleet.warnings)
+    else:  # in threads, warnings are Python's
+        assert other.warnings[["bridge", "kind"]].to_numpy().tolist() == [[name, "not-kept"] for name in some]
 
 
 def test_a_seed_depends_on_the_name_alone():
