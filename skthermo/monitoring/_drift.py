@@ -345,7 +345,7 @@ class DriftFollower:
     def _is_apart(self, learned: pd.DataFrame, waiting: pd.DataFrame, chance: float = 1e-3) -> bool:
         """Whether there is a step between the days that are learned and those that wait, beside a slow drift."""
         X, line, y = self._regression(pd.concat([learned, waiting]))
-        step = (np.arange(len(y)) >= len(y) - len(waiting)).astype(float)
+        step = (midnights_between(learned.index[0], waiting.index[-1]) > learned.index[-1]).astype(float)
         enough = enough_days(X, line, y) & ~np.isnan(y[step > 0]).all(axis=0)
         if not enough.any():
             return False

@@ -181,42 +181,42 @@ def identify_damage(
 
     with collected() as findings:
         shift, evidence = weighed(fem)
-    seen = evidence.observed
-    if models is None:
-        whole = evidence.explanations(random)
-    else:
+        seen = evidence.observed
+        if models is None:
+            whole = evidence.explanations(random)
+        else:
 
-        def with_model(model: Any, seed: int) -> list[DamageExplanation]:
-            with collected():  # as those of the chain itself
-                return weighed(refitted(fem, model=model))[1].explanations(np.random.RandomState(seed))
+            def with_model(model: Any, seed: int) -> list[DamageExplanation]:
+                with collected():  # as those of the chain itself
+                    return weighed(refitted(fem, model=model))[1].explanations(np.random.RandomState(seed))
 
-        models = checked_models(fem, models)
-        seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
-        jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
-        whole = averaged(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
+            models = checked_models(fem, models)
+            seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
+            jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
+            whole = averaged(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
 
-    errors, similarity = _errors(evidence)
-    draws, explained = _drawn(whole, causes, random), whole
-    if structure is not None:
-        located, members = _located(evidence, shift, structure, fem, measured)
-        explained = located.explanations(random)
-    n_observed, best = len(seen.change), explained[0]
-    by_group = tabulated(explained, errors.index).join(errors)
-    found = IdentifiedDamage(
-        table=by_group if structure is None else tabulated(explained, members.index).join(members),
-        groups=by_group,
-        shifts=_shifts(shift, explained, fem.mode_names_),
-        draws=draws,
-        damage=_severities(whole[0], whole[0].draws.mean(axis=0)),
-        p_value=chance_of(seen.change @ np.linalg.solve(seen.covariance, seen.change), n_observed, shift.freedom),
-        misfit_p_value=chance_of(best.misfit, n_observed - len(best.causes), shift.freedom),
-        similarity=similarity,
-        records=shift.counts,
-        explained=explained,
-        kind=kind,
-    )
-    if structure is not None:
-        found.table["is_likely"] = found.table.index.isin(found.likely_members())
+        errors, similarity = _errors(evidence)
+        draws, explained = _drawn(whole, causes, random), whole
+        if structure is not None:
+            located, members = _located(evidence, shift, structure, fem, measured)
+            explained = located.explanations(random)
+        n_observed, best = len(seen.change), explained[0]
+        by_group = tabulated(explained, errors.index).join(errors)
+        found = IdentifiedDamage(
+            table=by_group if structure is None else tabulated(explained, members.index).join(members),
+            groups=by_group,
+            shifts=_shifts(shift, explained, fem.mode_names_),
+            draws=draws,
+            damage=_severities(whole[0], whole[0].draws.mean(axis=0)),
+            p_value=chance_of(seen.change @ np.linalg.solve(seen.covariance, seen.change), n_observed, shift.freedom),
+            misfit_p_value=chance_of(best.misfit, n_observed - len(best.causes), shift.freedom),
+            similarity=similarity,
+            records=shift.counts,
+            explained=explained,
+            kind=kind,
+        )
+        if structure is not None:
+            found.table["is_likely"] = found.table.index.isin(found.likely_members())
     warn_each([*findings, *shift.findings, *seen.findings, *found.warnings()])
     return found
 

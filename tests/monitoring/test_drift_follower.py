@@ -76,9 +76,11 @@ def test_slow_drift_is_followed_and_raises_no_alarm():
     assert (ageing.evaluations_["state"] == "alarm").mean() < 0.02
 
 
-def test_sudden_damage_is_not_learned_as_drift():
+@pytest.mark.parametrize("outage", [[], range(440, 470)])
+def test_sudden_damage_is_not_learned_as_drift(outage):
     changes = {}, {"damage": {"diagonal": 0.12}, "damage_from": ONSET}
-    healthy, damaged = (in_service(campaign(**each)[:480]) for each in changes)
+    records = (campaign(**each)[:510] for each in changes)
+    healthy, damaged = (in_service(table.drop(index=table.index[outage])) for table in records)
     later = damaged.evaluations_.loc[ONSET + pd.Timedelta("7D") :]
     assert (later["state"] == "alarm").all()
     assert abs(damaged.drift_["change"] - healthy.drift_["change"])["diagonal"] < 0.03 * 0.12
