@@ -66,6 +66,12 @@ def effects_of(observed: ObservedChange, causes: Sequence[Cause], n_solved: int 
     for place, cause in enumerate(causes):
         amounts = cause.direction * np.expm1(ends * np.log1p(cause.direction * cause.bound))
         found[1:, place] = [observed.response([cause], [amount]) for amount in amounts]
+        unsolved = np.isnan(found[1:, place]).any(axis=1)
+        if unsolved.any():
+            raise ValueError(
+                f"the model gives NaN where {cause.name} has changed by {amounts[unsolved][0]:.2f}; expected a number "
+                f"for every mode at each change up to {amounts[-1]:.2f}"
+            )
     return found
 
 

@@ -122,7 +122,7 @@ def identify_damage(
         fit the model, causes have the same name or that of an explanation, ``prior`` is no `DamagePrior`, shapes or
         dofs do not fit the model, the model was not assembled from the structure, no record can be compared (each lacks
         all frequencies, a temperature, or similar weather in the training records), a mode is more than 3 times or less
-        than a fifth of the predicted one, no cause can be seen, or the model cannot be changed so.
+        than a fifth of the predicted one, no cause can be seen, or the model cannot be changed so or gives NaN then.
 
     Warns
     -----

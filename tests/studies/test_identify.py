@@ -477,6 +477,15 @@ def test_bad_options(fem, healthy, change, message):
         identify_damage(fem, WEATHER, healthy, **{"groups": GROUPS, **change})
 
 
+def test_a_program_that_fails_under_heavy_damage_is_named(fem, healthy):
+    def program(row):
+        return TRUSS.frequencies(row[np.newaxis])[0] if row[0] > 0.4 else np.full(6, np.nan)
+
+    failing = with_model(fem, CallableModel(program, TRUSS.parameter_names, 6))
+    with pytest.raises(ValueError, match="NaN where bottom"):
+        identify_damage(failing, WEATHER, healthy)
+
+
 def test_bad_records(fem, healthy):
     F = healthy
     with pytest.raises(ValueError, match="temperatures"):
