@@ -34,8 +34,8 @@ from skthermo._core.frames import (
 from skthermo._core.warnings import collected, warn_each
 from skthermo.detection._base import labelled_damaged, mean_log_density
 from skthermo.detection._rows_regression import RowsRegression, read_folds
-from skthermo.exceptions import SkthermoWarning
-from skthermo.preprocessing.checks import misplaced_columns, set_aside
+from skthermo.exceptions import RecordsWarning, SkthermoWarning
+from skthermo.preprocessing.checks import listed_details, misplaced_columns, set_aside
 from skthermo.preprocessing.folds import BlockedKFold, Rows
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.sensors import SensorRegression, filled_findings
@@ -505,6 +505,10 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         inputs, of_inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"useless-column"})
         responses, of_responses = set_aside(frequencies=named_F, unit="", needs_all=True)
         findings = [*of_inputs, *of_responses, *misplaced_columns(named_T, named_F)]
+        constant = inputs.table["detail"][inputs.table["what"] == "useless-column"]
+        if len(constant):
+            text = f"inputs are constant: {listed_details(constant)}. Nothing is learned of what they change"
+            findings.append(RecordsWarning(f"{text}. Repair these sensors, or leave the columns out", "useless-column"))
         cleaned = (np.ascontiguousarray(as_floats(found.frequencies)) for found in (inputs, responses))
         T, F = (frame_like(table, values) for table, values in zip((T, F), cleaned, strict=True))
         return T, F, findings

@@ -56,6 +56,13 @@ def test_responses_that_may_be_zero_have_residuals_in_their_own_unit():
     np.testing.assert_allclose(fitted.transform(strain)["f1"], strain["f1"] - expected[:, 0], atol=1e-12)
 
 
+def test_an_input_that_is_constant_in_the_baseline_is_named_and_changes_nothing():
+    with pytest.warns(UserWarning, match="'frost'.*useless-column"):
+        fitted = compensator(LinearRegression()).fit(X.assign(frost=0.0))
+    expected = compensator(LinearRegression()).fit(X).transform(X)
+    np.testing.assert_allclose(fitted.transform(X.assign(frost=1.0)), expected, atol=1e-12)
+
+
 def test_damping_ratios_are_compensated_beside_frequencies():
     """They fall by 14 % with every ten degrees and scatter by 15 %."""
     random, names = np.random.default_rng(0), [f"xi{mode}" for mode in range(1, 4)]
