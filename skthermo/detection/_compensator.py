@@ -507,7 +507,7 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         findings = [*of_inputs, *of_responses, *misplaced_columns(named_T, named_F)]
         constant = inputs.table["detail"][inputs.table["what"] == "useless-column"]
         if len(constant):
-            text = f"inputs are constant: {listed_details(constant)}. Nothing is learned of what they change"
+            text = f"inputs are constant: {listed_details(constant)}. Records where they differ will hardly show damage"
             findings.append(RecordsWarning(f"{text}. Repair these sensors, or leave the columns out", "useless-column"))
         cleaned = (np.ascontiguousarray(as_floats(found.frequencies)) for found in (inputs, responses))
         T, F = (frame_like(table, values) for table, values in zip((T, F), cleaned, strict=True))
