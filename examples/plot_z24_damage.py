@@ -53,7 +53,7 @@ print(alarm_table(measured, ways).round(1).to_string())
 #
 #    Alarms in percent
 #                 false alarms  damage found
-#    one regime            0.2          60.0
+#    one regime            0.2          43.1
 #    two regimes           0.9          90.8
 #
 # Which parameter changes?

@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from harness import arguments, compensated, joined, last_step, modes_of, raw, recipes, shown, z24_records
 from sklearn.ensemble import IsolationForest
+from sklearn.preprocessing import StandardScaler
 from structures import Footbridge
 
 from skthermo.datasets import make_fleet, make_truss, make_truss_campaign, make_z24
@@ -34,8 +35,8 @@ def detectors(model, targets):
         MODEL: compensated(targets, DirectionalDetector(model)),
         FALLS: compensated(targets, DirectionalDetector()),
         OMNIBUS: compensated(targets),
-        NEIGHBOURS: raw(targets, recipes("detector").NeighbourDistance()),
-        "isolation forest, raw": raw(targets, IsolationForest(n_estimators=500, random_state=0)),
+        NEIGHBOURS: raw(targets, StandardScaler(), recipes("detector").NeighbourDistance()),
+        "isolation forest, raw": raw(targets, StandardScaler(), IsolationForest(n_estimators=500, random_state=0)),
     }
 
 

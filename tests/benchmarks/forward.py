@@ -122,7 +122,8 @@ class RawByDay:
 
     def __init__(self, targets, window):
         self.window = window
-        self.detector = raw(targets, OutlierDetector(recipes("detector").NeighbourDistance()))
+        neighbours = make_pipeline(StandardScaler(), recipes("detector").NeighbourDistance())
+        self.detector = raw(targets, OutlierDetector(neighbours))
 
     def by_day(self, records):
         return records if self.window is None else records.rolling(self.window, min_periods=2).median()

@@ -21,7 +21,6 @@ from scipy.signal import lfilter
 from sklearn.compose import ColumnTransformer
 from sklearn.impute import SimpleImputer
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 from versions import OtherVersion, has_failed, side_by_side
 
 from skthermo import detection
@@ -203,13 +202,9 @@ def modes_of(records):
     return [name for name in records if str(name).startswith("f")]
 
 
-def raw(targets, estimator):
+def raw(targets, *steps):
     """An outlier detector of raw frequencies, of which missing ones count as the mean."""
-    return make_pipeline(
-        ColumnTransformer([("frequencies", StandardScaler(), targets)]),
-        SimpleImputer(strategy="constant", fill_value=0.0),
-        estimator,
-    )
+    return make_pipeline(ColumnTransformer([("frequencies", "passthrough", targets)]), SimpleImputer(), *steps)
 
 
 def compensated(targets, last=None, regressor=None, **options):
