@@ -163,9 +163,10 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
     -----
     Columns are frequencies or residuals. A column whose values are positive, with a standard deviation below a third of
     their mean, is read as a frequency, and is divided by its mean; the methods above get relative frequencies and
-    residuals as they are. `fit` sets aside, as if they were missing, frequencies that are farther from the median than
-    half of it, residuals that are farther than a hundred robust standard deviations, infinite values, and those of a
-    sensor that is stuck.
+    residuals as they are. Frequencies that a scaler has standardised are read as residuals: their seasons count as
+    noise that lasts, and the threshold is high. `fit` sets aside, as if they were missing, frequencies that are farther
+    from the median than half of it, residuals that are farther than a hundred robust standard deviations, infinite
+    values, and those of a sensor that is stuck.
 
     ``_cause(X, rows)`` says why rows have no index. A detector that learns a distribution has ``_has_likelihood()``
     True and ``_log_densities(F)``, and with them a ``score``. A detector, or a step before it, that looks at earlier
@@ -267,7 +268,8 @@ class DamageDetector(DamageIndexMixin, Estimator, ABC):
                     "the baseline, or one of its regimes (detectors_), has far too few independent records "
                     f"(n_independent_) for a false-alarm rate of {self.contamination:.2g}, which "
                     f"{np.ceil(1 / self.contamination - 1):.0f} or more tell. Later records may raise several times as "
-                    "many alarms. Give a longer baseline, or a higher contamination",
+                    "many alarms, or none. Give a longer baseline, a higher contamination, and frequencies in Hz: "
+                    "standardised ones are read as residuals, which have no seasons",
                     "few-records",
                 )
             )
