@@ -20,9 +20,9 @@ from skthermo.preprocessing import HampelFilter
 from skthermo.residuals.gaussian import Gaussian
 from skthermo.residuals.numbers import independent_records
 from skthermo.residuals.weather import (
-    NearestPlaces,
     TrainingRange,
     mean_of_nearest,
+    nearest_in_parts,
     one_in_each_part,
     weather_coordinates,
 )
@@ -161,15 +161,11 @@ class BaselineResiduals:
 
     def _similar(self, weather: Array) -> scipy.sparse.csr_array:
         """Equal weights of the records with the most similar weather, (n_rows, n_records)."""
-        some = one_in_each_part(len(self.places), MOST_PLACES)
-        near = self._drawn_from.nearest(self.coordinates.transform(weather))[1]
+        some, wanted = one_in_each_part(len(self.places), MOST_PLACES), self.coordinates.transform(weather)
+        near = np.concatenate([found for _, found in nearest_in_parts(self.places[some], wanted, 25)])
         ends = np.arange(0, near.size + 1, near.shape[1])
         weights = np.full(near.size, 1 / near.shape[1])
         return scipy.sparse.csr_array((weights, some[near].ravel(), ends), (len(near), len(self.places)))
-
-    @cached_property
-    def _drawn_from(self) -> NearestPlaces:
-        return NearestPlaces(self.places[one_in_each_part(len(self.places), MOST_PLACES)], 25)
 
     def _taken(self, similar: scipy.sparse.csr_array, random_state: np.random.RandomState) -> NDArray[np.intp]:
         """Positions of records in runs for rows with some similar records.

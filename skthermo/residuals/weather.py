@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -180,46 +179,15 @@ def weather_coordinates(weather: Array, explained: float = 0.99) -> Pipeline:
         return make_pipeline(StandardScaler(), PCA(explained)).fit(weather)
 
 
-class NearestPlaces:
-    """Places among which the nearest to each wanted one are searched for."""
-
-    def __init__(self, places: Array, number: int) -> None:
-        self.places, self.number = places, min(number, len(places))
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"places": self.places, "number": self.number}
-
-    @cached_property
-    def _tree(self) -> NearestNeighbors:
-        return NearestNeighbors(n_neighbors=self.number).fit(self.places)
-
-    def nearest(self, wanted: Array) -> tuple[Array, NDArray[np.int32]]:
-        """Mean distance (n_wanted,) to the places nearest to each wanted one, and their positions, nearest first,
-        (n_wanted, number)."""
-        distances, near = np.empty(len(wanted)), np.empty((len(wanted), self.number), dtype=np.int32)
-        for part in parts(len(wanted), self.number):
-            lengths, near[part] = self._tree.kneighbors(wanted[part])
-            distances[part] = lengths.mean(axis=1)
-        return distances, near
-
-
-def nearest(places: Array, wanted: Array, number: int) -> tuple[Array, NDArray[np.intp]]:
-    """Distances and positions of the places nearest to each wanted one, (n_wanted, number)."""
-    none = np.empty((0, min(number, len(places))))
-    found = [(none, none.astype(np.intp)), *(part[1:] for part in nearest_in_parts(places, wanted, number))]
-    distances, near = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
-    return distances, near
-
-
 def nearest_in_parts(
     places: Array, wanted: Array, number: int, n_columns: int = 1
-) -> Iterator[tuple[slice, Array, NDArray[np.intp]]]:
-    """Distances and positions of the nearest places for some of the wanted ones after others: memory is bounded, also
+) -> Iterator[tuple[slice, NDArray[np.intp]]]:
+    """Positions of the nearest places, nearest first, for some of the wanted ones after others: memory is bounded, also
     where each place has several columns."""
     number = min(number, len(places))
     tree = NearestNeighbors(n_neighbors=number).fit(places)
     for part in parts(len(wanted), number * n_columns):
-        yield part, *tree.kneighbors(wanted[part])
+        yield part, tree.kneighbors(wanted[part], return_distance=False)
 
 
 def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, number: int) -> Array:
@@ -233,7 +201,7 @@ def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, nu
         return means
     enough = number if shares.min() == 1 else int(np.ceil(1.25 * number / max(shares.min(), 1 / 3)))
     filled = np.where(used, values, 0.0)
-    for part, _, near in nearest_in_parts(places, wanted, enough, n_columns=values.shape[1]):
+    for part, near in nearest_in_parts(places, wanted, enough, n_columns=values.shape[1]):
         known = used[near]
         known &= known.cumsum(axis=1, dtype=np.int32) <= number
         is_enough = known.sum(axis=1) == number
@@ -242,7 +210,7 @@ def mean_of_nearest(places: Array, values: Array, used: Array, wanted: Array, nu
         few = np.flatnonzero(np.isnan(means[:, column]))
         if is_used.any() and len(few):
             own = values[is_used, column]
-            for part, _, near in nearest_in_parts(places[is_used], wanted[few], number):
+            for part, near in nearest_in_parts(places[is_used], wanted[few], number):
                 means[few[part], column] = own[near].mean(axis=1)
     return means
 

@@ -11,11 +11,10 @@ from skthermo.residuals.gaussian import Gaussian, check_invertible
 from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import (
     Extrapolation,
-    NearestPlaces,
     TrainingRange,
     implausible,
     mean_of_nearest,
-    nearest,
+    nearest_in_parts,
     one_in_each_part,
     unpredicted_findings,
     unseen_weather,
@@ -65,17 +64,13 @@ def test_rows_without_a_prediction_have_their_causes():
     assert unpredicted_findings(np.zeros(3, dtype=bool), weather) == []
 
 
-def test_the_nearest_places_are_those_of_sorted_distances():
-    apart = cdist(WANTED, PLACES)
-    expected = np.argsort(apart, axis=1)[:, :7]
-    distances, near = nearest(PLACES, WANTED, 7)
-    np.testing.assert_array_equal(near, expected)
-    np.testing.assert_allclose(distances, np.sort(apart, axis=1)[:, :7])
-    found = NearestPlaces(PLACES, 7).nearest(WANTED)
-    np.testing.assert_allclose(found[0], distances.mean(axis=1))
-    np.testing.assert_array_equal(found[1], expected)
-    assert nearest(PLACES, WANTED[:0], 7)[0].shape == (0, 7)
-    assert nearest(PLACES, WANTED, 100)[1].shape == (25, 60)
+@pytest.mark.parametrize("number", [7, 100])
+def test_the_nearest_places_are_those_of_sorted_distances(number):
+    expected = np.argsort(cdist(WANTED, PLACES), axis=1)[:, :number]
+    for n_columns in (1, 400_000):  # all rows at once, and one after the other
+        found = list(nearest_in_parts(PLACES, WANTED, number, n_columns))
+        np.testing.assert_array_equal(np.concatenate([near for _, near in found]), expected)
+        np.testing.assert_array_equal(np.concatenate([np.arange(25)[rows] for rows, _ in found]), np.arange(25))
 
 
 def test_means_of_the_nearest_places_count_those_where_a_column_is_used():
