@@ -23,6 +23,8 @@ TABLES = {
     "mixed": pd.DataFrame(VALUES, pd.Index(["a", 1, ("b", 2)], tupleize_cols=False)),
     "series": pd.Series([1.0, np.nan], ["f1", "f2"], name="offset (%)"),
     "empty": pd.Series([], [], dtype="int64"),
+    "no column": pd.DataFrame(index=HOURS),
+    "series of texts": pd.Series(["x", None, "y"], HOURS),
     "texts": pd.DataFrame({"a": [1.0, 2.0], "b": ["x", None], "c": ["y", "z"]}),
     "times": pd.DataFrame({"from": HOURS, "to": HOURS.tz_localize("Europe/Brussels"), "rows": [1, 2, 3]}),
 }

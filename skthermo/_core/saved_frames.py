@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+SAVED_AS_ARRAYS = (np.dtype(float), np.dtype("int64"), np.dtype(bool))
+
 
 class SavesFrames:
     """Objects whose files hold tables in place of frames; reading a file makes them frames again."""
@@ -26,7 +28,7 @@ class SavesFrames:
 
 @dataclass
 class SavedLabels:
-    """Labels of an index: a range, times as integers, or a list."""
+    """Labels of an index: a range, times as integers, an array of numbers, a text in JSON, or a list."""
 
     kind: str
     labels: Any
@@ -48,13 +50,12 @@ class SavedTime:
 
 @dataclass
 class SavedTable:
-    """Values and labels of a frame, or of a series where there are no columns; texts are one text in JSON."""
+    """Values and labels of a frame, or of a series where there are no columns; columns of several types are labels."""
 
-    values: NDArray | list | str | SavedLabels
+    values: NDArray | list[SavedLabels]
     index: SavedLabels
     columns: SavedLabels | None
     name: Any = None
-    dtype: str | None = None
 
 
 def to_saved(value: Any) -> Any:
@@ -69,14 +70,13 @@ def to_saved(value: Any) -> Any:
         return _to_time(value)
     if not isinstance(value, pd.DataFrame | pd.Series) or value.attrs:
         return value
-    is_frame = isinstance(value, pd.DataFrame)
-    axes = [_to_labels(axis) for axis in value.axes]
-    dtypes = set(value.dtypes) if is_frame else {value.dtype}
-    if None in axes:
+    frame = value if isinstance(value, pd.DataFrame) else value.to_frame(0)
+    index, columns = map(_to_labels, frame.axes)
+    are_alike = len(dtypes := set(frame.dtypes)) == 1 and dtypes.issubset(SAVED_AS_ARRAYS)
+    values = frame.to_numpy() if are_alike else [_to_labels(pd.Index(column)) for _, column in frame.items()]
+    if index is None or columns is None or (isinstance(values, list) and None in values):
         return value
-    if len(dtypes) != 1 or dtypes.pop() not in (np.dtype(float), np.dtype("int64"), np.dtype(bool)):
-        return _of_columns(value, axes) if is_frame else _of_objects(value, axes)
-    return SavedTable(value.to_numpy(), axes[0], axes[1] if is_frame else None, None if is_frame else value.name)
+    return SavedTable(values, index, columns) if frame is value else SavedTable(values, index, None, value.name)
 
 
 def from_saved(value: Any) -> Any:
@@ -87,18 +87,11 @@ def from_saved(value: Any) -> Any:
         return _from_time(value)
     if not isinstance(value, SavedTable):
         return value
-    index = _from_labels(value.index)
-    if isinstance(value.values, SavedLabels):
-        return pd.Series(_from_labels(value.values), index, name=value.name)
-    if isinstance(value.values, str):
-        return pd.Series(json.loads(value.values), index, name=value.name, dtype=value.dtype)
-    if value.columns is None:
-        return pd.Series(value.values, index, name=value.name, dtype=value.dtype)
-    if isinstance(value.values, list):
-        columns = dict(enumerate(map(from_saved, value.values)))
-        table = pd.DataFrame(columns, pd.RangeIndex(len(index)))
-        return table.set_axis(index, axis=0).set_axis(_from_labels(value.columns), axis=1)
-    return pd.DataFrame(value.values, index, _from_labels(value.columns))
+    index, values = _from_labels(value.index), value.values
+    if isinstance(values, list):
+        values = {place: pd.Series(one, dtype=one.dtype) for place, one in enumerate(map(_from_labels, values))}
+    table = pd.DataFrame(values, pd.RangeIndex(len(index))).set_axis(index, axis=0)
+    return table[0].rename(value.name) if value.columns is None else table.set_axis(_from_labels(value.columns), axis=1)
 
 
 def _to_time(value: Any) -> Any:
@@ -119,24 +112,6 @@ def _from_time(saved: SavedTime) -> Any:
     return time if saved.zone is None else time.tz_localize("UTC").tz_convert(saved.zone)
 
 
-def _of_columns(frame: pd.DataFrame, axes: list[Any]) -> Any:
-    """A frame with columns of several types as a table of tables, or unchanged."""
-    numbered = frame.set_axis(pd.RangeIndex(len(frame)), axis=0)  # the index is saved once
-    columns = [to_saved(numbered.iloc[:, place]) for place in range(frame.shape[1])]
-    return SavedTable(columns, *axes) if all(isinstance(column, SavedTable) for column in columns) else frame
-
-
-def _of_objects(series: pd.Series, axes: list[Any]) -> Any:
-    """A series of texts and numbers as a table of a list, one of times as a table of labels, or unchanged."""
-    if series.dtype.kind == "M":
-        times = _to_labels(pd.DatetimeIndex(series))
-        return series if times is None else SavedTable(times, axes[0], None, series.name)
-    values = series.tolist()
-    texts = series.dtype == object or str(series.dtype) == "str"
-    plain = texts and all(isinstance(value, str | int | float | None) for value in values)
-    return SavedTable(json.dumps(values), axes[0], None, series.name, str(series.dtype)) if plain else series
-
-
 def _to_labels(index: pd.Index) -> SavedLabels | None:
     """None for an index that these labels would not give again."""
     if isinstance(index, pd.RangeIndex):
@@ -144,8 +119,12 @@ def _to_labels(index: pd.Index) -> SavedLabels | None:
     elif isinstance(index, pd.DatetimeIndex):
         zone = None if index.tz is None else str(index.tz)
         saved = SavedLabels("times", index.asi8, f"M8[{index.unit}]", index.name, zone, index.freqstr)
+    elif type(index) is pd.Index and index.dtype in SAVED_AS_ARRAYS:
+        saved = SavedLabels("array", index.to_numpy(), str(index.dtype), index.name)
     elif type(index) is pd.Index:
-        saved = SavedLabels("list", index.tolist(), str(index.dtype), index.name)
+        is_plain = all(isinstance(label, str | int | float | None) for label in index)
+        labels = json.dumps(index.tolist()) if is_plain else index.tolist()
+        saved = SavedLabels("text" if is_plain else "list", labels, str(index.dtype), index.name)
     else:
         return None
     try:
@@ -158,8 +137,9 @@ def _to_labels(index: pd.Index) -> SavedLabels | None:
 def _from_labels(saved: SavedLabels) -> pd.Index:
     if saved.kind == "range":
         return pd.RangeIndex(*saved.labels, name=saved.name)
-    if saved.kind == "list":
-        return pd.Index(saved.labels, dtype=saved.dtype, name=saved.name, tupleize_cols=False)
+    if saved.kind != "times":
+        labels = json.loads(saved.labels) if saved.kind == "text" else saved.labels
+        return pd.Index(labels, dtype=saved.dtype, name=saved.name, tupleize_cols=False)
     times = pd.DatetimeIndex(saved.labels.view(saved.dtype), name=saved.name)
     if saved.zone is not None:
         times = times.tz_localize("UTC").tz_convert(saved.zone)
