@@ -15,8 +15,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skthermo._core.arrays import Array, as_floats, means_of_known
 from skthermo._core.frames import column_names
-from skthermo.exceptions import RecordsWarning, SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
-from skthermo.preprocessing.checks import Plausible
+from skthermo.exceptions import SkthermoWarning, UnevaluatedRowsWarning, WeatherWarning
 
 FAR_OUTSIDE = 0.25  # ranges of the training temperatures beyond which a temperature counts as unknown weather
 NUMBERS_AT_ONCE = 4_000_000  # held in memory
@@ -116,22 +115,6 @@ class Extrapolation:
     def variances(self, weather: Any) -> Array:
         """Variance of the residuals of each row, in terms of the one inside; unknown weather counts as inside."""
         return 1 + np.log1p(self.reach.ends(as_floats(weather)) ** 2) @ self.growth
-
-
-def implausible(known: TrainingRange, temperatures: Any) -> list[RecordsWarning]:
-    """The finding of temperatures that no weather gives, beside a known range; an input may be something else, so it is
-    no error."""
-    far = Plausible.beside(known.lowest, known.highest).implausible(as_floats(temperatures)).any(axis=0)
-    if not far.any():
-        return []
-    names = ", ".join(repr(name) for name, is_far in zip(known.names, far, strict=True) if is_far)
-    return [
-        RecordsWarning(
-            f"temperatures are implausible: {names}. Their predictions are wrong. Give degrees Celsius, and NaN where "
-            "a value is missing",
-            "doubtful-values",
-        )
-    ]
 
 
 def unseen_weather(weather: Any, folds: NDArray[np.intp], consequence: str) -> list[WeatherWarning]:

@@ -12,7 +12,6 @@ from skthermo.residuals.sensors import SensorRegression, filled_findings
 from skthermo.residuals.weather import (
     Extrapolation,
     TrainingRange,
-    implausible,
     mean_of_nearest,
     nearest_in_parts,
     one_in_each_part,
@@ -37,13 +36,6 @@ def test_doubts_name_the_inputs_that_are_far_outside_the_range_and_no_others():
     (found,) = reach.doubts(AIR + [11.0, 0.0])
     assert (found.kind, "'air'" in str(found), "'deck'" in str(found)) == ("other-weather", True, False)
     assert "kelvin" in str(reach.doubts(AIR + 273.15)[0])
-
-
-def test_temperatures_that_no_weather_gives_are_named():
-    reach = TrainingRange.spanned(AIR, slice(None))
-    assert implausible(reach, AIR) == []
-    (found,) = implausible(reach, AIR.assign(deck=-999.0))
-    assert (found.kind, "'deck'" in str(found), "'air'" in str(found)) == ("doubtful-values", True, False)
 
 
 def test_a_fold_in_weather_of_its_own_is_named():

@@ -240,7 +240,7 @@ def misplaced_columns(temperatures: Table, frequencies: Table) -> list[RecordsWa
 
 
 class TypicalColumns:
-    """TypicalColumns of a table, of rows evenly spread, with their robust statistics."""
+    """Columns of a table, of rows evenly spread, with their robust statistics."""
 
     def __init__(self, table: Table, default: str):
         values = as_floats(table)[spread_evenly(np.arange(len(table)), 2000)]

@@ -4,7 +4,7 @@ units."""
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -436,15 +436,9 @@ class Plausible:
     @classmethod
     def learned(cls, baseline: pd.DataFrame, targets: Sequence[Any]) -> Plausible:
         """No temperature in kelvin, and none that is 100 degrees beyond the baseline; targets may have any value."""
-        is_target = baseline.columns.isin(targets)
-        found = cls.beside(*_range(baseline.to_numpy()))
-        lowest, highest = np.where(is_target, -np.inf, found.lowest), np.where(is_target, np.inf, found.highest)
-        return replace(found, lowest=lowest, highest=highest)
-
-    @classmethod
-    def beside(cls, least: Array, most: Array) -> Plausible:
-        """Temperatures where these are known: none in kelvin, and none that is 100 degrees beyond them."""
-        return cls(np.fmin(least - 100, -80), np.fmax(most + 100, 100), least, most)
+        (least, most), is_target = _range(baseline.to_numpy()), baseline.columns.isin(targets)
+        lowest = np.where(is_target, -np.inf, np.fmin(least - 100, -80))
+        return cls(lowest, np.where(is_target, np.inf, np.fmax(most + 100, 100)), least, most)
 
     @classmethod
     def of_weather(cls, temperatures: Array) -> Plausible:
