@@ -16,6 +16,8 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 
+from skthermo.exceptions import RecordsWarning
+
 Array: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = Array | scipy.sparse.csc_array
 MatrixLike: TypeAlias = ArrayLike | scipy.sparse.sparray | scipy.sparse.spmatrix
@@ -154,6 +156,20 @@ def means_of_known(values: Array, axis: int = 0) -> Array:
     """Means without NaN along one axis of a table; NaN, without a warning, where nothing is known."""
     counts = (~np.isnan(values)).sum(axis=axis)
     return np.divide(np.nansum(values, axis=axis), counts, out=np.full(len(counts), np.nan), where=counts > 0)
+
+
+def means_of_usual(frequencies: Array, names: Sequence[Any]) -> tuple[Array, list[RecordsWarning]]:
+    """Means of columns of frequencies, NaN ignored, without values that are not positive or are farther than half of it
+    from the median of the others, and the finding of these values."""
+    middle = median(np.where((frequencies > 0) & np.isfinite(frequencies), frequencies, np.nan))
+    is_usual = np.abs(frequencies - middle) <= middle / 2
+    counts = (~is_usual & ~np.isnan(frequencies)).sum(axis=0)
+    means = means_of_known(np.where(is_usual, frequencies, np.nan))
+    if not counts.any():
+        return means, []
+    where = ", ".join(f"{name!r} ({count})" for name, count in zip(names, counts, strict=True) if count)
+    text = f"{counts.sum()} frequencies are not positive, or far from all others: {where}. They count as missing"
+    return means, [RecordsWarning(f"{text}. Put NaN there", "set-aside")]
 
 
 def robust_deviation(values: Array) -> Array:

@@ -443,9 +443,12 @@ class SensorWatch:
             if len(last) == n_days and (last.abs() < abs(fault.size) / 2).all():
                 changes[fault] = replace(fault, until=last.index[0])
             elif today - fault.detected < 60 * DAY:
-                changes[fault] = replace(fault, **change_of(own))
+                again = replace(fault, **change_of(own))
+                is_the_same = again.since <= fault.detected and abs(again.size) >= abs(fault.size) / 2
+                changes |= {fault: again} if is_the_same else {}
         excess = self.thermometers.excess(rest)[trusted]
-        if (excess > 1).any() and 2 * (1 + len(lasting)) <= len(self.sensors):
+        n_left_out = len(self.sensors) - len(trusted)
+        if (excess > 1).any() and 2 * (1 + n_left_out) <= len(self.sensors):
             suspects, exchanges = excess.index[excess > excess.max() / 2].difference(self.reference, sort=False), []
             resolved = [
                 name for name in suspects if self.thermometers.agree(means, [one for one in trusted if one != name])

@@ -14,6 +14,7 @@ from skthermo._core.arrays import (
     by_name,
     central_differences,
     check_dofs,
+    means_of_usual,
     real_array,
     shape_array,
 )
@@ -35,7 +36,7 @@ class Measured:
     shapes: Array  # (n_dofs, n_measured), of unit length; NaN where only the frequency was measured
     dofs: NDArray[np.intp]  # empty where no shapes were measured
     shape_weights: Array  # 0 where no shape was measured
-    findings: list[SkthermoWarning] = field(default_factory=list)  # about the shapes
+    findings: list[SkthermoWarning] = field(default_factory=list)
 
     @property
     def has_frequency(self) -> NDArray[np.bool_]:
@@ -56,16 +57,8 @@ def read_measured(
     model: Any, F: Array, names: list[str], shapes: Any, dofs: Any, frequency_std: Any, shape_weight: ArrayLike
 ) -> Measured:
     """Means over records, with shapes and weights, of the modes that were measured."""
-    n_modes = F.shape[1]
-    wrong = np.argwhere(~(np.isnan(F) | ((F > 0) & np.isfinite(F))))
-    if wrong.size:
-        row, column = wrong[0]
-        raise ValueError(
-            f"frequency {names[column]!r} of record {row} is {F[row, column]}; expected Hz above 0, or NaN"
-        )
-    counts = np.isfinite(F).sum(axis=0)
-    means = np.where(counts > 0, np.nansum(F, axis=0) / np.maximum(counts, 1), np.nan)
-    places, unit, findings = _read_shapes(model, shapes, dofs, names)
+    means, findings = means_of_usual(F, names)
+    places, unit, of_shapes = _read_shapes(model, shapes, dofs, names)
     weights = _per_mode(shape_weight, names, "shape_weight")
     if (weights < 0).any() or not np.isfinite(weights).all():
         raise ValueError(f"shape_weight is {shape_weight!r}; expected finite numbers, none negative")
@@ -74,9 +67,9 @@ def read_measured(
             f"shape_weight is {shape_weight!r} but no shapes were given; expected shapes, or a weight of 0"
         )
     with_shape = np.isfinite(unit).any(axis=0)
-    columns = np.flatnonzero((counts > 0) | with_shape)
+    columns = np.flatnonzero(~np.isnan(means) | with_shape)
     if not columns.size:
-        raise ValueError(f"F is NaN in all {len(F)} records of all {n_modes} modes; expected a measured frequency")
+        raise ValueError(f"F is NaN, or not above 0, in all {len(F)} records; expected a measured frequency in Hz")
     return Measured(
         names=[names[i] for i in columns],
         columns=columns,
@@ -85,7 +78,7 @@ def read_measured(
         shapes=unit[:, columns],
         dofs=places,
         shape_weights=np.where(with_shape, weights, 0.0)[columns],
-        findings=findings,
+        findings=findings + of_shapes,
     )
 
 

@@ -198,7 +198,8 @@ class ModelUpdater(Estimator):
         ----------
         F : array-like or DataFrame of shape (n_records, n_modes) or (n_modes,)
             Measured frequencies in Hz; their mean over records is fitted. NaN is allowed, and a mode that is NaN in
-            all records is left out. With shapes, there may be fewer columns than the model has modes.
+            all records is left out. Values that are not positive, or farther than half of it from the median of their
+            mode, count as missing. With shapes, there may be fewer columns than the model has modes.
         y : None
             Ignored.
         shapes : array-like of shape (n_dofs, n_modes), optional
@@ -223,9 +224,10 @@ class ModelUpdater(Estimator):
 
         Warns
         -----
-        ModelWarning, ResultWarning
-            If there are more parameters than residuals and no prior, or the optimum is doubtful: not converged, at a
-            bound, with frequencies missed by 15 % or far beyond their noise, or with a mode paired with another one.
+        ModelWarning, RecordsWarning, ResultWarning
+            If values count as missing, there are more parameters than residuals and no prior, or the optimum is
+            doubtful: not converged, at a bound, with frequencies missed by 15 % or far beyond their noise, or with a
+            mode paired with another one.
         """
         measured = self._read(F, shapes, dofs, frequency_std)
         bounds = self._read_bounds()

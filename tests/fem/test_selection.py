@@ -96,7 +96,11 @@ def test_shapes_tell_modes_apart_that_frequencies_confuse():
 
 
 def test_the_mean_of_records_with_gaps_counts_and_names_are_kept():
+    wrong = pd.DataFrame({"a": [7.4, 7.6, 0.0], 2: [27.0, 999.0, 28.0]})
+    with pytest.warns(UserWarning, match=r"2 frequencies.*'a' \(1\), '2' \(1\).*set-aside"):
+        counted = match_modes(TRUSS, wrong)
     table = match_modes(TRUSS, pd.DataFrame({"a": [7.4, 7.6, np.nan], 2: [27.0, np.nan, 28.0]}))
+    pd.testing.assert_frame_equal(counted, table)
     assert table.index.tolist() == ["a", "2"]
     np.testing.assert_allclose(table["measured"], [7.5, 27.5])
 

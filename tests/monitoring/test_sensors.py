@@ -251,6 +251,19 @@ def test_one_thermometer_can_still_be_dead_or_stuck():
         assert after_service(own, alone).faults_["kind"].tolist() == [kind]
 
 
+def test_where_two_thermometers_are_left_neither_is_blamed(monitor, records):
+    stuck = with_fault(records, "stuck")[0]
+    stuck.loc[late(records, ONSET + 3), "T2"] += 4.0
+    assert after_service(monitor, stuck).faults_["column"].tolist() == ["T1"]
+
+
+def test_an_offset_that_has_ended_keeps_its_size_and_its_first_day(monitor, records):
+    faulty = records.copy()
+    faulty.loc[late(records)[: 8 * PER_DAY], "T1"] += 3.0
+    (fault,) = after_service(monitor, faulty, N_DAYS - 1).faults_.itertuples()
+    assert fault.since <= fault.detected < fault.until <= late(records, ONSET + 10)[0]
+
+
 def test_outages_of_the_logger_and_empty_days_are_no_faults(monitor, records):
     outage = late(records)[: 10 * PER_DAY]
     empty = records.copy()

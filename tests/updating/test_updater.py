@@ -45,6 +45,17 @@ def test_frequencies_alone_recover_the_parameters(model, method):
     assert updater.starts_["success"].all()
 
 
+def test_values_that_cannot_be_frequencies_count_as_missing_and_are_named():
+    records = make_truss_campaign(random_state=0).frequencies
+    wrong, missing = records.copy(), records.copy()
+    for row, value in enumerate([0.0, -999.0, 999.0, 9999.0]):
+        wrong.iloc[row, 1], missing.iloc[row, 1] = value, np.nan
+    with pytest.warns(UserWarning, match=r"4 frequencies.*'f2' \(4\).*set-aside"):
+        updater = ModelUpdater(TRUSS, prior=0.2, random_state=0).fit(wrong, frequency_std=0.01 * records.mean())
+    expected = ModelUpdater(TRUSS, prior=0.2, random_state=0).fit(missing, frequency_std=0.01 * records.mean())
+    np.testing.assert_array_equal(updater.theta_, expected.theta_)
+
+
 @OF_MODELS
 def test_shapes_at_a_few_degrees_of_freedom_recover_what_two_frequencies_do_not(model, method):
     dofs = np.random.default_rng(3).choice(model.n_dof, 8, replace=False)

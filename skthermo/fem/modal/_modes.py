@@ -16,6 +16,7 @@ from skthermo._core.arrays import (
     check_model,
     check_names,
     integer_row,
+    means_of_usual,
     real_array,
     shape_array,
     without_mask,
@@ -288,7 +289,8 @@ def match_modes(
     model : FE model
         With a method ``local_modes``, more modes than ``n_modes`` are searched.
     frequencies : array-like or DataFrame of shape (n_records, n_measured) or (n_measured,)
-        Measured frequencies in Hz; their mean over records counts. NaN is allowed.
+        Measured frequencies in Hz; their mean over records counts. NaN is allowed. Values that are not positive, or
+        farther than half of it from the median of their column, count as missing.
     shapes : array-like of shape (n_dofs, n_measured), optional
         Measured mode shapes, real or complex, scaled in any way. The model needs a method ``local_modes``.
     dofs : array-like of int of shape (n_dofs,), or list of (node, direction), optional
@@ -305,13 +307,13 @@ def match_modes(
     Raises
     ------
     ValueError
-        If a mode was never measured or a frequency is not positive, there are more measured modes than the model has,
+        If a mode was never measured, there are more measured modes than the model has,
         or just one of ``shapes`` and ``dofs`` is given.
 
     Warns
     -----
     UserWarning
-        If, without shapes, another pairing is as good.
+        If values count as missing; if, without shapes, another pairing is as good.
 
     Notes
     -----
@@ -333,14 +335,13 @@ def match_modes(
 
     names = check_names([*map(str, getattr(frequencies, "columns", ()))], "columns of the frequencies")
     F = np.atleast_2d(real_array(frequencies, "frequencies"))
-    known = ~np.isnan(F)
-    if F.ndim != 2 or not known.any(axis=0).all() or not (F[known] > 0).all() or not np.isfinite(F[known]).all():
-        raise ValueError(
-            f"frequencies have shape {F.shape}; expected (n_records, n_measured), positive numbers in Hz or NaN, and "
-            "at least one in every column"
-        )
-    measured = np.nanmean(F, axis=0)
-    names = names or [f"f{i + 1}" for i in range(len(measured))]
+    if F.ndim != 2:
+        raise ValueError(f"frequencies have shape {F.shape}; expected (n_records, n_measured)")
+    names = names or [f"f{i + 1}" for i in range(F.shape[1])]
+    measured, findings = means_of_usual(F, names)
+    if np.isnan(measured).any():
+        never = [name for name, mean in zip(names, measured, strict=True) if np.isnan(mean)]
+        raise ValueError(f"frequencies {never} have no value above 0; expected at least one in Hz in every column")
     check_model(model)
     if (shapes is None) != (dofs is None):
         raise ValueError("expected both shapes and dofs, or neither")
@@ -375,7 +376,8 @@ def match_modes(
             f"another pairing of modes is as good, by frequencies alone: {changed}. Both may be right. Give the "
             "measured shapes and dofs, or compare the shapes"
         )
-        warn_each([RecordsWarning(text, "mode-order")])
+        findings.append(RecordsWarning(text, "mode-order"))
+    warn_each(findings)
     table["offset"] = 100 * (table["model"] / table["measured"] - 1)
     if macs is not None:
         table["mac"] = macs[np.arange(len(ranks)), ranks]
