@@ -440,12 +440,12 @@ class SensorWatch:
         for fault in lasting.values():
             own = rest[fault.column].dropna()
             last = own[own.index >= fault.detected][-n_days:]
-            if len(last) == n_days and (last.abs() < abs(fault.size) / 2).all():
+            is_back = last.abs() < abs(fault.size) / 2
+            if len(last) == n_days and is_back.all():
                 changes[fault] = replace(fault, until=last.index[0])
-            elif today - fault.detected < 60 * DAY:
+            elif today - fault.detected < 60 * DAY and not is_back[-1:].any():
                 again = replace(fault, **change_of(own))
-                is_the_same = again.since <= fault.detected and abs(again.size) >= abs(fault.size) / 2
-                changes |= {fault: again} if is_the_same else {}
+                changes |= {fault: again} if again.since <= fault.detected else {}
         excess = self.thermometers.excess(rest)[trusted]
         n_left_out = len(self.sensors) - len(trusted)
         if (excess > 1).any() and 2 * (1 + n_left_out) <= len(self.sensors):

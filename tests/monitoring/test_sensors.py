@@ -251,17 +251,22 @@ def test_one_thermometer_can_still_be_dead_or_stuck():
         assert after_service(own, alone).faults_["kind"].tolist() == [kind]
 
 
-def test_where_two_thermometers_are_left_neither_is_blamed(monitor, records):
-    stuck = with_fault(records, "stuck")[0]
-    stuck.loc[late(records, ONSET + 3), "T2"] += 4.0
-    assert after_service(monitor, stuck).faults_["column"].tolist() == ["T1"]
+def test_where_two_thermometers_are_left_neither_is_blamed(records):
+    random, near = np.random.default_rng(0), records.copy()
+    near["T1"] = near["T0"] + random.normal(0, 0.1, len(near))
+    near["T2"] = near["T0"] + np.repeat(random.normal(0, 3.0, len(near) // PER_DAY), PER_DAY)
+    own = fitted(near)
+    near.loc[late(near), "T1"] = 11.5
+    assert after_service(own, near, N_DAYS - 1).faults_["column"].tolist() == ["T1"]
 
 
-def test_an_offset_that_has_ended_keeps_its_size_and_its_first_day(monitor, records):
+@pytest.mark.parametrize("n_days", [3, 8])
+def test_an_offset_that_is_over_ends_and_keeps_its_first_day(monitor, records, n_days):
     faulty = records.copy()
-    faulty.loc[late(records)[: 8 * PER_DAY], "T1"] += 3.0
+    faulty.loc[late(records)[: n_days * PER_DAY], "T1"] += 2.0
     (fault,) = after_service(monitor, faulty, N_DAYS - 1).faults_.itertuples()
-    assert fault.since <= fault.detected < fault.until <= late(records, ONSET + 10)[0]
+    assert fault.column == "T1"
+    assert fault.since <= fault.detected < fault.until <= late(records, ONSET + n_days + 5)[0]
 
 
 def test_outages_of_the_logger_and_empty_days_are_no_faults(monitor, records):
