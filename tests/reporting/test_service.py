@@ -385,10 +385,11 @@ def test_sensors_that_fail_are_named_and_those_that_work_again_are_not_called_fa
 
 def test_damage_events_are_counted_beside_the_false_alarms_that_were_to_be_expected():
     seen = [event_row("2025-03-01", "2025-03-02"), event_row("2025-04-01", "2025-04-02", kind="watch")]
+    seen += [event_row(f"2025-0{month}-01", f"2025-0{month}-20", kind="drift") for month in (5, 6)]
     monitor = FakeMonitor(events=seen, false_alarms_per_year=2.0)
     text = part_of(monitor, "false_alarms").text
     assert "gives 2 false alarms a year on average" in text
-    assert f"1{SPACE}damage event opened, and 0 turned out to be harmless" in text
+    assert f"1{SPACE}damage event and 2{SPACE}drift events opened, and 0 turned out to be harmless" in text
     years = (monitor.last_ - monitor.days_.index[0]) / pd.Timedelta(days=365.25)
     assert float(re.search(r"about ([\d.]+) false alarms were", text)[1]) == pytest.approx(2 * years, rel=0.05)
 
