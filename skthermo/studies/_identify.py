@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -185,16 +185,7 @@ def identify_damage(
         if models is None:
             whole = evidence.explanations(random)
         else:
-
-            def with_model(model: Any, seed: int) -> list[DamageExplanation]:
-                with collected():  # as those of the chain itself
-                    return weighed(refitted(fem, model=model))[1].explanations(np.random.RandomState(seed))
-
-            models = checked_models(fem, models)
-            seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
-            jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
-            whole = averaged(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
-
+            whole = _over_models(weighed, fem, checked_models(fem, models), random, n_jobs)
         errors, similarity = _errors(evidence)
         draws, explained = _drawn(whole, causes, random), whole
         if structure is not None:
@@ -219,6 +210,24 @@ def identify_damage(
             found.table["is_likely"] = found.table.index.isin(found.likely_members())
     warn_each([*findings, *shift.findings, *seen.findings, *found.warnings()])
     return found
+
+
+def _over_models(
+    weighed: Callable[[Any], tuple[FrequencyShift, Evidence]],
+    fem: Any,
+    models: Sequence[Any],
+    random: np.random.RandomState,
+    n_jobs: int | None,
+) -> list[DamageExplanation]:
+    """Explanations by the chain with each of some models, averaged."""
+
+    def with_model(model: Any, seed: int) -> list[DamageExplanation]:
+        with collected():  # as those of the chain itself
+            return weighed(refitted(fem, model=model))[1].explanations(np.random.RandomState(seed))
+
+    seeds = random.randint(np.iinfo(np.int32).max, size=len(models))
+    jobs = (delayed(with_model)(model, int(seed)) for model, seed in zip(models, seeds, strict=True))
+    return averaged(run_jobs(jobs, len(models), unit="models", n_jobs=n_jobs))
 
 
 def _errors(evidence: Evidence) -> tuple[pd.DataFrame, pd.DataFrame]:
