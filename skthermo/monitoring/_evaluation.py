@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 from scipy.sparse.csgraph import connected_components
+from sklearn.base import clone
 from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import Array, as_floats
@@ -20,6 +21,7 @@ from skthermo.detection import CompensatedDetector, DirectionalDetector, Tempera
 from skthermo.exceptions import ResultWarning
 from skthermo.monitoring._events import lowered
 from skthermo.monitoring._records import Lookback
+from skthermo.preprocessing import BlockedKFold
 
 IndexOf: TypeAlias = Callable[[pd.DataFrame], Array]  # damage indices of records in order of time
 
@@ -61,20 +63,29 @@ class DetectorParts:
         """How far back means of residuals are taken; the memory of the weather delays no alarm."""
         return Lookback.learned(*self.after)
 
-    def residuals(self, records: pd.DataFrame, *, is_baseline: bool = False, in_windows: bool = False) -> pd.DataFrame:
-        """What the weather does not explain of each record, of windows where these are asked for and there are some.
-
-        Those of the baseline itself are out of fold.
-        """
+    def residuals(self, records: pd.DataFrame, *, in_windows: bool = False) -> pd.DataFrame:
+        """What the weather does not explain of each record, of windows where these are asked for and there are some."""
         if self.compensator is None:
             return records[self.targets] - self.trained[self.targets].mean()
-        if is_baseline:
-            rest = self.compensator.residuals_
-        else:
-            rest_of = self.last.residuals if in_windows and self.is_whole else self.compensator.transform
-            with collected(drop_others=True):
-                rest = rest_of(through(self.steps, records))
+        rest_of = self.last.residuals if in_windows and self.is_whole else self.compensator.transform
+        with collected(drop_others=True):
+            rest = rest_of(through(self.steps, records))
         return self._in_order(as_floats(rest)).set_index(records.index)
+
+    def out_of_fold(self, block: pd.Timedelta) -> pd.DataFrame:
+        """Residuals of the baseline by regressions that have not learned from the same block of time.
+
+        Means over a block scatter as they will in other years; out of shorter folds they scatter too little. Folds
+        that somebody has chosen stay.
+        """
+        compensator = self.compensator
+        if compensator is None:
+            return self.residuals(self.trained)
+        if compensator.cv is None:
+            folds = list(BlockedKFold(block=block).split(self.trained))
+            with collected(drop_others=True):
+                compensator = clone(compensator).set_params(cv=folds).fit(through(self.steps, self.trained))
+        return self._in_order(as_floats(compensator.residuals_)).set_index(self.trained.index)
 
     def _in_order(self, values: Array) -> pd.DataFrame:
         """Values of the compensator's targets in the order of the monitor's."""

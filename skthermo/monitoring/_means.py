@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from skthermo._core.arrays import Array, median, robust_deviation
-from skthermo._core.frames import days_later, midnights
+from skthermo._core.frames import DAY, days_later, midnights
 from skthermo._core.saved_frames import SavesFrames
 from skthermo.monitoring._evaluation import DetectorParts
 from skthermo.monitoring._events import leading, table_of
@@ -46,14 +46,14 @@ class MeanTest(SavesFrames):
         since: pd.Timestamp | None = None,
         crossings: float = 16.0,
     ) -> MeanTest:
-        """From out-of-fold residuals of what a detector was trained on, for so many false alarms a year.
+        """From residuals of what a detector was trained on, for so many false alarms a year.
 
         The days ``since`` an intervention alone tell the level after it.
 
         A level that a mean exceeds with probability p is exceeded in about 16 p events a year, as means of neighbouring
         weeks share most of their days: measured with independent and with correlated residuals of three and six modes.
         """
-        rest, groups = parts.residuals(parts.trained, is_baseline=True), parts.groups
+        rest, groups = parts.out_of_fold(cls.n_days * DAY), parts.groups
         means = rest.groupby(midnights(rest.index)).mean()
         is_long = means.notna().any(axis=1).sum() >= 12 * cls.n_days / 2  # each of a dozen parts tells of half a mean
         errors = MeanErrors.learned(means.to_numpy()) if is_long else None

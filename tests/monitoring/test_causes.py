@@ -5,12 +5,13 @@ import copy
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 
 from skthermo.detection import CompensatedDetector, MahalanobisDetector
 from skthermo.monitoring import Monitor
-from skthermo.preprocessing import ExponentialMeans
+from skthermo.preprocessing import BlockedKFold, ExponentialMeans
 from tests.monitoring.nightly import quietly
 
 PER_DAY, MODES = 4, ["f1", "f2", "f3"]
@@ -111,6 +112,14 @@ def test_a_loss_that_creeps_is_a_drift_which_becomes_damage_under_the_same_numbe
     assert "damage, was drift" in said
     healthy = served(fitted, SERVICE)
     assert not (healthy.weeks_["level"] > 1).any()
+
+
+def test_a_mean_of_a_month_is_compared_with_months_that_the_regression_had_not_learned(fitted):
+    detector = clone(fitted.detector).set_params(cv=BlockedKFold(block="30D"))
+    months = quietly(Monitor(detector, false_alarms_per_year=0.1).fit, ALL[:N_BASELINE])
+    own, other = (served(one, SERVICE[: 45 * PER_DAY]).weeks_["level"] for one in (fitted, months))
+    assert own.notna().sum() >= 2
+    np.testing.assert_allclose(own, other)
 
 
 @pytest.mark.nightly
