@@ -502,13 +502,15 @@ class TemperatureCompensator(TransformerMixin, Estimator):
         named_T = pd.DataFrame(as_floats(T), index, np.delete(names, self.targets_))
         named_F = pd.DataFrame(as_floats(F), named_T.index, names[self.targets_])
         # inputs need not be temperatures, and may be constant
-        inputs, of_inputs = set_aside(frequencies=named_T, unit="", needs_all=True, exclude={"useless-column"})
+        inputs, of_inputs = set_aside(frequencies=named_T, unit="", exclude={"useless-column"})
         responses, of_responses = set_aside(frequencies=named_F, unit="", needs_all=True)
         findings = [*of_inputs, *of_responses, *misplaced_columns(named_T, named_F)]
-        constant = inputs.table["detail"][inputs.table["what"] == "useless-column"]
+        is_constant = (inputs.table["what"] == "useless-column") & ~inputs.table["column"].isin(list(inputs.left_out))
+        constant = inputs.table["detail"][is_constant]
         if len(constant):
             text = f"inputs are constant: {listed_details(constant)}. Records where they differ will hardly show damage"
             findings.append(RecordsWarning(f"{text}. Repair these sensors, or leave the columns out", "useless-column"))
+        inputs.frequencies[list(inputs.left_out)] = np.nan
         cleaned = (np.ascontiguousarray(as_floats(found.frequencies)) for found in (inputs, responses))
         T, F = (frame_like(table, values) for table, values in zip((T, F), cleaned, strict=True))
         return T, F, findings

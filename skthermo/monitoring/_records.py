@@ -298,7 +298,8 @@ def usable_baseline(
     records, found = without_what_cannot_be(baseline, targets, units)
     if found.left_out:
         if monitor.fem is not None:
-            raise ValueError(f"the chain needs columns that cannot be used: {'; '.join(found.left_out.values())}")
+            why = "; ".join(found.left_out.values())
+            raise ValueError(f"columns of the chain cannot be used: {why}; expected a chain fitted without them")
         records = records.drop(columns=list(found.left_out))
         targets, units = [name for name in targets if name in records], {name: units[name] for name in records}
         for part in compensators_of(detector):

@@ -50,7 +50,8 @@ class SensorRegression:
     def fill(self, temperatures: Any) -> tuple[Array, Array]:
         """Temperatures with gaps filled from the other sensors, and the standard deviations of the filled values.
 
-        These are zero where a sensor has a value. Rows without any value stay NaN.
+        These are zero where a sensor has a value. Rows without any value stay NaN. Sensors that were not learned are
+        zero throughout, which says nothing.
         """
         values = as_floats(temperatures).copy()
         deviations = np.where(np.isnan(values), np.nan, 0.0)
@@ -58,6 +59,7 @@ class SensorRegression:
         for part in parts(len(gaps), self.learned.sum() ** 2):
             rows = np.ix_(gaps[part], self.learned)
             values[rows], deviations[rows] = self.gaussian.completed(values[rows])
+        values[:, ~self.learned] = deviations[:, ~self.learned] = 0.0
         return values, deviations
 
     def departures(self, temperatures: Any) -> Array:

@@ -250,7 +250,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         Parameters
         ----------
         X : array-like or DataFrame of shape (n_samples, n_sensors)
-            Temperatures in degrees Celsius; NaN is allowed, and filled from the other sensors.
+            Temperatures in degrees Celsius; NaN is allowed, and filled from the other sensors. Sensors that
+            are constant or missing throughout are left out, also of later records.
         y : array-like or DataFrame of shape (n_samples, n_modes)
             Measured frequencies of the healthy structure in Hz; NaN is allowed. With a model of one mode, it may be a
             series or a vector of shape (n_samples,); `predict` then gives vectors.
@@ -271,10 +272,11 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         ------
         ValueError
             If the records have gross errors, all of which are listed: tables of different rows, another number of modes
-            than the model's, columns that are constant or missing throughout, temperatures in kelvin, frequencies that
-            are not positive or not in Hz, infinite values, or numbers that stand for a missing value; if
-            shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``; if weights are negative,
-            NaN or infinite, all 0, not one for each row, or of no use to the mapper, whose ``fit`` takes none.
+            than the model's, modes or all sensors that are constant or missing throughout, temperatures in kelvin,
+            frequencies that are not positive or not in Hz, infinite values, or numbers that stand for a missing value;
+            if shapes are given to an inverse without ``dofs``, or not given to one with ``dofs``; if weights are
+            negative, NaN or infinite, all 0, not one for each row, or of no use to the mapper, whose ``fit`` takes
+            none.
 
         Warns
         -----
@@ -287,8 +289,12 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         F, self.y_is_vector_ = frequency_table(y)
         gate = check_records(T, frame_like(F, check_array(F, **options)), model=self.model)
-        gate.refuse_meaningless(needs_all=True)
-        T, F, far = gate.temperatures, gate.frequencies, gate.outliers.to_numpy()
+        is_left_out = np.array([name in gate.left_out for name in column_names(T, "T")])
+        if is_left_out.all() or is_left_out.sum() < len(gate.left_out):  # a mode, which the model has
+            gate.refuse_meaningless(needs_all=True)
+        gate.refuse_meaningless(exclude={"useless-column"})
+        T = frame_like(T, np.where(is_left_out, np.nan, as_floats(gate.temperatures)))
+        F, far = gate.frequencies, gate.outliers.to_numpy()
         weights = row_weights(sample_weight, X)
         if weights is not None:
             weights = weights / weights[weights > 0].mean()  # penalties do not depend on their scale
@@ -303,7 +309,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
             self.sensors_ = SensorRegression.fitted(T)
             filled, complete = frame_like(T, self.sensors_.fill(T)[0]), usable
             if self.imputer_ is not None:
-                values = as_floats(self.imputer_.fit_transform(np.hstack([T, usable])))
+                sensors = np.where(self.sensors_.learned, as_floats(T), 0.0)
+                values = as_floats(self.imputer_.fit_transform(np.hstack([sensors, usable])))
                 filled, complete, *_ = np.hsplit(values, np.cumsum([T.shape[1], usable.shape[1]]))
                 filled, complete = frame_like(T, filled), frame_like(usable, complete)
             self.mapper_ = mapper = with_means(mapper, filled, usable)

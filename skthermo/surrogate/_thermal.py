@@ -91,7 +91,7 @@ class Discrepancy:
         for number, mask in enumerate(present):
             modes = np.flatnonzero(of_mode == number)
             rows = spread_evenly(np.flatnonzero(mask & ~is_far[:, modes].any(axis=1)), 20_000)
-            if len(rows) < 30 or not np.ptp(inputs[rows], axis=0).all():
+            if len(rows) < 30 or not np.ptp(inputs[rows], axis=0).any():
                 continue
             values, own = ratios[np.ix_(rows, modes)], None if weights is None else weights[rows]
             values = values[:, 0] if len(modes) == 1 else values

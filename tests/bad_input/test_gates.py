@@ -33,7 +33,7 @@ OF_FREQUENCIES = {  # what is done to a table or a column, and what the error na
 }
 OF_TEMPERATURES = {
     "'T2' lies": lambda table: changed(table, "T2", table["T2"] + 273.15),
-    "'T3' is NaN": lambda table: changed(table, "T3", np.nan),
+    "'T3' lies": lambda table: changed(table, "T3", table["T3"] + 273.15),
 }
 VALUES = {  # what is done to values, which are set aside, and what the warning names
     "'f3' is inf": lambda table: changed(table, "f3", np.inf, [5]),
@@ -71,6 +71,23 @@ def test_a_chain_lists_all_errors(names):
         frequencies = OF_FREQUENCIES.get(name, lambda table: table)(frequencies)
     text = error_of(chain().fit, temperatures, frequencies)
     assert all(name in text for name in names)
+
+
+@pytest.mark.parametrize("values", [np.nan, 12.5, [-999.0] * (len(T) - 9) + [*range(9)]], ids=["none", "one", "few"])
+def test_a_sensor_that_says_nothing_is_left_out_and_named_and_changes_nothing(values):
+    with pytest.warns(RecordsWarning, match="'dead'"):
+        fitted = chain().fit(T.assign(dead=values), F)
+    without, later = chain().fit(T, F), T.assign(dead=20.0)
+    np.testing.assert_allclose(fitted.predict(later), without.predict(T), rtol=1e-9)
+    np.testing.assert_allclose(fitted.predict_interval(later), without.predict_interval(T), rtol=1e-9)
+    if np.size(values) > 1 or values != 12.5:  # inputs of a detector need not be temperatures, and may be constant
+        with pytest.warns(RecordsWarning, match="'dead'"):
+            rest = compensator().fit(T.assign(dead=values).join(F)).transform(later.join(F))
+        np.testing.assert_allclose(rest, compensator().fit(T.join(F)).transform(T.join(F)), rtol=1e-9, atol=1e-12)
+
+
+def test_a_chain_needs_a_sensor_that_says_something():
+    assert "'T1' is 3" in error_of(chain().fit, T.assign(**dict.fromkeys(T, 3.0)), F)
 
 
 @pytest.mark.parametrize("names", subsets(OF_FREQUENCIES), ids="+".join)

@@ -35,14 +35,16 @@ def test_gaps_are_filled_and_departures_measured_by_a_linear_regression_on_the_o
     assert np.isnan(SensorRegression.fitted(T).departures(new)).all()
 
 
-def test_what_no_sensor_tells_stays_missing():
+def test_what_no_sensor_tells_stays_missing_and_a_sensor_without_values_says_nothing():
     T = np.column_stack([records(200), np.full(200, np.nan)])
     new = np.full((2, 4), np.nan)
     new[1, 0] = 5.0
     filled, deviations = SensorRegression.fitted(T).fill(new)
-    assert np.isnan(filled[0]).all()
-    assert np.isnan(deviations[0]).all()
-    assert np.isnan(filled[1]).tolist() == [False, False, False, True]
+    assert np.isnan(filled[0, :3]).all()
+    assert np.isnan(deviations[0, :3]).all()
+    assert not np.isnan(filled[1]).any()
+    new[:, 3] = [-20.0, 30.0]
+    np.testing.assert_array_equal(SensorRegression.fitted(T).fill(new)[0][:, 3], filled[:, 3])
 
 
 def dependent_records(n_rows, seed):
