@@ -66,6 +66,7 @@ from skthermo.monitoring._records import (
     read_records,
     refuse_other_units,
     sorted_out,
+    unknown_months,
     usable_baseline,
     without_what_cannot_be,
     without_wrong_clocks,
@@ -496,7 +497,7 @@ class Monitor(SavesFrames, Estimator):
         self.smallest_changes_ = SmallestChanges.measured(
             self._index, trained, self.targets_, self.threshold_, within, share_above, parts.groups
         )
-        return list(levels.findings(self.smallest_changes_))
+        return [*levels.findings(self.smallest_changes_), *unknown_months(trained[self.targets_])]
 
     def _index(self, records: pd.DataFrame) -> Array:
         """Damage indices of records in order of time, by the detector in charge."""

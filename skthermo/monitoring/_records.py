@@ -16,16 +16,16 @@ from sklearn.pipeline import Pipeline
 
 from skthermo._core.arrays import as_floats, is_model, refuse_no_table
 from skthermo._core.estimators import check_is_fitted
-from skthermo._core.frames import DAY, YEAR, of_a_wrong_clock, positions_of, usual_step
+from skthermo._core.frames import DAY, YEAR, midnights, of_a_wrong_clock, positions_of, usual_step
 from skthermo._core.saved_frames import SavesFrames
-from skthermo._core.text import counted, duration_text
+from skthermo._core.text import counted, duration_text, listed
 from skthermo.detection import (
     CompensatedDetector,
     DirectionalDetector,
     MahalanobisDetector,
     TemperatureCompensator,
 )
-from skthermo.exceptions import RecordsWarning
+from skthermo.exceptions import FewRecordsWarning, RecordsWarning
 from skthermo.preprocessing import HampelFilter
 from skthermo.preprocessing.checks import RecordFindings, set_aside
 
@@ -311,6 +311,24 @@ def usable_baseline(
         if len(targets) < len(records.columns.difference(monitor.reference or [], sort=False)):
             detector = CompensatedDetector(detector, targets=targets)
     return records, detector, targets, units, found
+
+
+def unknown_months(responses: pd.DataFrame) -> Iterator[FewRecordsWarning]:
+    """The finding that responses of a baseline have no value in a month in which others have some in a week of days."""
+    days = responses.groupby(midnights(responses.index)).count() > 0
+    per_month = days.groupby(days.index.month).sum()
+    is_unknown = (per_month == 0) & (per_month.max(axis=1) >= 7).to_numpy()[:, np.newaxis]
+    months = {
+        name: listed([f"{pd.Timestamp(2001, month, 1):%B}" for month in per_month.index[is_unknown[name]]])
+        for name in is_unknown.columns[is_unknown.any()]
+    }
+    if months:
+        each = "; ".join(f"{name!r} in {names}" for name, names in months.items())
+        yield FewRecordsWarning(
+            f"responses have no baseline record in some months: {each}. Other seasons tell what is usual of them then, "
+            "which may give false alarms or hide damage. Refit with records of these months",
+            "few-records",
+        )
 
 
 def without_what_cannot_be(

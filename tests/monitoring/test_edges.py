@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import warnings
 from functools import cache, partial
 
 import numpy as np
@@ -338,6 +339,17 @@ def test_a_column_that_says_nothing_is_left_out_and_named():
     others = [name for name in records if name not in ("T1", "f2")]
     alone = Monitor(detector([name for name in MODES if name != "f2"]), random_state=0).fit(baseline[others])
     pd.testing.assert_frame_equal(answers, alone.update(records[N_BASELINE : N_BASELINE + 40][others]))
+
+
+@pytest.mark.parametrize("first_day", [1, 2])
+def test_a_mode_that_is_missing_for_a_whole_month_of_the_baseline_is_named_with_the_month(first_day):
+    baseline = six_hourly()[:N_BASELINE]
+    is_missing = (baseline.index.month == 5) & (baseline.index.day >= first_day)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Monitor(detector(MODES, regimes=None)).fit(baseline.assign(f2=baseline["f2"].mask(is_missing)))
+    is_named = any("'f2'" in str(one.message) and "May" in str(one.message) for one in caught)
+    assert is_named == (first_day == 1)
 
 
 @pytest.mark.parametrize(
