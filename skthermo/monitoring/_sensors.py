@@ -426,11 +426,9 @@ class SensorWatch:
     def _with_departures(self, state: WatchState, today: pd.Timestamp, n_days: int = 4) -> WatchState:
         """Thermometers that have come back to less than half of their departure for some days are used again.
 
-        In its first two months, an offset that goes on may turn out to be a drift. Two that are exchanged are put back
-        in place, after some days, in which an offset of one may look alike. Else the thermometer that departs from the
-        others is left out if without it, and without no other one, none does.
+        In its first two months, an offset that goes on may turn out to be a drift. Others begin to depart.
         """
-        means, changes, found, lasting = in_place(state.means, state.faults), {}, [], state.lasting("offset", "drift")
+        means, changes, lasting = in_place(state.means, state.faults), {}, state.lasting("offset", "drift")
         for fault in state.faults:
             if fault.column in self.sensors and fault not in lasting.values() and fault.kind != "swapped":
                 is_in = (means.index >= midnight(fault.since)) & (means.index < (fault.until or days_later(today, 1)))
@@ -446,27 +444,36 @@ class SensorWatch:
             elif today - fault.detected < 60 * DAY and not is_back[-1:].any():
                 again = replace(fault, **change_of(own))
                 changes |= {fault: again} if again.since <= fault.detected else {}
-        excess = self.thermometers.excess(rest)[trusted]
-        n_left_out = len(self.sensors) - len(trusted)
-        if (excess > 1).any() and 2 * (1 + n_left_out) <= len(self.sensors):
-            suspects, exchanges = excess.index[excess > excess.max() / 2].difference(self.reference, sort=False), []
-            resolved = [
-                name for name in suspects if self.thermometers.agree(means, [one for one in trusted if one != name])
-            ]
-            swapped = state.lasting("swapped")
-            for pair in map(list, combinations([name for name in trusted if name not in self.reference], 2)):
-                is_free = all(name not in swapped or swapped[name].other in pair for name in pair)
-                if is_free and set(resolved) <= set(pair) and suspects.isin(pair).any():
-                    since = self.thermometers.exchanged(means, pair, trusted, pair[0] in swapped)
-                    exchanges += [] if since is None else [(pair, since)]
-            if len(exchanges) == 1:
-                pair, since = exchanges[0]
-                if since <= days_later(today, 1 - n_days):
-                    ended, found = exchange(pair, since, today, swapped)
-                    changes |= ended
-            elif len(resolved) == 1:
-                found = [Fault(column=resolved[0], detected=today, **change_of(rest[resolved[0]].dropna()))]
-        return state.updated(changes, found)
+        ended, begun = self._departing(state, today, means, rest, n_days)
+        return state.updated(changes | ended, begun)
+
+    def _departing(
+        self, state: WatchState, today: pd.Timestamp, means: pd.DataFrame, rest: pd.DataFrame, n_days: int
+    ) -> tuple[dict[Fault, Fault], list[Fault]]:
+        """Faults that end and begin where daily means of thermometers that are trusted depart from each other.
+
+        Two that are exchanged are put back in place, after some days, in which an offset of one may look alike. Else
+        the thermometer that departs from the others is left out if without it, and without no other one, none does.
+        """
+        trusted = [name for name in self.sensors if name not in state.left_out()]
+        excess, n_left_out = self.thermometers.excess(rest)[trusted], len(self.sensors) - len(trusted)
+        if not (excess > 1).any() or 2 * (1 + n_left_out) > len(self.sensors):
+            return {}, []
+        suspects = excess.index[excess > excess.max() / 2].difference(self.reference, sort=False)
+        others = {name: [one for one in trusted if one != name] for name in suspects}
+        resolved = [name for name in suspects if self.thermometers.agree(means, others[name])]
+        swapped, exchanges = state.lasting("swapped"), []
+        for pair in map(list, combinations([name for name in trusted if name not in self.reference], 2)):
+            is_free = all(name not in swapped or swapped[name].other in pair for name in pair)
+            if is_free and set(resolved) <= set(pair) and suspects.isin(pair).any():
+                since = self.thermometers.exchanged(means, pair, trusted, pair[0] in swapped)
+                exchanges += [] if since is None else [(pair, since)]
+        if len(exchanges) == 1:
+            pair, since = exchanges[0]
+            return exchange(pair, since, today, swapped) if since <= days_later(today, 1 - n_days) else ({}, [])
+        if len(resolved) == 1:
+            return {}, [Fault(column=resolved[0], detected=today, **change_of(rest[resolved[0]].dropna()))]
+        return {}, []
 
 
 def values_text(records: pd.DataFrame, rows: Array, units: Mapping[Hashable, str], what: str) -> list[str]:
