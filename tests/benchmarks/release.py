@@ -103,7 +103,7 @@ PARTS = {
     "solves-pynite": timing("solves.py --parts pynite"),
     "two-workers": timing("solves.py --parts workers --rounds 3"),
     "speed": timing("speed.py", **FRAME),
-    "speed-footbridge": timing("speed.py --rows study-footbridge --rounds 1"),
+    "speed-footbridge": timing("speed.py --rows surface study-footbridge --rounds 1"),
     "speed-year": timing("speed.py --rows detector-year mapper-year chain-year --against 43ba4fa4"),
     "scaling": timing(
         "scaling.py --rounds 1 --most-samples 100000 --most-full 100 --figure docs/images/scaling.png",

@@ -40,7 +40,7 @@ from versions import OtherVersion, run_present
 
 from skthermo.datasets import make_kw51, make_truss, make_truss_campaign
 from skthermo.detection import MahalanobisDetector, OutlierDetector
-from skthermo.fem import add_noise, sample
+from skthermo.fem import FrequencySurface, add_noise, sample
 from skthermo.monitoring import Monitor
 from skthermo.preprocessing import BlockedKFold, KNNGapImputer, LagFeatures
 from skthermo.studies import DetectabilityStudy, identify_damage, sweep
@@ -125,6 +125,16 @@ def kw51_damaged(clock, quick):
         damages = [{group: severity} for group in [*model.groups][:5] for severity in (0.05, 0.1, 0.2)]
         for damage in damages:
             fem.simulate(T, damage=damage)
+
+
+def surface(clock, quick):
+    """An hourly year of KW51 by a surface of its reduced model, made on the way, beside the reduced model."""
+    air = hourly_year(800 if quick else 8760)[0].to_numpy()
+    theta, model = 1 - 4e-4 * (air - 10) * [1.0, 1.2, 0.8, 1.0, 0.9], make_kw51().reduced(0.05, random_state=0)
+    with clock.work():
+        FrequencySurface(model.frequencies, theta).frequencies(theta)
+    with clock.beside():
+        model.frequencies(theta)
 
 
 def lags(clock, quick, n_rows=8760):
@@ -386,6 +396,7 @@ GROUPS = {
     "Chains and studies": {
         "truss-chain": truss_chain,
         "intervals": intervals,
+        "surface": surface,
         "kw51-damaged": kw51_damaged,
         "search": search,
         "identify": identified,
