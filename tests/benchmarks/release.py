@@ -72,7 +72,7 @@ PARTS = {
     "earlier-weather": Part("earlier_weather.py", "--parts truss", **Z24),
     "sensors": Part("monitor_sensors.py", **Z24),
     "service-causes": Part("service_causes.py --dates 2"),
-    "slow-changes": Part("slow_changes.py --against 9ccb0df2"),
+    "slow-changes": Part("slow_changes.py"),
     "drift": Part("parameter_drift.py --parts tracked"),
     "new-baselines": Part("monitor_retraining.py", "--seeds 1 --only refit", needs="kw51"),
     "fleet-prior": Part("fleet_prior.py --members frequencies --against 43ba4fa4"),

@@ -1,7 +1,7 @@
 """Slow changes: false events of healthy years, and how soon a loss that grows is found.
 
     OMP_NUM_THREADS=1 python tests/benchmarks/slow_changes.py
-    OMP_NUM_THREADS=1 python tests/benchmarks/slow_changes.py --structures soil --seeds 3 --against 9ccb0df2
+    OMP_NUM_THREADS=1 python tests/benchmarks/slow_changes.py --structures soil --seeds 3
 
 Six-hourly records of five years: bridges of the synthetic fleet, and girders whose soil follows the air with 40 days,
 which no sensor measures. A `Monitor` learns the first year and sees the four others, healthy and, from a day of the
