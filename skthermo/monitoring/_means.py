@@ -53,16 +53,27 @@ class MeanTest(SavesFrames):
         A level that a mean exceeds with probability p is exceeded in about 16 p events a year, as means of neighbouring
         weeks share most of their days: measured with independent and with correlated residuals of three and six modes.
         """
-        rest, groups = parts.out_of_fold(cls.n_days * DAY), parts.groups
-        means = rest.groupby(midnights(rest.index)).mean()
-        is_long = means.notna().any(axis=1).sum() >= 12 * cls.n_days / 2  # each of a dozen parts tells of half a mean
-        errors = MeanErrors.learned(means.to_numpy()) if is_long else None
-        if errors is not None and since is not None:
-            n_own = np.maximum(means[means.index >= since].count().to_numpy() / errors.for_one, 1.0)
-            errors = replace(errors, n_trained=np.minimum(errors.n_trained, n_own))
+        groups = parts.groups
         directions = None if groups is None else groups.drop(columns=["sensitivity", "joined"])
         joined = {} if groups is None else groups["joined"].to_dict()
+        errors = cls._errors(parts, since)
         return cls(errors, per_year / crossings, parts.targets, parts.scales, directions, joined)
+
+    @classmethod
+    def _errors(cls, parts: DetectorParts, since: pd.Timestamp | None) -> MeanErrors | None:
+        """Errors of means of days, None where there are fewer than half a mean for each of a dozen parts."""
+        least = 12 * cls.n_days / 2
+        if midnights(parts.trained.index).nunique() < least:
+            return None
+        rest = parts.out_of_fold(cls.n_days * DAY)
+        means = rest.groupby(midnights(rest.index)).mean()
+        if means.notna().any(axis=1).sum() < least:
+            return None
+        errors = MeanErrors.learned(means.to_numpy())
+        if since is None:
+            return errors
+        n_own = np.maximum(means[means.index >= since].count().to_numpy() / errors.for_one, 1.0)
+        return replace(errors, n_trained=np.minimum(errors.n_trained, n_own))
 
     def weeks(self, means: pd.DataFrame, times: Sequence[pd.Timestamp]) -> pd.DataFrame:
         """A row for each of some times, by daily means of residuals before it.
