@@ -325,9 +325,18 @@ def fit_outputs(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array |
 
 
 def fit_checked(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
-    """Fit a regressor to records that were checked before: one that checks its own does not do so again."""
+    """Fit a regressor to records that were checked before: one that checks its own does not do so again.
+
+    Behind the transformers of a pipeline, its inputs may be no temperatures at all.
+    """
     fit = getattr(regressor, "_fit_checked", None)
-    return fit_weighted(regressor, X, y, sample_weight) if fit is None else fit(X, y, sample_weight)
+    if fit is not None:
+        return fit(X, y, sample_weight)
+    is_plain = isinstance(regressor, Pipeline) and regressor.memory is None and len(regressor) > 1
+    if is_plain and hasattr(regressor[-1], "_fit_checked") and (sample_weight is None or not _routing_enabled()):
+        regressor[-1]._fit_checked(regressor[:-1].fit_transform(X, y), y, sample_weight)
+        return regressor
+    return fit_weighted(regressor, X, y, sample_weight)
 
 
 def fit_weighted(estimator: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:

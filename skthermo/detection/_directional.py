@@ -423,6 +423,8 @@ def rare_level(index: Array, rate: float, tail: float = 0.1) -> float:
     Their median tells by how much, so that outliers do not.
     """
     squares = index[np.isfinite(index)] ** 2
+    if len(squares) < 2:
+        raise ValueError(f"{len(squares)} of {len(index)} baseline records have an index; expected more records")
     level = np.quantile(squares, 1 - tail)
     excess = (np.median(squares[squares > level]) - level) / np.log(2)
     return float(np.sqrt(level + excess * np.log(tail / rate)))

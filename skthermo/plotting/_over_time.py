@@ -195,7 +195,8 @@ class PredictionDisplay(Display):
         measured : array-like or DataFrame of shape (n_samples, n_columns)
             Frequencies in Hz, or another quantity.
         predicted : array-like or DataFrame of shape (n_samples, n_columns), or mapping of str to such, optional
-            The same, predicted; several by label.
+            The same, predicted; several by label. Columns of frames are matched by name, rows of arrays are those of
+            the first frame.
         lowest : array-like or DataFrame of shape (n_samples, n_columns), optional
             Lower ends of the intervals.
         highest : array-like or DataFrame of shape (n_samples, n_columns), optional
@@ -218,18 +219,24 @@ class PredictionDisplay(Display):
         """
         if (lowest is None) != (highest is None):
             raise ValueError("only one of lowest and highest is given; expected both or none")
-        first = as_table(measured, "measured")
+        by_label = predicted if isinstance(predicted, Mapping) else {labels[1]: predicted}
+        by_label = {str(label): one for label, one in by_label.items() if one is not None}
+        first = as_table(measured, "measured", beside=[*by_label.values(), lowest, highest])
 
         def like_first(table: ArrayLike, name: str) -> pd.DataFrame:
-            check_same_rows(measured, table, ("measured", name))
+            check_same_rows(first, table, ("measured", name))
             found = as_table(table, name)
             if found.shape != first.shape:
                 n_columns = f"{first.shape[1]} columns and {name} {found.shape[1]}"
                 raise ValueError(f"measured has {n_columns}; expected the same")
-            return found
+            if not isinstance(table, pd.DataFrame) or not isinstance(measured, pd.DataFrame):
+                return found.set_axis(first.index).set_axis(first.columns, axis=1)
+            if set(found.columns) != set(first.columns):
+                names = f"the columns {list(first.columns)} and {name} {list(found.columns)}"
+                raise ValueError(f"measured has {names}; expected the same")
+            return found[first.columns]
 
-        by_label = predicted if isinstance(predicted, Mapping) else {labels[1]: predicted}
-        tables = {str(label): like_first(one, str(label)) for label, one in by_label.items() if one is not None}
+        tables = {label: like_first(one, label) for label, one in by_label.items()}
         ends = () if lowest is None else (like_first(lowest, "lowest"), like_first(highest, "highest"))
         if temperature is not None:
             check_same_rows(temperature, measured, ("temperature", "measured"))
@@ -424,7 +431,7 @@ class DamageIndexDisplay(Display):
     thresholds: Mapping[str, float]
     _: KW_ONLY
     onset: object = None
-    label: str = "damage index (Mahalanobis, unsquared)"
+    label: str = "damage index"
     events: pd.DataFrame | None = None
     watch: float | None = None
 
@@ -513,8 +520,10 @@ class DamageIndexDisplay(Display):
         for title, by_label in by_title.items():
             if not isinstance(by_label, Mapping) or not by_label:
                 raise ValueError(f"damage index is {by_label!r:.200}; expected one or more by label")
+            beside = list(by_label.values())
             tables[title] = {
-                str(label): as_table(one, f"damage index {label!r}", is_one=True) for label, one in by_label.items()
+                str(label): as_table(one, f"damage index {label!r}", is_one=True, beside=beside)
+                for label, one in by_label.items()
             }
             value, what = given.get(title), f"threshold{f' of {title!r}' if title else ''}"
             values = real_array(value, what)
@@ -739,9 +748,11 @@ def _write(ax: Axes, text: str, x: float, y: float, **style: object) -> None:
     ax.text(x, y, text, transform=ax.transAxes, fontsize="small", color=GREY, bbox=box, **style)
 
 
-def as_table(values: ArrayLike, what: str, prefix: str = "f", *, is_one: bool = False) -> pd.DataFrame:
-    """A frame of floats; the columns of an array are called f1, f2, ..., a single one by what it is, and its rows by
-    their numbers from 0."""
+def as_table(
+    values: ArrayLike, what: str, prefix: str = "f", *, is_one: bool = False, beside: Sequence[Any] = ()
+) -> pd.DataFrame:
+    """A frame of floats; the columns of an array are called f1, f2, ..., a single one by what it is. Its rows are those
+    of the first frame beside it, if there is any, else numbers from 0."""
     if isinstance(values, pd.Series):
         values = values.to_frame((what if is_one else f"{prefix}1") if values.name is None else values.name)
     real_array(values, what)
@@ -751,7 +762,11 @@ def as_table(values: ArrayLike, what: str, prefix: str = "f", *, is_one: bool = 
         raise ValueError(f"{what} has shape {np.shape(values)}; expected {expected}")
     if isinstance(values, pd.DataFrame):
         return pd.DataFrame(columns, values.index, values.columns)
-    return pd.DataFrame(columns, columns=[what] if is_one else [f"{prefix}{i + 1}" for i in range(columns.shape[1])])
+    index = next((one.index for one in beside if isinstance(one, pd.DataFrame | pd.Series)), None)
+    if index is not None and len(index) != len(columns):
+        raise ValueError(f"{what} has {len(columns)} rows and a frame beside it {len(index)}; expected the same number")
+    names = [what] if is_one else [f"{prefix}{i + 1}" for i in range(columns.shape[1])]
+    return pd.DataFrame(columns, index, names)
 
 
 def in_time(table: pd.DataFrame) -> tuple[NDArray, NDArray]:

@@ -216,7 +216,7 @@ class DetectionTask(Bunch):
         Raises
         ------
         ValueError
-            If there is no such detector, or a search that is not fitted.
+            If there is no such detector, or a search that is not fitted or has no score.
 
         Warns
         -----
@@ -227,6 +227,11 @@ class DetectionTask(Bunch):
         if isinstance(detector, BaseSearchCV):
             if not hasattr(detector, "best_params_"):
                 raise ValueError(f"{detector!r:.200} has no best_params_; expected a search that is fitted")
+            if not np.isfinite(getattr(detector, "best_score_", 0.0)):
+                raise ValueError(
+                    f"the best score of {detector!r:.200} is no number; expected a search that could evaluate some "
+                    "setting, by the task's scoring, of a detector that learns the modes and not temperatures"
+                )
             if hasattr(detector, "best_estimator_") and not hasattr(last_step(detector), "damage_index"):
                 text = (
                     "the search has fitted best_estimator_ to all records of the task, damaged ones among them, since "

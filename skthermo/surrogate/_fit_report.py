@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from sklearn.utils import Bunch
 
 from skthermo._core.arrays import Array, as_floats, cramer_rao, robust_deviation, spread_evenly
 from skthermo._core.estimators import last_step
 from skthermo._core.frames import Table, column_names, columns_by_sensor, has_stamps
 from skthermo._core.saved_frames import SavesFrames
-from skthermo._core.text import capital
+from skthermo._core.text import capital, listed
 from skthermo.exceptions import FewRecordsWarning, ModelWarning, RecordsWarning, SkthermoWarning
 from skthermo.fem import linearise
 from skthermo.metrics import mape
@@ -134,13 +135,23 @@ class FittedParameters(SavesFrames):
         """Smallest deviation, and what temperature does, in percent, by parameter."""
         percent = pd.DataFrame({"smallest deviation (%)": (100 * self.deviations).round(2)})
         if self.prior is not None:
-            percent["moved by itself (%)"] = (100 * self.prior.own).round(2)
+            percent["moved by itself (%)"] = np.where(self.is_determined, (100 * self.prior.own).round(2), np.nan)
         return percent
+
+    @property
+    def is_determined(self) -> NDArray[np.bool_]:
+        """Which parameters move a frequency, so that records tell of them."""
+        return np.isfinite(self.deviations.to_numpy())
 
     @property
     def sentences(self) -> list[str]:
         """What temperature does to the parameters, and which rows were hard to solve."""
-        lines = [] if self.prior is None else [f"{capital(str(self.prior))}."]
+        lines, known = [], self.is_determined
+        if self.prior is not None and known.any():
+            names = tuple(self.deviations.index[known])
+            lines.append(f"{capital(str(replace(self.prior, names=names, own=self.prior.own[known])))}.")
+        if not known.all():
+            lines.append(f"These modes say nothing of {listed(list(map(repr, self.deviations.index[~known])))}.")
         if self.n_unconverged:
             lines.append(f"The parameters of {self.n_unconverged} rows have not converged.")
         if self.n_by_full_model:

@@ -148,11 +148,12 @@ def doubts_of_order(model: FEModel, F: Table) -> list[RecordsWarning]:
     is_better = (best**2).sum() < 0.25 * (given**2).sum() and np.abs(best).max() < 15
     if not is_better or np.abs(given[others]).min(initial=np.inf) < 2:
         return []
+    remedy = f", or use model.with_modes({order.tolist()})" if hasattr(model, "with_modes") else f": {order.tolist()}"
     return [
         RecordsWarning(
             f"the frequencies {[names[place] for place in others]} look like other modes of the model. They would be "
-            f"learned as those of their columns. Order them as the model does, or use model.with_modes("
-            f"{order.tolist()}); match_modes compares frequencies and shapes",
+            f"learned as those of their columns. Order them as the model does{remedy}; match_modes compares "
+            "frequencies and shapes",
             "mode-order",
         )
     ]

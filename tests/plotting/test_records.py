@@ -8,7 +8,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from sklearn.linear_model import LinearRegression
 
-from skthermo.plotting import PredictionDisplay
+from skthermo.plotting import DamageIndexDisplay, PredictionDisplay
 
 
 def drawn(line):
@@ -40,6 +40,25 @@ def test_arrays_have_numbered_sensors_and_records(later):
     display = PredictionDisplay.from_predictions(np.arange(10.0), unit="")
     np.testing.assert_array_equal(display.lines_["measured"][0].get_xdata(), np.arange(10))
     assert (display.axes_[0].get_xlabel(), display.axes_[0].get_ylabel()) == ("record", "$f_{1}$")
+
+
+def test_arrays_beside_frames_have_their_rows_and_columns_are_matched_by_name(fem, later):
+    T, F = later.temperatures, later.frequencies
+    predicted = fem.predict(T)
+    wanted = PredictionDisplay.from_predictions(F, predicted, kind="lines")
+    frames = F, predicted[list(F)[::-1]]
+    for one, other in (frames, (F, predicted.to_numpy()), (F.to_numpy(), predicted)):
+        display = PredictionDisplay.from_predictions(one, other, kind="lines")
+        for label, lines in wanted.lines_.items():
+            for line, expected in zip(display.lines_[label], lines, strict=True):
+                np.testing.assert_array_equal(line.get_xydata(), expected.get_xydata())
+    with pytest.raises(ValueError, match="columns"):
+        PredictionDisplay.from_predictions(F, predicted.rename(columns={"f1": "g1"}))
+    indices = {"frame": F["f1"], "array": F["f1"].to_numpy()}
+    first, second = DamageIndexDisplay.from_predictions(indices, 7.5).points_[""]
+    np.testing.assert_array_equal(first.get_xdata(), second.get_xdata())
+    with pytest.raises(ValueError, match="rows"):
+        DamageIndexDisplay.from_predictions(indices | {"short": np.ones(3)}, 7.5)
 
 
 def test_given_axes_are_used(later):

@@ -259,6 +259,17 @@ def test_who_takes_no_labels_is_named_after_a_search(fem):
         task.refit(search)
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_a_search_without_any_score_has_no_best_detector(fem):
+    task = task_of(fem)  # whose columns have temperatures, which a forest takes for frequencies
+    forest = IsolationForest(n_estimators=10, random_state=0)
+    options = {"cv": task.cv, "scoring": task.scoring, "refit": False}
+    search = GridSearchCV(forest, {"max_samples": [50]}, **options).fit(task.X, task.y)
+    assert np.isnan(search.best_score_)
+    with pytest.raises(ValueError, match="no number"):
+        task.refit(search)
+
+
 def test_confirmation_in_the_same_weather_says_so(fem):
     task = task_of(fem, columns=MODES)
     with pytest.warns(UserWarning, match="other-weather"):

@@ -10,8 +10,11 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import KFold
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
 
 from skthermo.detection import TemperatureCompensator
+from skthermo.exceptions import RecordsWarning
 from skthermo.fem import AffineModel, Beam, CallableModel, Spring, Structure, add_noise
 from skthermo.metrics import mape
 from skthermo.plotting import PredictionDisplay
@@ -161,3 +164,35 @@ def test_a_mapper_that_cannot_predict_the_parameters_is_refused():
             DataInformedFEM(TRUSS, mapper=mapper, random_state=0).fit(T, F)
     trees = TemperatureMapper(HistGradientBoostingRegressor(max_iter=5))
     assert np.isfinite(DataInformedFEM(TRUSS, mapper=trees, random_state=0).fit(T, F).predict(T)).all(axis=None)
+
+
+def test_features_behind_a_pipeline_need_not_be_temperatures():
+    """A chain is the same whatever the scale of features that transformers make of temperatures, flags among them."""
+
+    def chain(*steps):
+        return DataInformedFEM(TRUSS, mapper=make_pipeline(*steps, PLAIN), random_state=0)
+
+    def scaled(T, factor, flag):
+        return np.column_stack([factor * np.asarray(T), np.full(len(T), flag)])
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RecordsWarning)
+        plain, large = (
+            chain(FunctionTransformer(scaled, kw_args={"factor": factor, "flag": flag})).fit(T, F)
+            for factor, flag in ((1.0, 0.0), (1e3, 1.0))
+        )
+    assert large.report_.rows.trained == plain.report_.rows.trained == len(T)
+    np.testing.assert_allclose(large.predict(T), plain.predict(T), rtol=1e-9)
+
+
+def test_a_parameter_that_moves_no_mode_is_not_said_to_be_moved_by_temperature():
+    model = CallableModel(lambda theta: np.array([2.0, 3.0]) * np.sqrt(theta[0]), ["deck", "dead"], 2)
+    air = pd.DataFrame({"air": np.linspace(-10.0, 30.0, 120)})
+    measured = add_noise(
+        model.frequencies(np.column_stack([1 - 1e-3 * air["air"], np.ones(120)])), 1e-3, random_state=0
+    )
+    report = DataInformedFEM(model, mapper=PLAIN, random_state=0).fit(air, measured).report_
+    moved = report.parameters.table["moved by itself (%)"]
+    assert np.isnan(moved["dead"])
+    assert moved["deck"] > 0
+    assert "'dead' by itself" not in str(report)
