@@ -329,14 +329,14 @@ def fit_checked(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array |
 
     Behind the transformers of a pipeline, its inputs may be no temperatures at all.
     """
-    fit = getattr(regressor, "_fit_checked", None)
-    if fit is not None:
-        return fit(X, y, sample_weight)
-    is_plain = isinstance(regressor, Pipeline) and regressor.memory is None and len(regressor) > 1
-    if is_plain and hasattr(regressor[-1], "_fit_checked") and (sample_weight is None or not _routing_enabled()):
-        regressor[-1]._fit_checked(regressor[:-1].fit_transform(X, y), y, sample_weight)
-        return regressor
-    return fit_weighted(regressor, X, y, sample_weight)
+    is_behind_others = isinstance(regressor, Pipeline) and not _routing_enabled()
+    if not hasattr(regressor[-1] if is_behind_others else regressor, "behind_means"):
+        return fit_weighted(regressor, X, y, sample_weight)
+    options: dict[str, Any] = {"check_input": False}
+    if sample_weight is not None and takes_weights(regressor):
+        options["sample_weight"] = sample_weight
+    prefix = f"{regressor.steps[-1][0]}__" if is_behind_others else ""
+    return regressor.fit(X, y, **{f"{prefix}{name}": value for name, value in options.items()})
 
 
 def fit_weighted(estimator: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:

@@ -372,7 +372,9 @@ class TemperatureMapper(MultiplierRegressor):
         self.random_state = random_state
 
     @_fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> TemperatureMapper:
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, *, check_input: bool = True
+    ) -> TemperatureMapper:
         """Learn the mapping from complete rows.
 
         Parameters
@@ -385,6 +387,9 @@ class TemperatureMapper(MultiplierRegressor):
             Weight of each row; weights in a series are matched to the rows of a frame by index. A row of weight 0
             counts as left out. Of a pipeline as the regressor, the last step gets the weights; with metadata routing,
             those steps that request them.
+        check_input : bool, default=True
+            Whether X is checked as temperatures. Chains and compensators, which have checked theirs, do not check what
+            the steps of a pipeline make of them.
 
         Returns
         -------
@@ -400,13 +405,15 @@ class TemperatureMapper(MultiplierRegressor):
             takes none.
         """
         T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        harmless = ("few-records", "stuck", "implausible-values")  # in rows of any order, of any inputs
+        T = frame_like(X, T)
         with collected() as self.findings_:
-            found, _ = set_aside(frame_like(X, T), exclude=harmless, needs_all=True)
+            if check_input:
+                harmless = ("few-records", "stuck", "implausible-values")  # in rows of any order, of any inputs
+                T = set_aside(T, exclude=harmless, needs_all=True)[0].temperatures
         weights = row_weights(sample_weight, X)
         if weights is not None and self.regressor is not None:
             check_takes_weights(self.regressor)
-        self._learn_with_means(found.temperatures, theta, weights)
+        self._learn_with_means(T, theta, weights)
         warn_each(self.findings_)
         return self
 
@@ -434,12 +441,6 @@ class TemperatureMapper(MultiplierRegressor):
             means = self._chosen(clone(Pipeline(steps)).fit_transform(X, y) if steps else X, as_columns(y))
         steps += [] if means is None else [("means", clone(means))]
         return Pipeline([*steps, ("mapper", last)]) if steps else last
-
-    def _fit_checked(self, X: Table, y: Table, sample_weight: Array | None) -> TemperatureMapper:
-        self.findings_ = []
-        T, theta = self._read_xy(X, y, ("temperatures", "theta"))
-        self._learn_with_means(frame_like(X, T), theta, sample_weight)
-        return self
 
     def _learn_with_means(self, T: Table, theta: Array, weights: Array | None) -> None:
         known = theta if weights is None else np.where(weights[:, np.newaxis] > 0, theta, np.nan)

@@ -111,7 +111,7 @@ def test_callbacks_see_the_stages():
     assert recorder.tasks[-4:] == [("DataInformedFEM", last, 0), last, "fit", "teardown"]
     np.testing.assert_array_equal(twin.predict(T), clone(fem).set_callbacks().fit(T, F).predict(T))
     with pytest.raises(ValueError, match="constant"):
-        fem.fit(T.assign(T1=1.0), F)
+        fem.fit(T, F.assign(f1=1.0))
     with pytest.raises(ValueError, match="bounds"):
         fem.set_params(inverse__bounds=-1).fit(T, F)
     assert recorder.tasks[-1] == "teardown"
