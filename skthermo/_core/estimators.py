@@ -329,13 +329,15 @@ def fit_checked(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array |
 
     Behind the transformers of a pipeline, its inputs may be no temperatures at all.
     """
-    is_behind_others = isinstance(regressor, Pipeline) and not _routing_enabled()
-    if not hasattr(regressor[-1] if is_behind_others else regressor, "behind_means"):
+    last, prefix = regressor, ""
+    while isinstance(last, Pipeline) and not _routing_enabled():
+        name, last = last.steps[-1]
+        prefix += f"{name}__"
+    if not hasattr(last, "behind_means"):
         return fit_weighted(regressor, X, y, sample_weight)
     options: dict[str, Any] = {"check_input": False}
     if sample_weight is not None and takes_weights(regressor):
         options["sample_weight"] = sample_weight
-    prefix = f"{regressor.steps[-1][0]}__" if is_behind_others else ""
     return regressor.fit(X, y, **{f"{prefix}{name}": value for name, value in options.items()})
 
 
