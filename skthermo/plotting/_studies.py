@@ -176,9 +176,10 @@ class PODCurveDisplay(Display):
         self.errorbar_ = ax.errorbar(100 * severities, 100 * share, errors, marker=marker, **style)
         drawn = np.linspace(severities.min(), severities.max(), 200)
         pod, lowest, highest = (100 * np.asarray(values, dtype=float) for values in curve.predict(drawn))
-        style = {"color": colour, "linestyle": line, "label": shared.shortened(self.label or "fitted curve")}
+        is_fitted, name = np.isfinite(pod).any(), shared.shortened(self.label or "fitted curve")
+        style = {"color": colour, "linestyle": line, "label": name if is_fitted else f"{name}: no curve fits"}
         self.line_ = ax.plot(100 * drawn, pod, gid="POD", **style)[0]
-        label = None if number else f"its {100 * getattr(curve, 'confidence', 0.95):g} % interval"
+        label = None if number or not is_fitted else f"its {100 * getattr(curve, 'confidence', 0.95):g} % interval"
         style = {"color": colour, "alpha": 0.15, "linewidth": 0, "label": label}
         self.band_ = ax.fill_between(100 * drawn, lowest, highest, **style)
         self.replicates_ = None

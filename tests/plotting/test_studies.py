@@ -106,6 +106,13 @@ def test_several_curves_in_one_axes_differ_without_colour():
     assert PODCurveDisplay.from_predictions(Curve(0.3, a90_95=None), marks=False).marks_ == {}
 
 
+def test_the_legend_promises_no_band_where_no_curve_fits():
+    fitted, without = Curve(0.2), Curve(np.nan, a90_95=np.nan)
+    without.n_detected = fitted.n_detected
+    bands = [PODCurveDisplay.from_predictions(one).band_.get_label() for one in (fitted, without)]
+    assert [band.startswith("_") for band in bands] == [False, True]  # such labels are in no legend
+
+
 def test_curves_of_strengthenings_and_of_records_without_a_slope():
     display = PODCurveDisplay.from_predictions(pod_curve([-0.1, -0.2, -0.3], [10, 60, 99], [100] * 3))
     assert display.line_.get_xdata()[[0, -1]].tolist() == [-30.0, -10.0]
