@@ -106,7 +106,7 @@ def test_several_curves_in_one_axes_differ_without_colour():
     assert PODCurveDisplay.from_predictions(Curve(0.3, a90_95=None), marks=False).marks_ == {}
 
 
-def test_the_legend_promises_no_band_where_no_curve_fits():
+def test_the_legend_has_no_band_where_no_curve_fits():
     fitted, without = Curve(0.2), Curve(np.nan, a90_95=np.nan)
     without.n_detected = fitted.n_detected
     bands = [PODCurveDisplay.from_predictions(one).band_.get_label() for one in (fitted, without)]
