@@ -319,43 +319,33 @@ def fit_outputs(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array |
         if y.ndim == 1:
             raise
         try:
-            return fit_weighted(MultiOutputRegressor(regressor), X, y, sample_weight)
+            return fit_checked(MultiOutputRegressor(regressor), X, y, sample_weight)
         except Exception:
             raise error from None
 
 
 def fit_checked(regressor: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
-    """Fit a regressor to records that were checked before: one that checks its own does not do so again.
+    """Fit a regressor to records that were checked before, with weights if it takes them.
 
-    Behind the transformers of a pipeline, its inputs may be no temperatures at all.
+    The last part of a pipeline, or of a search, gets the arguments. A mapper there does not check its inputs again, as
+    the steps before it may make features that are no temperatures. With metadata routing, where a user has requested or
+    refused weights for some part, scikit-learn routes them.
     """
-    last, prefix = regressor, ""
-    while isinstance(last, Pipeline) and not _routing_enabled():
-        name, last = last.steps[-1]
-        prefix += f"{name}__"
-    if not hasattr(last, "behind_means"):
-        return fit_weighted(regressor, X, y, sample_weight)
-    options: dict[str, Any] = {"check_input": False}
+    last, steps = regressor, list[str]()
+    while (part := inside(last)) is not None:
+        steps += [last.steps[-1][0]] if isinstance(last, Pipeline) else []
+        last = part
+    options: dict[str, Any] = {}
+    if hasattr(last, "behind_means") and (last is regressor or not _routing_enabled()):
+        options["check_input"] = False
     if sample_weight is not None and takes_weights(regressor):
+        if last is not regressor and routes_weights(regressor):
+            return regressor.fit(X, y, sample_weight=sample_weight)
         options["sample_weight"] = sample_weight
-    return regressor.fit(X, y, **{f"{prefix}{name}": value for name, value in options.items()})
-
-
-def fit_weighted(estimator: BaseEstimator, X: Any, y: Any, sample_weight: Array | None = None) -> BaseEstimator:
-    """Fit an estimator, with weights if it takes them: of a pipeline the last step, of a search what it searches over.
-
-    With metadata routing, where a user has requested or refused weights for some part, scikit-learn routes them.
-    """
-    if sample_weight is None or not takes_weights(estimator):
-        return estimator.fit(X, y)
-    if inside(estimator) is None or routes_weights(estimator):
-        return estimator.fit(X, y, sample_weight=sample_weight)
-    part, steps = estimator, []
-    while part is not None:
-        steps += [part.steps[-1][0]] if isinstance(part, Pipeline) else []
-        part = inside(part)
+    if last is regressor or not options:
+        return regressor.fit(X, y, **options)
     with config_context(enable_metadata_routing=False):  # nobody has said which step gets them
-        return estimator.fit(X, y, **{"__".join([*steps, "sample_weight"]): sample_weight})
+        return regressor.fit(X, y, **{"__".join([*steps, name]): value for name, value in options.items()})
 
 
 def takes_weights(estimator: Any) -> bool:

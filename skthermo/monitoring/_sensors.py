@@ -433,8 +433,7 @@ class SensorWatch:
             if fault.column in self.sensors and fault not in lasting.values() and fault.kind != "swapped":
                 is_in = (means.index >= midnight(fault.since)) & (means.index < (fault.until or days_later(today, 1)))
                 means.loc[is_in, fault.column] = np.nan
-        trusted = [name for name in self.sensors if name not in state.left_out()]
-        rest = self.thermometers.departures(means, trusted)
+        rest = self.thermometers.departures(means, self._trusted(state))
         for fault in lasting.values():
             own = rest[fault.column].dropna()
             last = own[own.index >= fault.detected][-n_days:]
@@ -447,6 +446,10 @@ class SensorWatch:
         ended, begun = self._departing(state, today, means, rest, n_days)
         return state.updated(changes | ended, begun)
 
+    def _trusted(self, state: WatchState) -> list[Any]:
+        """Thermometers that are not left out."""
+        return [name for name in self.sensors if name not in state.left_out()]
+
     def _departing(
         self, state: WatchState, today: pd.Timestamp, means: pd.DataFrame, rest: pd.DataFrame, n_days: int
     ) -> tuple[dict[Fault, Fault], list[Fault]]:
@@ -455,7 +458,7 @@ class SensorWatch:
         Two that are exchanged are put back in place, after some days, in which an offset of one may look alike. Else
         the thermometer that departs from the others is left out if without it, and without no other one, none does.
         """
-        trusted = [name for name in self.sensors if name not in state.left_out()]
+        trusted = self._trusted(state)
         excess, n_left_out = self.thermometers.excess(rest)[trusted], len(self.sensors) - len(trusted)
         if not (excess > 1).any() or 2 * (1 + n_left_out) > len(self.sensors):
             return {}, []

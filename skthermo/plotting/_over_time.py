@@ -225,12 +225,12 @@ class PredictionDisplay(Display):
 
         def like_first(table: ArrayLike, name: str) -> pd.DataFrame:
             check_same_rows(first, table, ("measured", name))
-            found = as_table(table, name)
+            found = as_table(table, name, beside=[first])
             if found.shape != first.shape:
                 n_columns = f"{first.shape[1]} columns and {name} {found.shape[1]}"
                 raise ValueError(f"measured has {n_columns}; expected the same")
             if not isinstance(table, pd.DataFrame) or not isinstance(measured, pd.DataFrame):
-                return found.set_axis(first.index).set_axis(first.columns, axis=1)
+                return found.set_axis(first.columns, axis=1)
             if set(found.columns) != set(first.columns):
                 names = f"the columns {list(first.columns)} and {name} {list(found.columns)}"
                 raise ValueError(f"measured has {names}; expected the same")

@@ -65,7 +65,7 @@ from skthermo.exceptions import UnevaluatedRowsWarning
 from skthermo.fem import FEModel
 from skthermo.fem.damage import LossKind, damage_directions
 from skthermo.metrics.errors import complete_r2
-from skthermo.preprocessing import BiasAligner, check_records
+from skthermo.preprocessing import BiasAligner
 from skthermo.preprocessing.checks import misplaced_columns
 from skthermo.residuals.sensors import SensorRegression
 from skthermo.residuals.weather import TrainingRange
@@ -78,6 +78,7 @@ from skthermo.surrogate._records import (
     doubts_of_order,
     frequency_table,
     measurement_noise,
+    usable_records,
 )
 from skthermo.surrogate._regression import FrequencyInverse, TemperatureMapper
 from skthermo.surrogate._simulator import Simulator
@@ -288,13 +289,8 @@ class DataInformedFEM(CallbackSupport, SavesFrames, RegressorMixin, Estimator):
         options = {"dtype": np.float64, "copy": True, "allow_infinite": True}
         T = frame_like(X, validate_data(self, X, ensure_min_samples=2, **options))
         F, self.y_is_vector_ = frequency_table(y)
-        gate = check_records(T, frame_like(F, check_array(F, **options)), model=self.model)
-        is_left_out = np.array([name in gate.left_out for name in column_names(T, "T")])
-        if is_left_out.all() or is_left_out.sum() < len(gate.left_out):  # a mode, which the model has
-            gate.refuse_meaningless(needs_all=True)
-        gate.refuse_meaningless(exclude={"useless-column"})
-        T = frame_like(T, np.where(is_left_out, np.nan, as_floats(gate.temperatures)))
-        F, far = gate.frequencies, gate.outliers.to_numpy()
+        T, F, gate = usable_records(T, frame_like(F, check_array(F, **options)), self.model)
+        far = gate.outliers.to_numpy()
         weights = row_weights(sample_weight, X)
         if weights is not None:
             weights = weights / weights[weights > 0].mean()  # penalties do not depend on their scale

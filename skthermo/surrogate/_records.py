@@ -27,12 +27,12 @@ from skthermo._core.arrays import (
     spread_evenly,
 )
 from skthermo._core.estimators import _safe_indexing, fit_checked, last_step
-from skthermo._core.frames import Table, check_same_rows, column_names, row_times
+from skthermo._core.frames import Table, check_same_rows, column_names, frame_like, row_times
 from skthermo._core.saved_frames import SavesFrames
 from skthermo._core.warnings import collected
 from skthermo.exceptions import RecordsWarning
 from skthermo.fem import FEModel, match_modes
-from skthermo.preprocessing import BlockedKFold
+from skthermo.preprocessing import BlockedKFold, RecordFindings, check_records
 from skthermo.preprocessing.folds import out_of_fold
 from skthermo.residuals.baseline import BaselineResiduals
 from skthermo.residuals.weather import unseen_weather
@@ -129,6 +129,16 @@ def frequency_table(y: Any) -> tuple[Table, bool]:
     if isinstance(y, pd.Series):
         return y.to_frame("f1" if y.name is None else y.name), True
     return np.reshape(y, (-1, 1)), True
+
+
+def usable_records(T: Table, F: Table, model: FEModel) -> tuple[Table, Table, RecordFindings]:
+    """Temperatures, NaN in sensors that say nothing, frequencies, and findings; an error if a mode says nothing."""
+    found = check_records(T, F, model=model)
+    is_left_out = np.array([name in found.left_out for name in column_names(T, "T")])
+    if is_left_out.all() or is_left_out.sum() < len(found.left_out):
+        found.refuse_meaningless(needs_all=True)
+    found.refuse_meaningless(exclude={"useless-column"})
+    return frame_like(T, np.where(is_left_out, np.nan, as_floats(found.temperatures))), found.frequencies, found
 
 
 def doubts_of_order(model: FEModel, F: Table) -> list[RecordsWarning]:
