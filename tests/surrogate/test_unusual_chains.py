@@ -9,7 +9,7 @@ import pytest
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import KFold
+from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer
 
@@ -196,3 +196,10 @@ def test_a_parameter_that_moves_no_mode_is_not_said_to_be_moved_by_temperature()
     assert np.isnan(moved["dead"])
     assert moved["deck"] > 0
     assert "'dead' by itself" not in str(report)
+
+
+def test_features_in_a_search_need_not_be_temperatures_either():
+    pipeline = make_pipeline(FunctionTransformer(lambda T: 1e3 * T), PLAIN)
+    chain = DataInformedFEM(TRUSS, random_state=0)
+    found = clone(chain).set_params(mapper=GridSearchCV(pipeline, {}, cv=KFold(3), error_score="raise")).fit(T, F)
+    np.testing.assert_allclose(found.predict(T), clone(chain).set_params(mapper=PLAIN).fit(T, F).predict(T), rtol=1e-9)
