@@ -3,8 +3,8 @@
     OMP_NUM_THREADS=1 python tests/benchmarks/slow_changes.py
     OMP_NUM_THREADS=1 python tests/benchmarks/slow_changes.py --structures soil --seeds 3
 
-Six-hourly records of five years: bridges of the synthetic fleet, and girders whose soil follows the air with 40 days,
-which no sensor measures. A `Monitor` learns the first year and sees the four others, healthy and, from a day of the
+Six-hourly records of five years: bridges of the synthetic fleet, girders whose soil follows the air with 40 days, and
+arches with moisture of 20 days and soil of 30; no sensor measures soil or moisture. A `Monitor` learns the first year and sees the four others, healthy and, from a day of the
 second year on, with a loss of stiffness that grows by 5 % a year; each of two groups in turn lowers the frequencies as
 the model says. It is asked for one false alarm a year, a quarter of it for the mean of 30 days: drifts.
 
@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 from forward import RidgeWithLags
 from harness import arguments, is_missed, joined, modes_of, shown, split
-from structures import slow_soil, user_model
+from structures import Site, slow_soil, user_model
 
 from skthermo.datasets import make_fleet
 from skthermo.detection import CompensatedDetector
@@ -43,7 +43,12 @@ def soil(seed):
     return joined(slow_soil(seed + 10, n_days=YEARS * 365))[::3], user_model(seed + 10)
 
 
-STRUCTURES = {"fleet": fleet, "soil": soil}
+def arch(seed):
+    site = Site("moist arch", seed + 10, YEARS)
+    return pd.concat([site.records(2024 + year) for year in range(YEARS)])[::2], site.model
+
+
+STRUCTURES = {"fleet": fleet, "soil": soil, "moist arch": arch}
 
 
 class Chart:

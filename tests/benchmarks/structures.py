@@ -362,17 +362,18 @@ class Site:
     - "moist arch": steel, concrete with moisture of 20 days that no weather tells, and bearings on soil that follows
       the air with 30 days.
 
-    The weather of the years 2024 and 2025 goes on; two thermometers have errors of .2 K.
+    The weather of some years from 2024 on goes on; two thermometers have errors of .2 K.
     """
 
     KINDS = {"frozen girder": "girder", "moist arch": "arch"}
 
-    def __init__(self, name, seed=0):
+    def __init__(self, name, seed=0, years=2):
         self.bridge = next(
             one for one in make_fleet(3, atypical=0.0, random_state=seed).values() if one.kind == self.KINDS[name]
         )
         self.name, self.seed, self.model = name, seed, self.bridge.model
-        self.index = pd.date_range("2024-01-01", "2026-01-01", freq="3h", inclusive="left", name="time")
+        end = pd.Timestamp(2024 + years, 1, 1)
+        self.index = pd.date_range("2024-01-01", end, freq="3h", inclusive="left", name="time")
         weather = CLIMATE.weather(self.index[0], self.index[-1] + pd.Timedelta(hours=3), (seed, WEATHER))
         rows = weather.index.get_indexer(self.index)
         self.weather = {
