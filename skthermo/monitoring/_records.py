@@ -314,7 +314,7 @@ def usable_baseline(
 
 
 def unknown_months(responses: pd.DataFrame) -> Iterator[FewRecordsWarning]:
-    """The finding that responses of a baseline have no value in a month in which others have some in a week of days."""
+    """The finding that responses of a baseline have no value in a month in which others have values on seven days."""
     days = responses.groupby(midnights(responses.index)).count() > 0
     per_month = days.groupby(days.index.month).sum()
     is_unknown = (per_month == 0) & (per_month.max(axis=1) >= 7).to_numpy()[:, np.newaxis]
@@ -325,8 +325,8 @@ def unknown_months(responses: pd.DataFrame) -> Iterator[FewRecordsWarning]:
     if months:
         each = "; ".join(f"{name!r} in {names}" for name, names in months.items())
         yield FewRecordsWarning(
-            f"responses have no baseline record in some months: {each}. Other seasons tell what is usual of them then, "
-            "which may give false alarms or hide damage. Refit with records of these months",
+            f"responses have no baseline record in some months: {each}. Their values there are expected "
+            "by other seasons, which may give false alarms or hide damage. Refit with records of these months",
             "few-records",
         )
 
