@@ -124,7 +124,7 @@ MUTATIONS = {  # file and tests: what breaks, original text, mutated text
         ("weights of a series by index", "sample_weight.reindex(X.index)", "sample_weight"),
     ],
     ("_core/estimators.py", "surrogate/test_sample_weight.py"): [
-        ("weights routed as requested", "is None or routes_weights(estimator):", "is None:"),
+        ("weights routed as requested", "is not regressor and routes_weights(regressor):", "is not regressor:"),
     ],
     ("surrogate/_simulator.py", "surrogate/test_shape_inputs.py"): [
         ("relative derivatives of shapes", "shapes, slopes * at[:, np.newaxis]", "shapes, slopes"),
