@@ -73,10 +73,11 @@ class TrainingRecords(SavesFrames):
             return np.ones(len(self.inputs), dtype=bool)
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
-    def residuals(self, model: ThermalModel) -> BaselineResiduals:
+    def residuals(self, model: ThermalModel, *, n_records: int = 1) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
-        A fold holds every fifth block of a week, or longer where residuals are correlated for longer.
+        A fold holds every fifth block of a week, or longer where residuals are correlated for longer, or where means of
+        ``n_records`` are to scatter as they do in other years: out of shorter blocks they scatter too little.
         """
         measured = as_floats(self.frequencies)
         known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
@@ -92,7 +93,8 @@ class TrainingRecords(SavesFrames):
         records = _safe_indexing(self.temperatures, order)
         seen = ~np.isnan(own).all(axis=1)
         in_sample = BaselineResiduals(inputs[seen], own[seen], own[seen], np.zeros(seen.sum(), dtype=np.intp))
-        fold_of = BlockedKFold(N_FOLDS).remembering(records, 5.0 * in_sample.correlation_time).fold_of(records)
+        together = max(5.0 * in_sample.correlation_time, n_records)
+        fold_of = BlockedKFold(N_FOLDS).remembering(records, together).fold_of(records)
         learner, names = last_step(model.mapper), list(self.parameter_names)
 
         def learn_parameters(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
