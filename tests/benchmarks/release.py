@@ -86,6 +86,7 @@ PARTS = {
     "record-defects": Part("record_defects.py"),
     "study-bands": Part("study_bands.py"),
     "explained-damage": Part("explained_damage.py"),
+    "identified-months": Part("identified_months.py"),
     "explained-kw51": Part("explained_damage.py --structures KW51 --designs frequencies shapes"),
     "located-damage": Part("located_damage.py"),
     "z24-damage": Part("z24_damage.py", **Z24),
