@@ -46,8 +46,7 @@ def measured_shift(fem: Any, T: ArrayLike, F: ArrayLike, noise: Any) -> Frequenc
     frequencies = _checked(fem, T, F)
     expected = fem.recorder_.residuals.expected(fem.weather(T).inputs)  # what the chain leaves in such weather
     shifts = np.log(frequencies / (as_floats(fem.predict(T)) * (1 + expected)))
-    n_measured = int((~np.isnan(frequencies)).any(axis=1).sum())
-    healthy = np.log1p(fem.records_.residuals(fem.thermal_, n_records=n_measured).values)  # in order of time
+    healthy = np.log1p(fem.recorder_.residuals_of_long_blocks.values)  # in order of time
     errors = MeanErrors.learned(healthy)
     left_out = _left_out(fem, T, frequencies, shifts, errors.deviations)
     rows = ~np.any(list(left_out.values()), axis=0)

@@ -73,11 +73,11 @@ class TrainingRecords(SavesFrames):
             return np.ones(len(self.inputs), dtype=bool)
         return (self.weights > 0) | np.isnan(as_floats(self.frequencies)).all(axis=1)
 
-    def residuals(self, model: ThermalModel, *, n_records: int = 1) -> BaselineResiduals:
+    def residuals(self, model: ThermalModel, *, least: int = 1) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
-        A fold holds every fifth block of a week, or longer where residuals are correlated for longer, or where means of
-        ``n_records`` are to scatter as they do in other years: out of shorter blocks they scatter too little.
+        A fold holds every fifth block of a week, or of five correlation times or the ``least`` number of records where
+        these are longer, as far as it keeps two blocks.
         """
         measured = as_floats(self.frequencies)
         known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
@@ -87,14 +87,14 @@ class TrainingRecords(SavesFrames):
         weights = None if self.weights is None else self.weights[order]
         has_theta = ~np.isnan(theta).any(axis=1)
         if has_theta.sum() < 2 * N_FOLDS:
-            least = 2 * N_FOLDS
-            raise ValueError(f"{has_theta.sum()} records have parameters; expected at least {least} for residuals")
+            few = f"{has_theta.sum()} records have parameters"
+            raise ValueError(f"{few}; expected at least {2 * N_FOLDS} for residuals")
         own = measured / (self.modelled[order] * np.exp(model.discrepancy.at(inputs))) - 1
         records = _safe_indexing(self.temperatures, order)
         seen = ~np.isnan(own).all(axis=1)
         in_sample = BaselineResiduals(inputs[seen], own[seen], own[seen], np.zeros(seen.sum(), dtype=np.intp))
-        together = max(5.0 * in_sample.correlation_time, n_records)
-        fold_of = BlockedKFold(N_FOLDS).remembering(records, together).fold_of(records)
+        length = max(5.0 * in_sample.correlation_time, least)
+        fold_of = BlockedKFold(N_FOLDS).remembering(records, length).fold_of(records)
         learner, names = last_step(model.mapper), list(self.parameter_names)
 
         def learn_parameters(train: NDArray[np.intp]) -> Callable[[NDArray[np.intp]], Array]:
@@ -235,6 +235,15 @@ class RecordSimulator(SavesFrames):
     def residuals(self) -> BaselineResiduals:
         """Out-of-fold residuals of the training records by weather, for which the mapper is fitted in each fold."""
         return self.records.residuals(self.model)
+
+    @cached_property
+    def residuals_of_long_blocks(self) -> BaselineResiduals:
+        """The same out of the longest blocks, a tenth of the records, whose means scatter as those of other years.
+
+        Where moisture or soil makes residuals last, a regression has learned much of a shorter block from the blocks
+        beside it.
+        """
+        return self.records.residuals(self.model, least=len(self.records.inputs))
 
     @cached_property
     def service(self) -> ServiceRecords:

@@ -16,6 +16,7 @@ from skthermo.fem import AffineModel, CallableModel
 from skthermo.preprocessing import BiasAligner
 from skthermo.studies import DamagePrior, DetectabilityStudy, identify_damage
 from skthermo.surrogate import DataInformedFEM, PosteriorInverse, with_model
+from tests.residuals.series import autoregressive
 from tests.studies.identified import identified
 
 TRUSS = make_truss()
@@ -396,6 +397,18 @@ def test_records_that_depend_on_those_before_count_less():
         found = identify_damage(fem, WEATHER, simulated(fem), GROUPS, random_state=0)
         errors[correlation] = found.shifts["standard_error"].mean()
     assert errors[0.9] > 2 * errors[0.0]
+
+
+@pytest.mark.filterwarnings("ignore:.*(few-records|undetermined)")
+@pytest.mark.parametrize("seed", [4, pytest.param(2, marks=pytest.mark.nightly)])
+def test_moisture_that_lasts_for_weeks_is_rarely_taken_for_a_change(seed):
+    years = make_truss_campaign(3, random_state=seed)
+    moisture = autoregressive(len(years.frequencies), np.exp(-1 / 20), seed)
+    T, F = years.temperatures, years.frequencies * np.exp(0.003 * moisture)
+    fem = DataInformedFEM(TRUSS, random_state=0).fit(T[:365], F[:365])
+    months = [slice(start, start + 30) for start in range(365, len(T) - 30, 45)]
+    p_values = np.array([identify_damage(fem, T[month], F[month], GROUPS, random_state=0).p_value for month in months])
+    assert np.mean(p_values <= 0.05) <= 0.1
 
 
 def test_records_in_foreign_weather_are_not_compared(fem, healthy):
