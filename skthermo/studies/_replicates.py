@@ -27,6 +27,7 @@ from skthermo.updating import ModelUpdater
 
 PARTS = {"noise": "noise", "weather": "the weather", "baseline": "the training records", "model": "the model"}
 """What a replicate draws, in the order in which one is added to the others, and how it is called."""
+ENOUGH = 10  # replicates for bands of 90 %
 
 
 def drawn_replicates(
@@ -37,7 +38,7 @@ def drawn_replicates(
     parts = checked_parts(uncertainty, with_models=models is not None)
     years = other_years(T) if isinstance(T, list | tuple) and len(T) and np.ndim(T[0]) == 2 else [T]
     if positive_integer(number, "n_replicates") < 2:
-        raise ValueError(f"n_replicates is {number}; expected at least 2, 10 or more for bands of 90 %")
+        raise ValueError(f"n_replicates is {number}; expected at least 2, {ENOUGH} or more for bands of 90 %")
     seeds = np.random.RandomState(seed).randint(np.iinfo(np.int32).max, size=number + 1).tolist()
     if models is not None:
         models = checked_models(fem, models)
@@ -244,15 +245,18 @@ class ReplicateRates:
         return np.sqrt(variances.assign(together=total)).join(shares)
 
 
-def in_sentences(results: pd.DataFrame, parts: pd.DataFrame | None, detector: str, confidence: float) -> str:
+def in_sentences(results: pd.DataFrame, replicates: ReplicateRates | None, detector: str, confidence: float) -> str:
     """What the intervals of a detector include, and the widest one with its parts."""
-    if parts is None:
+    if replicates is None:
         return "Intervals include noise only, not other weather, other training records or an error of the model."
+    parts, number = replicates.table(), len(next(iter(replicates.rates.values())))
     names = [name for name in PARTS if name in parts]
     lines = [
         f"{confidence:.0%} prediction intervals include the uncertainty of {listed([PARTS[name] for name in names])}. "
         "They hold in weather like that of the training records: colder or warmer days can raise more false alarms."
     ]
+    if number < ENOUGH:
+        lines.append(f"They are rough, as {number} replicates tell them. Take n_replicates={ENOUGH} or more.")
     rows = results[(results["detector"] == detector) & (results["source"] == "simulated")].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"]
     if len(width):

@@ -769,7 +769,7 @@ class DetectabilityStudy(BaseEstimator):
             If there are several detectors and none is named, or the one that is named has no results.
         """
         name = self.detector_name(detector)
-        return in_sentences(self._results, self.uncertainty_, name, self.confidence_)
+        return in_sentences(self._results, self.replicates_, name, self.confidence_)
 
     def _records(self, source: str) -> list[EvaluatedRecords]:
         """What the detectors evaluated of one source."""

@@ -74,6 +74,7 @@ def test_bands_of_a_study(study):
     damaged = study.results_.set_index("scenario").drop("healthy")
     widest = (damaged["pi_high"] - damaged["pi_low"]).idxmax()
     assert f"The widest is that of {widest!r}: " in summary
+    assert "2 replicates" in summary
 
 
 @pytest.mark.parametrize(
