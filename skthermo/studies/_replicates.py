@@ -256,7 +256,7 @@ def in_sentences(results: pd.DataFrame, replicates: ReplicateRates | None, detec
         "They hold in weather like that of the training records: colder or warmer days can raise more false alarms."
     ]
     if number < ENOUGH:
-        lines.append(f"They are rough, as {number} replicates tell them. Take n_replicates={ENOUGH} or more.")
+        lines.append(f"They come from {number} replicates and are rough: take n_replicates={ENOUGH} or more.")
     rows = results[(results["detector"] == detector) & (results["source"] == "simulated")].set_index("scenario")
     width = (rows["pi_high"] - rows["pi_low"])[rows["measure"] == "POD"]
     if len(width):

@@ -76,8 +76,8 @@ class TrainingRecords(SavesFrames):
     def residuals(self, model: ThermalModel, *, least: int = 1) -> BaselineResiduals:
         """Relative residuals of the records, each predicted by a mapper and a discrepancy of the other folds.
 
-        A fold holds every fifth block of a week, or of five correlation times or the ``least`` number of records where
-        these are longer, as far as it keeps two blocks.
+        A fold holds every fifth block of a week or, where that is longer, of five correlation times or the ``least``
+        number of records, as far as each fold keeps two blocks.
         """
         measured = as_floats(self.frequencies)
         known = ~np.isnan(self.inputs).any(axis=1) & ~np.isnan(measured).all(axis=1) & self.counted
