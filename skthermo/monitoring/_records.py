@@ -325,8 +325,8 @@ def unknown_months(responses: pd.DataFrame) -> Iterator[FewRecordsWarning]:
     if months:
         each = "; ".join(f"{name!r} in {names}" for name, names in months.items())
         yield FewRecordsWarning(
-            f"responses have no baseline record in some months: {each}. Their values there are expected "
-            "by other seasons, which may give false alarms or hide damage. Refit with records of these months",
+            f"responses have no baseline record in some months: {each}. The regression predicts them there "
+            "from other seasons, which may give false alarms or hide damage. Refit with records of these months",
             "few-records",
         )
 

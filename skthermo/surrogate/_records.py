@@ -87,8 +87,8 @@ class TrainingRecords(SavesFrames):
         weights = None if self.weights is None else self.weights[order]
         has_theta = ~np.isnan(theta).any(axis=1)
         if has_theta.sum() < 2 * N_FOLDS:
-            few = f"{has_theta.sum()} records have parameters"
-            raise ValueError(f"{few}; expected at least {2 * N_FOLDS} for residuals")
+            found = f"{has_theta.sum()} records have parameters"
+            raise ValueError(f"{found}; expected at least {2 * N_FOLDS} for residuals")
         own = measured / (self.modelled[order] * np.exp(model.discrepancy.at(inputs))) - 1
         records = _safe_indexing(self.temperatures, order)
         seen = ~np.isnan(own).all(axis=1)
@@ -238,10 +238,9 @@ class RecordSimulator(SavesFrames):
 
     @cached_property
     def residuals_of_long_blocks(self) -> BaselineResiduals:
-        """The same out of the longest blocks, a tenth of the records, whose means scatter as those of other years.
+        """Residuals out of blocks of a tenth of the records, whose means scatter as the means of other years do.
 
-        Where moisture or soil makes residuals last, a regression has learned much of a shorter block from the blocks
-        beside it.
+        Where moisture or soil makes residuals last, a regression learns much of a shorter block from its neighbours.
         """
         return self.records.residuals(self.model, least=len(self.records.inputs))
 
